@@ -1,0 +1,142 @@
+"""A motion: joints and hands over time, and which joints make up a task's chain.
+
+Joint order within a chain is the order of the names in :data:`CHAINS`, never the
+order of a file or a model, so a direction learned today means the same tomorrow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import InvalidInput
+
+__all__ = ["CHAINS", "SIDES", "Motion", "chain_joints", "chain_sides"]
+
+#: Order of the side axis of every per-hand array.
+SIDES = ("right", "left")
+
+_ARM = (
+    "shoulder_1",
+    "shoulder_2",
+    "shoulder_3",
+    "elbow_flexion",
+    "forearm_pronation",
+    "wrist_flexion",
+    "wrist_deviation",
+)
+_CLAVICLE = ("clavicle_protraction", "clavicle_elevation")
+
+
+def _named(side: str, joints: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"{side}_{joint}" for joint in joints)
+
+
+#: Joints that a task employs (the intrinsic part); all others are extrinsic.
+CHAINS: dict[str, tuple[str, ...]] = {
+    "right_arm": _named("right", _ARM),
+    "left_arm": _named("left", _ARM),
+    "right_arm_clavicle": _named("right", _CLAVICLE + _ARM),
+    "left_arm_clavicle": _named("left", _CLAVICLE + _ARM),
+    "both_arms": _named("right", _ARM) + _named("left", _ARM),
+}
+
+
+def chain_joints(chain: str) -> tuple[str, ...]:
+    """Return the joint names of a chain, in chain order."""
+    if chain not in CHAINS:
+        raise InvalidInput(
+            f"unknown chain '{chain}', expected one of {sorted(CHAINS)}."
+        )
+    return CHAINS[chain]
+
+
+def chain_sides(chain: str) -> tuple[str, ...]:
+    """Return the sides whose hands carry out the chain's task."""
+    joints = chain_joints(chain)
+    return tuple(side for side in SIDES if any(j.startswith(side) for j in joints))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Joints and hands over time.
+
+    Parameters
+    ----------
+    time : (T,) array
+        Seconds.
+    q : (T, nq) array
+        Configuration of the skeleton; the last ``len(joint_names)`` columns are the
+        joint angles in radians, before them stands the pose of the thorax in the world
+        (meters and a unit quaternion x, y, z, w) where the skeleton has one.
+    v : (T, nv) array
+        Velocity of `q` in the tangent space, m/s and rad/s.
+    joint_names : tuple of str
+        Names of the last columns of `q` and `v`.
+    hand_in_thorax : (T, 2, 3) array
+        Hand positions, meters; the side axis follows :data:`SIDES`.
+    hand_rotation_in_thorax : (T, 2, 3, 3) array
+        Hand orientations.
+    hand_velocity_in_thorax : (T, 2, 3) array
+        Velocity of the hand positions as seen from the thorax, m/s.
+    residual : (T,) array
+        Root mean square distance of the seen markers from the model's, meters.
+    iterations : (T,) integer array
+        Iterations that the solver took.
+    converged : (T,) boolean array
+        Whether the solver met its tolerance.
+    held : tuple of str
+        Joints that the markers could not observe; they stayed at their prior.
+    """
+
+    time: NDArray[np.float64]
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    joint_names: tuple[str, ...]
+    hand_in_thorax: NDArray[np.float64]
+    hand_rotation_in_thorax: NDArray[np.float64]
+    hand_velocity_in_thorax: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+    held: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                frozen = value.view()
+                frozen.flags.writeable = False
+                object.__setattr__(self, field.name, frozen)
+
+    @property
+    def angles(self) -> NDArray[np.float64]:
+        """Joint angles, (T, len(joint_names)) radians."""
+        return self.q[:, -len(self.joint_names) :]
+
+    def chain_angles(self, chain: str) -> NDArray[np.float64]:
+        """Joint angles of a chain, (T, n) radians in chain order."""
+        return self.angles[:, self._columns(chain)]
+
+    def chain_velocities(self, chain: str) -> NDArray[np.float64]:
+        """Joint velocities of a chain, (T, n) rad/s in chain order."""
+        return self.v[:, -len(self.joint_names) :][:, self._columns(chain)]
+
+    def place(self, chain: str) -> NDArray[np.float64]:
+        """Where the task happens: the hand, or the midpoint of both, (T, 3) m."""
+        return self.hand_in_thorax[:, self._sides(chain)].mean(axis=1)
+
+    def hand_speed(self, chain: str) -> NDArray[np.float64]:
+        """Speed of the chain's fastest hand relative to the thorax, (T,) m/s."""
+        velocity = self.hand_velocity_in_thorax[:, self._sides(chain)]
+        return np.linalg.norm(velocity, axis=2).max(axis=1)
+
+    def _columns(self, chain: str) -> list[int]:
+        return [self.joint_names.index(name) for name in chain_joints(chain)]
+
+    def _sides(self, chain: str) -> list[int]:
+        return [SIDES.index(side) for side in chain_sides(chain)]

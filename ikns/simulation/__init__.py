@@ -1,0 +1,1 @@
+"""Virtual subjects: simulated people with a known truth."""
