@@ -20,9 +20,9 @@ __all__ = ["CHAINS", "SIDES", "Motion", "chain_joints", "chain_sides"]
 SIDES = ("right", "left")
 
 _ARM = (
-    "shoulder_1",
-    "shoulder_2",
-    "shoulder_3",
+    "shoulder_abduction",
+    "shoulder_flexion",
+    "shoulder_rotation",
     "elbow_flexion",
     "forearm_pronation",
     "wrist_flexion",
