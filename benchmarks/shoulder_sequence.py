@@ -57,7 +57,7 @@ def self_motion(
     up = (SHOULDER - elbow) / UPPER_ARM
     forearm = (wrist - elbow) / FOREARM
     right = np.cross(forearm, up)
-    right /= -np.linalg.norm(right, axis=1, keepdims=True)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
     shoulder = Rotation.from_matrix(
         np.stack([np.cross(up, right), up, right], axis=2)
     )
