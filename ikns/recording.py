@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns.errors import InvalidInput
+from ikns.errors import InvalidInput, MarkerMismatch
 
 __all__ = ["Recording"]
 
 
-@dataclass(frozen=True)
+# Arrays have no single truth value, so recordings are compared by identity.
+@dataclass(frozen=True, eq=False)
 class Recording:
     """Marker positions over time.
 
@@ -94,6 +95,18 @@ class Recording:
         return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
 
     def select(self, labels: Sequence[str]) -> Recording:
-        """Return the same frames with only these markers, in this order."""
+        """Return the same frames with only these markers, in this order.
+
+        Raises
+        ------
+        MarkerMismatch
+            When the recording has no marker of that name.
+        """
+        missing = [label for label in labels if label not in self.labels]
+        if missing:
+            raise MarkerMismatch(
+                f"{self.source}: expected markers {', '.join(missing)}, found only "
+                f"{', '.join(self.labels)}."
+            )
         columns = [self.labels.index(label) for label in labels]
         return Recording(self.time, self.markers[:, columns], labels, self.source)
