@@ -1,0 +1,21 @@
+"""Every figure of the package: plain SI arrays in, a matplotlib Figure out.
+
+No figure touches pyplot or asks for a screen. Each takes ``simulated`` and says in its
+title when the data come from a virtual subject.
+"""
+
+from ikns.view.body import arm_points
+from ikns.view.directions import directions_figure, principal_angle_figure
+from ikns.view.residuals import residual_figure
+from ikns.view.signals import control_figure, swivel_figure
+from ikns.view.workspace import workspace_figure
+
+__all__ = [
+    "arm_points",
+    "control_figure",
+    "directions_figure",
+    "principal_angle_figure",
+    "residual_figure",
+    "swivel_figure",
+    "workspace_figure",
+]

@@ -1,0 +1,128 @@
+"""A report: one HTML file that holds its pictures, loads nothing and prints well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+
+from ikns.errors import FileError
+from ikns.view.parts import (
+    Cell,
+    KeyNumber,
+    Page,
+    Picture,
+    Section,
+    Step,
+    Table,
+    facts_html,
+    inline,
+    steps_html,
+)
+
+__all__ = [
+    "KeyNumber",
+    "Picture",
+    "Section",
+    "Step",
+    "Table",
+    "report_html",
+    "write_report",
+]
+
+
+def write_report(
+    path: str | Path,
+    *,
+    title: str,
+    sections: Sequence[Section],
+    simulated: bool,
+    lead: str = "",
+    facts: Mapping[str, Cell] | None = None,
+    key_numbers: Sequence[KeyNumber] = (),
+    next_steps: Sequence[Step] = (),
+) -> None:
+    """Write a report; an earlier file stays as it was until the new one is complete.
+
+    Parameters
+    ----------
+    path : str or Path
+        The HTML file.
+    title : str
+        Heading of the page.
+    sections : sequence of Section
+        Body of the report, in order.
+    simulated : bool
+        Whether the data come from a virtual subject; the header, every caption and
+        every table then say so.
+    lead : str
+        One paragraph under the title: the outcome.
+    facts : mapping, optional
+        Subject and provenance for the header: side, chain, seed, versions.
+    key_numbers : sequence of KeyNumber
+        Results to see first.
+    next_steps : sequence of Step
+        Commands for the end of the page.
+
+    Raises
+    ------
+    InvalidInput
+        When a picture has no alternative text or a table's row is too short or long.
+    FileError
+        When the file cannot be written.
+    """
+    page = report_html(
+        title=title,
+        sections=sections,
+        simulated=simulated,
+        lead=lead,
+        facts=facts,
+        key_numbers=key_numbers,
+        next_steps=next_steps,
+    )
+    target = Path(path)
+    draft = target.with_name(target.name + ".part")
+    try:
+        # A file name may hold bytes that are no text; they become question marks.
+        draft.write_text(page, encoding="utf-8", errors="replace", newline="\n")
+        draft.replace(target)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        raise FileError(f"{target}: cannot be written: {error.strerror}.") from None
+
+
+def report_html(
+    *,
+    title: str,
+    sections: Sequence[Section],
+    simulated: bool,
+    lead: str = "",
+    facts: Mapping[str, Cell] | None = None,
+    key_numbers: Sequence[KeyNumber] = (),
+    next_steps: Sequence[Step] = (),
+) -> str:
+    """Return the page that :func:`write_report` writes; same input, same text."""
+    page = Page(simulated)
+    style = files("ikns.view").joinpath("report.css").read_text(encoding="utf-8")
+    badge = '<p class="badge">Simulated subject</p>' if simulated else ""
+    parts = [
+        "<!DOCTYPE html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        # The browser itself refuses whatever the page would load.
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
+        "img-src data:; style-src 'unsafe-inline'\">",
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        '<meta name="color-scheme" content="light dark">',
+        f"<title>{escape(title)}</title>",
+        f"<style>\n{style}</style></head><body>",
+        f"<header>{badge}<h1>{inline(title)}</h1>",
+        f'<p class="lead">{inline(lead)}</p>' if lead else "",
+        facts_html(facts or {}),
+        "</header><main>",
+        page.key_numbers(key_numbers),
+        *(page.section(section) for section in sections),
+        steps_html(next_steps),
+        "</main></body></html>",
+    ]
+    return "\n".join(part for part in parts if part) + "\n"

@@ -1,0 +1,132 @@
+"""How every figure looks: colors, fonts, sizes, and the word "simulated"."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import matplotlib.style
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+__all__ = [
+    "BLUE",
+    "GREEN",
+    "GREY",
+    "INK",
+    "ORANGE",
+    "PAGE_WIDTH",
+    "PALE",
+    "RED",
+    "VOLUME",
+    "house_style",
+    "joint_labels",
+    "new_figure",
+    "point_color",
+]
+
+# Okabe and Ito, "Color Universal Design" (2008): told apart with any color vision.
+ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
+BLUE, RED, PURPLE, YELLOW = "#0072B2", "#D55E00", "#CC79A7", "#F0E442"
+INK, GREY, PALE = "#222222", "#8A8A8A", "#E4E4E4"
+#: The paper shows the interpolation volume in light red; it is drawn translucent.
+VOLUME = "#CC2233"
+
+#: Neighbors in this order differ in lightness as well as in hue.
+_CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, YELLOW)
+
+#: Width of a full figure, inches; 100 pixels of the report's page each.
+PAGE_WIDTH = 9.0
+
+_STYLE = {
+    "font.family": "sans-serif",
+    # Comes with matplotlib, so every machine draws the same picture.
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 8.5,
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8.5,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "figure.facecolor": "white",
+    "figure.titlesize": 11,
+    "figure.titleweight": "bold",
+    "grid.color": PALE,
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.1,
+    "svg.fonttype": "path",
+    # Ids inside an SVG are random without it.
+    "svg.hashsalt": "ikns",
+    "text.color": INK,
+    # A label with dollar signs is a label, not a formula.
+    "text.parse_math": False,
+    "xtick.color": GREY,
+    "xtick.labelcolor": INK,
+    "xtick.labelsize": 7.5,
+    "ytick.color": GREY,
+    "ytick.labelcolor": INK,
+    "ytick.labelsize": 7.5,
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Draw in our style whatever the user's own matplotlib settings are."""
+    with matplotlib.style.context(["default", _STYLE]):
+        yield
+
+
+def new_figure(
+    title: str, *, simulated: bool, height: float, width: float = PAGE_WIDTH
+) -> Figure:
+    """Return an empty figure that says in its title whether the data are simulated.
+
+    Parameters
+    ----------
+    title : str
+        What the figure shows.
+    simulated : bool
+        Whether any of the data come from a virtual subject.
+    height, width : float
+        Inches.
+    """
+    # Inches around each panel.
+    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06)
+    figure = Figure(figsize=(width, height), layout=layout)
+    text = f"{title} (simulated subject)" if simulated else title
+    figure.suptitle(text, x=0.008, ha="left")
+    return figure
+
+
+def point_color(point: int) -> tuple[float, float, float]:
+    """Color of a PCA point; past the seventh the hues return darker.
+
+    >>> point_color(0) == point_color(7)
+    False
+    """
+    darker = 0.62 ** (point // len(_CYCLE))
+    red, green, blue = to_rgb(_CYCLE[point % len(_CYCLE)])
+    return (red * darker, green * darker, blue * darker)
+
+
+def joint_labels(joint_names: Sequence[str]) -> list[str]:
+    """Joint names for reading, in the given order, without a side they all share.
+
+    >>> joint_labels(["right_elbow_flexion", "right_wrist_flexion"])
+    ['elbow flexion', 'wrist flexion']
+    >>> joint_labels(["right_elbow_flexion", "left_elbow_flexion"])
+    ['right elbow flexion', 'left elbow flexion']
+    """
+    words = [name.replace("_", " ") for name in joint_names]
+    for side in ("right ", "left "):
+        if words and all(word.startswith(side) for word in words):
+            return [word.removeprefix(side) for word in words]
+    return words
