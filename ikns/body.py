@@ -14,9 +14,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.anthropometry import Segment
 from ikns.errors import FileError, InvalidInput
 
-__all__ = ["SEGMENTS", "Inertial", "resize_urdf", "segment_lengths", "urdf_folder"]
+__all__ = [
+    "GENERIC_STATURE",
+    "SEGMENTS",
+    "Inertial",
+    "link_inertials",
+    "resize_urdf",
+    "segment_lengths",
+    "urdf_folder",
+]
+
+#: Stature of the generic body: mean of the ANSUR II means of women and men, m.
+GENERIC_STATURE = (1.6285 + 1.7562) / 2
+#: The trunk's center of mass lies this far behind the sternal notch: midway between
+#: notch and C7, where ISB puts the thorax's long axis; m in the generic body.
+_TRUNK_DEPTH = 0.060
+#: Trunk length (sternal notch to hip) of the generic body, de Leva 1996, m.
+_TRUNK_LENGTH = 0.5166
 
 #: Segments that scale, each named like its link, with the joint that ends it (the
 #: trunk has no such joint: its length is not a distance in the model).
@@ -73,6 +90,45 @@ def segment_lengths(urdf: str) -> dict[str, float]:
     }
 
 
+def link_inertials(urdf: str, parts: Mapping[str, Segment]) -> dict[str, Inertial]:
+    """Inertial properties of each segment's link, by link name.
+
+    Parameters
+    ----------
+    urdf : str
+        Gives the direction of each segment in its link.
+    parts : mapping
+        As from :func:`ikns.anthropometry.segments`: principal moments about the
+        front-back axis, the long axis, and the axis across both, palms forward.
+    """
+    joints = {joint.get("name"): joint for joint in ET.fromstring(urdf).iter("joint")}
+    trunk = parts["trunk_head"]
+    inertials = {
+        "thorax": Inertial(
+            trunk.mass_kg,
+            (-_TRUNK_DEPTH * trunk.length_m / _TRUNK_LENGTH, -trunk.com_m, 0.0),
+            trunk.inertia_kg_m2,
+        )
+    }
+    for name, end in SEGMENTS.items():
+        if end is None:
+            continue
+        part = parts[name.split("_", 1)[1]]
+        along = _vector(joints[end].find("origin"), "xyz")
+        center = part.com_m * along / np.linalg.norm(along)
+        front, long, across = part.inertia_kg_m2
+        moments = {
+            "clavicle": (front, across, long),  # long axis sideways
+            "upper_arm": (front, long, across),
+            # Thumbs forward in the zero pose: a quarter turn from palms forward.
+            "forearm": (across, long, front),
+            "hand": (across, long, front),
+        }[part.name]
+        x, y, z = (float(value) for value in center)
+        inertials[name] = Inertial(part.mass_kg, (x, y, z), moments)
+    return inertials
+
+
 def resize_urdf(
     urdf: str,
     factors: Mapping[str, float],
@@ -97,7 +153,9 @@ def resize_urdf(
     InvalidInput
         When a factor is not positive or a segment does not exist.
     """
-    robot = ET.fromstring(urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
+    robot = ET.fromstring(
+        urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
+    )
     links = {link.get("name"): link for link in robot.iter("link")}
     given = {} if inertials is None else inertials
     for name in [*factors, *given]:
@@ -140,9 +198,7 @@ def _set_inertial(link: ET.Element, inertial: Inertial) -> None:
     ET.SubElement(element, "origin", xyz=_text(np.array(inertial.center)))
     ET.SubElement(element, "mass", value=f"{inertial.mass:.9g}")
     xx, yy, zz = (f"{value:.9g}" for value in inertial.inertia)
-    ET.SubElement(
-        element, "inertia", ixx=xx, ixy="0", ixz="0", iyy=yy, iyz="0", izz=zz
-    )
+    ET.SubElement(element, "inertia", ixx=xx, ixy="0", ixz="0", iyy=yy, iyz="0", izz=zz)
     link.insert(0, element)
 
 

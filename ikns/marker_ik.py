@@ -1,8 +1,8 @@
-"""Marker inverse kinematics: the joint angles that put the markers where they were seen.
+"""Marker inverse kinematics: the joint angles that put markers where they were seen.
 
 Each frame minimizes, over the configuration q,
 
-    sum over seen markers |p_m(q) - seen_m|^2         marker distances, m^2
+    sum over seen markers weight_m |p_m(q) - seen_m|^2         marker distances, m^2
     + (PRIOR |q - q_before|)^2                        weak pull to the pose before
     + (LIMIT max(0, lower - q, q - upper))^2          soft joint limits
 
@@ -35,7 +35,7 @@ PRIOR = 5e-3
 #: Stiffness of the joint limits, m/rad: 10 deg beyond a limit costs as much as 9 mm.
 LIMIT = 0.05
 #: A frame has converged when no joint moves more than this in a step, rad and m.
-STEP_TOLERANCE = 1e-6
+STEP_TOLERANCE = 1e-5
 #: Root mean square residual above which a frame is also tried from scratch, m. Soft
 #: tissue and modeling leave 10 to 20 mm (stoop lifts, see benchmarks/real_people.py).
 LOST = 0.06
@@ -93,9 +93,9 @@ class MarkerIK:
         self.held = skeleton.marker_set.held
         fixed = skeleton.columns(self.held)
         self._free = np.setdiff1d(np.arange(skeleton.nv), fixed)
-        self._tracked = np.array(
-            [not marker.static_only for marker in skeleton.marker_set.markers]
-        )
+        worn = skeleton.marker_set.markers
+        self._tracked = np.array([not marker.static_only for marker in worn])
+        self._weight = np.sqrt([marker.weight for marker in worn])
 
     def solve(self, markers: ArrayLike, q: Array | None = None) -> Pose:
         """Solve one frame.
@@ -118,7 +118,9 @@ class MarkerIK:
         if seen.shape != expected:
             raise InvalidInput(f"expected markers {expected}, found {seen.shape}.")
         if np.isinf(seen).any():
-            raise InvalidInput("marker positions must be finite or NaN, found infinity.")
+            raise InvalidInput(
+                "marker positions must be finite or NaN, found infinity."
+            )
         if q is not None and not np.isfinite(q).all():
             raise InvalidInput("the pose before must be finite, found NaN or infinity.")
         seen[~self._tracked] = np.nan
@@ -215,17 +217,18 @@ class MarkerIK:
         """Levenberg-Marquardt from the pose `before`."""
         skeleton, free = self.skeleton, self._free
         rows = np.isfinite(seen).all(axis=1)
-        target = seen[rows]
+        target, weight = seen[rows], self._weight[rows, None]
         # From scratch the pull only keeps unseen joints from drifting.
         pull = PRIOR if prior else 0.1 * PRIOR
         q, damping = before, 1e-8
         positions, jacobian = skeleton.marker_jacobian(q)
-        cost = self._cost(positions[rows] - target, before, q, pull)
+        cost = self._cost(weight * (positions[rows] - target), before, q, pull)
         converged = False
         iterations = 0
         while iterations < self.max_iterations:
-            error = (positions[rows] - target).ravel()
-            J = jacobian[rows][:, :, free].reshape(len(error), len(free))
+            error = (weight * (positions[rows] - target)).ravel()
+            J = weight[:, None] * jacobian[rows][:, :, free]
+            J = J.reshape(len(error), len(free))
             moved = skeleton.difference(before, q)[free]
             beyond, outside = self._beyond(q)
             diagonal = pull**2 + LIMIT**2 * outside[free]
@@ -254,9 +257,8 @@ class MarkerIK:
                 full /= max(1.0, np.abs(full).max())
                 trial = skeleton.integrate(q, full)
                 trial_positions, trial_jacobian = skeleton.marker_jacobian(trial)
-                trial_cost = self._cost(
-                    trial_positions[rows] - target, before, trial, pull
-                )
+                error = weight * (trial_positions[rows] - target)
+                trial_cost = self._cost(error, before, trial, pull)
                 small = np.abs(full).max() < STEP_TOLERANCE
                 if trial_cost <= cost:
                     q, cost = trial, trial_cost
@@ -277,9 +279,7 @@ class MarkerIK:
         moved = self.skeleton.difference(before, q)
         beyond, _ = self._beyond(q)
         return float(
-            np.sum(error**2)
-            + pull**2 * (moved @ moved)
-            + LIMIT**2 * (beyond @ beyond)
+            np.sum(error**2) + pull**2 * (moved @ moved) + LIMIT**2 * (beyond @ beyond)
         )
 
     def _beyond(self, q: Array) -> tuple[Array, Array]:

@@ -42,6 +42,9 @@ class Marker:
         Worn in the static trial only.
     aliases : tuple of str
         Other labels of the same marker.
+    weight : float
+        How much inverse kinematics trusts it, relative to the others: less where soft
+        tissue moves under it.
     """
 
     label: str
@@ -50,6 +53,7 @@ class Marker:
     placement_sd: float
     static_only: bool = False
     aliases: tuple[str, ...] = ()
+    weight: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,9 @@ class MarkerSet:
         try:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise FileError(f"{path}: cannot be read as a marker set: {error}") from None
+            raise FileError(
+                f"{path}: cannot be read as a marker set: {error}"
+            ) from None
         if table.get("format") != _FORMAT:
             raise FileError(
                 f"{path}: expected marker-set format {_FORMAT}, "
@@ -199,6 +205,7 @@ def _read_marker(label: str, table: Mapping[str, Any]) -> Marker:
         float(table["placement_sd_mm"]) / 1000,
         bool(table.get("static_only", False)),
         tuple(table.get("aliases", ())),
+        float(table.get("weight", 1.0)),
     )
 
 
@@ -212,4 +219,6 @@ def _write_marker(marker: Marker) -> dict[str, object]:
         table["static_only"] = True
     if marker.aliases:
         table["aliases"] = list(marker.aliases)
+    if marker.weight != 1:
+        table["weight"] = marker.weight
     return table

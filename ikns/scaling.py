@@ -159,7 +159,9 @@ def scale(
             for s, name in enumerate(SEGMENTS)
             if name in lengths
         },
-        residuals=_by_label(labels[seen], np.linalg.norm(at_fit - target, axis=1)[seen]),
+        residuals=_by_label(
+            labels[seen], np.linalg.norm(at_fit - target, axis=1)[seen]
+        ),
         offsets=_by_label(
             labels[seen], np.linalg.norm(positions - nominal, axis=1)[seen]
         ),
@@ -222,9 +224,7 @@ def _absent_joints(
     return tuple(joint for joint in absent if joint not in worn.held)
 
 
-def _fit(
-    generic: Skeleton, target: Array
-) -> tuple[Array, Array, Array, Array, bool]:
+def _fit(generic: Skeleton, target: Array) -> tuple[Array, Array, Array, Array, bool]:
     """Gauss-Newton with step halving over sizes, marker places and pose.
 
     Returns log factors (S,), marker positions (M, 3), configuration, covariance of the

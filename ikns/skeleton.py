@@ -15,7 +15,16 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from ikns.body import SEGMENTS, Inertial, resize_urdf, segment_lengths, urdf_folder
+from ikns.anthropometry import Segment, segments
+from ikns.body import (
+    GENERIC_STATURE,
+    SEGMENTS,
+    Inertial,
+    link_inertials,
+    resize_urdf,
+    segment_lengths,
+    urdf_folder,
+)
 from ikns.errors import FileError, InvalidInput, MarkerMismatch
 from ikns.marker_set import MarkerSet
 from ikns.motion import SIDES, chain_joints, chain_sides
@@ -83,6 +92,54 @@ class Skeleton:
             raise FileError(f"{file}: cannot be read as a URDF: {error}") from None
         return cls(text, MarkerSet.load(marker_set))
 
+    @classmethod
+    def from_anthropometry(
+        cls,
+        stature: float,
+        mass: float,
+        sex: str,
+        *,
+        marker_set: str | Path = "oxford24",
+    ) -> Skeleton:
+        """Return the body of an average adult of this stature, mass and sex.
+
+        Parameters
+        ----------
+        stature : float
+            Meters.
+        mass : float
+            Kilograms.
+        sex : str
+            "female" or "male".
+        marker_set : str or path
+            What the person wears.
+
+        Examples
+        --------
+        >>> skeleton = Skeleton.from_anthropometry(1.75, 70, "female")
+        >>> round(skeleton.segment_lengths["right_upper_arm"], 3)
+        0.277
+        """
+        return cls.load(marker_set=marker_set).proportioned(
+            segments(stature, mass, sex), stature=stature
+        )
+
+    def proportioned(self, parts: Mapping[str, Segment], *, stature: float) -> Skeleton:
+        """Return a skeleton with a person's segments.
+
+        Parameters
+        ----------
+        parts : mapping
+            As from :func:`ikns.anthropometry.segments`.
+        stature : float
+            Meters; sizes the thorax.
+        """
+        lengths = self.segment_lengths
+        factors = {"thorax": stature / GENERIC_STATURE}
+        for name in lengths:
+            factors[name] = parts[name.split("_", 1)[1]].length_m / lengths[name]
+        return self.resized(factors, inertials=link_inertials(self.urdf, parts))
+
     def resized(
         self,
         factors: Mapping[str, float],
@@ -131,11 +188,11 @@ class Skeleton:
         return np.array(pin.neutral(self._model))
 
     def integrate(self, q: Array, v: Array) -> Array:
-        """Configuration after the tangent step `v` from `q`."""
+        """Return the configuration after the tangent step `v` from `q`."""
         return np.array(pin.integrate(self._model, q, v))
 
     def difference(self, q0: Array, q1: Array) -> Array:
-        """Tangent step that leads from `q0` to `q1`."""
+        """Return the tangent step that leads from `q0` to `q1`."""
         return np.array(pin.difference(self._model, q0, q1))
 
     def columns(self, joints: tuple[str, ...]) -> NDArray[np.int64]:
@@ -175,7 +232,7 @@ class Skeleton:
         return positions, jacobian
 
     def size_jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Derivatives of the marker positions by the body's sizes.
+        """Differentiate the marker positions by the body's sizes.
 
         Returns
         -------
@@ -212,7 +269,7 @@ class Skeleton:
         return np.array(pose.translation), np.array(pose.rotation)
 
     def hands_in_thorax(self, q: Array) -> tuple[Array, Array]:
-        """Knuckle positions (2, 3) m and hand orientations (2, 3, 3), right and left."""
+        """Right and left knuckle, (2, 3) m, and hand orientation, (2, 3, 3)."""
         self._update_in_thorax(q)
         poses = [
             pin.updateFramePlacement(self._model, self._data, frame)
@@ -272,7 +329,7 @@ class Skeleton:
             radial = elbow - shoulder - line * np.dot(elbow - shoulder, line)
             down = -np.eye(3)[1] + line * line[1]
             outward = np.cross(down, line) * (1 if side == "left" else -1)
-            # The sine of 1 deg of elbow flexion leaves about 2 mm between elbow and line.
+            # 1 deg of elbow flexion leaves about 2 mm between elbow and line.
             straight = np.linalg.norm(radial) < 2e-3
             angles[i] = (
                 np.nan if straight else np.arctan2(radial @ outward, radial @ down)
