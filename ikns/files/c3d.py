@@ -132,7 +132,7 @@ def _frame_count(layout: Layout, fitting: int) -> int:
     if count == _WORD:
         start = _long(layout, "TRIAL:ACTUAL_START_FIELD")
         end = _long(layout, "TRIAL:ACTUAL_END_FIELD")
-        if start and end - start + 1 > _WORD:
+        if start and end - start + 1 >= _WORD:
             count = end - start + 1
         else:
             count = layout.number("POINT:LONG_FRAMES", max(fitting, _WORD))
