@@ -6,8 +6,8 @@ are trajectories without a name. Virtual points that *are* positions (joint cent
 the center of mass) stay: whoever needs certain markers picks them by label.
 
 The bytes are read here rather than by ezc3d, which writes our files and checks this
-reader in its tests: version 1.7 ends the process on damaged parameters and on parameter
-descriptions over 127 bytes, drops all frames after 65535, and takes ten times as long.
+reader in its tests: version 1.7.2 ends the whole process on some damaged parameters,
+refuses parameter descriptions over 127 bytes, and drops all frames after 65535.
 """
 
 from __future__ import annotations
