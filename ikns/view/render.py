@@ -6,6 +6,7 @@ import base64
 import io
 import warnings
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from ikns.view.style import house_style
@@ -14,8 +15,8 @@ __all__ = ["data_uri", "png", "svg"]
 
 #: Dots per inch of a PNG: about two per pixel of a page 900 pixels wide.
 _DPI = 170
-#: An SVG above this size (bytes) holds so many points that a PNG is smaller.
-_LARGEST_SVG = 250_000
+#: Points in one figure above which an SVG (60 bytes each) outgrows the PNG.
+_MOST_POINTS = 3000
 
 
 def svg(figure: Figure) -> bytes:
@@ -34,14 +35,18 @@ def data_uri(figure: Figure) -> str:
     >>> data_uri(Figure(figsize=(1, 1)))[:26]
     'data:image/svg+xml;base64,'
     """
-    # A 3-D figure holds thousands of polygons: not worth drawing to find out.
-    spatial = any(axes.name == "3d" for axes in figure.axes)
-    vector = b"" if spatial else svg(figure)
-    if spatial or len(vector) > _LARGEST_SVG:
+    if _is_crowded(figure):
         kind, picture = "image/png", png(figure)
     else:
-        kind, picture = "image/svg+xml", vector
+        kind, picture = "image/svg+xml", svg(figure)
     return f"data:{kind};base64,{base64.b64encode(picture).decode('ascii')}"
+
+
+def _is_crowded(figure: Figure) -> bool:
+    lines = [line for axes in figure.axes for line in axes.lines]
+    points = sum(np.size(line.get_xdata()) for line in lines)
+    # Surfaces and clouds of points are what 3-D axes are used for.
+    return points > _MOST_POINTS or any(axes.name == "3d" for axes in figure.axes)
 
 
 def _saved(figure: Figure, kind: str) -> bytes:
