@@ -1,0 +1,235 @@
+"""The smallest box around points, oriented as they lie, and places on its surface."""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
+from scipy.spatial.distance import cdist
+
+from ikns.errors import InvalidInput
+
+__all__ = ["BoundingBox", "box_surface_points", "minimum_bounding_box"]
+
+# Thinner than this times the longest side counts as flat: far above rounding (1e-16)
+# and below the 0.1 mm that any camera resolves in a workspace of a meter.
+_FLAT = 1e-9
+_ROUNDING = 1e-12  # of the coordinates, when points are compared
+_FRAMES = 6  # starting frames of each kind for the smallest box; a tenth of a second
+_ROUNDS, _GAIN = 30, 1e-6  # rounds of turns, and the gain in volume that ends them
+
+
+class BoundingBox(NamedTuple):
+    """An oriented box.
+
+    Parameters
+    ----------
+    center : (d,) array
+        Middle of the box, in the unit of the points (m).
+    axes : (d, d) array
+        Orthonormal rows, right-handed, the longest side first.
+    half_lengths : (d,) array
+        Half the side along each axis; zero where the points are flat.
+    """
+
+    center: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    half_lengths: NDArray[np.float64]
+
+
+def minimum_bounding_box(points: ArrayLike) -> BoundingBox:
+    """Oriented box of minimum volume around points.
+
+    The exact minimum (O'Rourke 1985) costs the cube of the hull's size. Here a box is
+    turned about one of its axes to the smallest rectangle seen along that axis (exact,
+    one side lies on the outline: Freeman and Shapira 1975), then about the next, until
+    a round of turns gains less than a millionth (30 rounds at most). This starts from
+    the principal axes, from the smallest boxes that lie flush on a face of the convex
+    hull, and from frames all around, and the smallest result counts.
+
+    Guaranteed: it holds all points and is never larger than the principal-axes box, the
+    coordinate-axes box or any face-flush box. Not guaranteed: the global minimum.
+    (Against descents from 240 frames it was 0.2 % larger on average and 3 % at worst on
+    4 random points; less on more points; equal on lumps at the corners of a box.)
+
+    Flat points get the smallest rectangle, exactly. Points that fill more than three
+    dimensions get the box along their principal axes.
+
+    Parameters
+    ----------
+    points : (N, d) array
+        Any unit; flat or coinciding points give half lengths of zero.
+
+    Returns
+    -------
+    BoundingBox
+        Center (d,), axes (d, d) as rows, half lengths (d,), the longest side first.
+
+    Raises
+    ------
+    InvalidInput
+        When the points are not a non-empty table of finite numbers.
+
+    Examples
+    --------
+    >>> diamond = [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+    >>> minimum_bounding_box(diamond).half_lengths.round(6).tolist()
+    [0.707107, 0.707107, 0.0]
+    """
+    x = np.asarray(points, dtype=np.float64)
+    if x.ndim != 2 or 0 in x.shape or not np.isfinite(x).all():
+        raise InvalidInput(f"expected finite points (N, d), found an array {x.shape}.")
+    mean = x.mean(axis=0)
+    _, s, axes = np.linalg.svd(np.linalg.qr(x - mean, mode="r"))
+    floor = max(_FLAT * s[0], _ROUNDING * np.abs(x).max())
+    rank = int(np.count_nonzero(s > floor))
+    if rank in (2, 3):
+        inside = axes[:rank]
+        axes[:rank] = _smallest_axes((x - mean) @ inside.T, inside.T) @ inside
+    low, high = (x @ axes.T).min(axis=0), (x @ axes.T).max(axis=0)
+    half = (high - low) / 2
+    half[rank:] = 0.0  # below the tolerance for flat
+    order = np.argsort(-half, kind="stable")
+    axes, center, half = axes[order], (low + high) / 2 @ axes, half[order]
+    axes *= np.sign(np.take_along_axis(axes, np.abs(axes).argmax(1)[:, None], axis=1))
+    axes[-1] *= np.sign(np.linalg.det(axes))
+    return BoundingBox(center, axes, half)
+
+
+def box_surface_points(
+    box: BoundingBox, n: int, *, up: ArrayLike | None = None
+) -> NDArray[np.float64]:
+    """Places on the surface of a box where `n` centroids start.
+
+    In this order: vertices; centers of the upper and the lower face; centers of the
+    other faces; middles of the edges (26 in all for a box with three sides); then
+    whatever place on the surface is farthest from those before, on a regular grid.
+    Fewer than all vertices: two opposite ones, or first those no two of which share an
+    edge. A flat box is a rectangle, a segment or a point and gives the places that it
+    has; of a box with more than three sides only the three longest vary.
+
+    Parameters
+    ----------
+    box : BoundingBox
+        From :func:`minimum_bounding_box`.
+    n : int
+        How many places.
+    up : (d,) array, optional
+        Upward direction; the box axis closest to it is the vertical one. Default: the
+        Y axis in three dimensions (ISB thorax: X forward, Y up, Z right), else the
+        shortest side.
+
+    Returns
+    -------
+    (n, d) array
+        Distinct places unless the box is a single point.
+    """
+    longest = box.half_lengths.max()
+    sides = np.flatnonzero(box.half_lengths > _FLAT * longest)[:3]
+    if not sides.size:
+        return np.repeat(box.center[None], n, axis=0)
+    r = len(sides)
+    if up is None and len(box.center) == 3:
+        up = (0.0, 1.0, 0.0)
+    lift = np.eye(r)[-1] if up is None else box.axes[sides] @ np.asarray(up, float)
+    vertical = int(np.abs(lift).argmax())
+    upward = np.where(np.arange(r) == vertical, np.copysign(1.0, lift), 1.0)
+
+    cube = np.array(list(itertools.product((1.0, -1.0), repeat=r)))
+    even = cube.prod(axis=1) > 0
+    vertices = np.vstack([cube[even], cube[~even]])
+    if n == 2:
+        vertices = np.vstack([vertices[0], -vertices[0]])
+    places = [*vertices]
+    for k in (vertical, *np.delete(np.arange(r), vertical)) if r > 1 else ():
+        places += [np.eye(r)[k] * upward, -np.eye(r)[k] * upward]
+    if r == 3:
+        steps = np.array(list(itertools.product((1.0, 0.0, -1.0), repeat=3)))
+        places += [*steps[np.count_nonzero(steps == 0, axis=1) == 1]]
+    half = box.half_lengths[sides]
+    chosen = _spread(np.array(places[:n]) * half, half, n)
+    return box.center + chosen @ box.axes[sides]
+
+
+def _spread(
+    places: NDArray[np.float64], half: NDArray[np.float64], n: int
+) -> NDArray[np.float64]:
+    """Add places of a grid on the surface, farthest first, until there are `n`."""
+    if n <= len(places):
+        return places
+    r = len(half)
+    # At least four candidates for each place; a segment offers its whole length.
+    steps = 2 ** int(np.ceil(np.log2(4 * n) / max(r - 1, 1)))
+    line = np.linspace(-1.0, 1.0, steps + 1)
+    grid = np.array(list(itertools.product(line, repeat=r)))
+    if r > 1:
+        grid = grid[np.abs(grid).max(axis=1) == 1.0]
+    grid = grid * half
+    gap = cdist(grid, places).min(axis=1)
+    chosen = list(places)
+    while len(chosen) < n:
+        farthest = grid[gap.argmax()]
+        chosen.append(farthest)
+        gap = np.minimum(gap, np.linalg.norm(grid - farthest, axis=1))
+    return np.array(chosen)
+
+
+def _smallest_axes(
+    x: NDArray[np.float64], coordinate_axes: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Axes (rows) of the smallest box found around points (N, 2 or 3) that fill it.
+
+    `x` is in principal axes, whose signs are arbitrary; starting frames that differ by
+    such signs are all tried, so a moved cloud gets the moved box.
+    """
+    hull = ConvexHull(x)
+    x = x[hull.vertices]
+    if x.shape[1] == 2:
+        return _turned(x, np.eye(2), 0, 1)
+    normals = hull.equations[:, :3]
+    on_faces = [_turned(x, np.linalg.svd(n[None])[2], 1, 2) for n in normals]
+    on_faces.sort(key=lambda axes: _volume(x, axes))
+    frames = np.linalg.qr(np.random.default_rng(0).normal(size=(_FRAMES, 3, 3)))[0]
+    flips = [np.diag(signs) for signs in np.vstack([np.ones(3), 1 - 2 * np.eye(3)])]
+    starts = [np.eye(3), *on_faces[:_FRAMES], *(f @ s for f in frames for s in flips)]
+    found = [_shrunk(x, axes) for axes in starts]
+    if coordinate_axes.shape == (3, 3):
+        found.append(coordinate_axes)
+    return _shrunk(x, min(found, key=lambda axes: _volume(x, axes)))
+
+
+def _shrunk(x: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn about one axis after the other until no turn makes the box smaller."""
+    volume = _volume(x, axes)
+    for _ in range(_ROUNDS):
+        before = volume
+        for i, j in ((0, 1), (1, 2), (0, 2)):
+            turned = _turned(x, axes, i, j)
+            if _volume(x, turned) < volume:
+                volume, axes = _volume(x, turned), turned
+        if volume > before * (1 - _GAIN):
+            break
+    return axes
+
+
+def _volume(x: NDArray[np.float64], axes: NDArray[np.float64]) -> float:
+    return float(np.ptp(x @ axes.T, axis=0).prod())
+
+
+def _turned(
+    x: NDArray[np.float64], axes: NDArray[np.float64], i: int, j: int
+) -> NDArray[np.float64]:
+    """Axes with `i` and `j` turned to the smallest rectangle around what they see."""
+    seen = x @ axes[[i, j]].T
+    outline = seen[ConvexHull(seen).vertices]
+    edges = np.roll(outline, -1, axis=0) - outline
+    along = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    across = along @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    area = np.ptp(outline @ along.T, axis=0) * np.ptp(outline @ across.T, axis=0)
+    best = area.argmin()
+    turned = axes.copy()
+    turned[[i, j]] = np.stack([along[best], across[best]]) @ axes[[i, j]]
+    return turned
