@@ -58,9 +58,7 @@ def self_motion(
     forearm = (wrist - elbow) / FOREARM
     right = np.cross(forearm, up)
     right /= np.linalg.norm(right, axis=1, keepdims=True)
-    shoulder = Rotation.from_matrix(
-        np.stack([np.cross(up, right), up, right], axis=2)
-    )
+    shoulder = Rotation.from_matrix(np.stack([np.cross(up, right), up, right], axis=2))
     flexion = np.arccos(np.clip(np.sum(-up * forearm, axis=1), -1, 1))
     elbow_frame = shoulder * Rotation.from_euler("Z", flexion[:, None])
     middle = len(SWIVEL) // 2
