@@ -1,1 +1,17 @@
 """Virtual subjects: simulated people with a known truth."""
+
+from ikns.simulation.folder import write_protocol
+from ikns.simulation.movement import Unsteadiness
+from ikns.simulation.protocol import Protocol, simulate_protocol
+from ikns.simulation.subject import VirtualSubject, virtual_subject
+from ikns.simulation.trial import Trial
+
+__all__ = [
+    "Protocol",
+    "Trial",
+    "Unsteadiness",
+    "VirtualSubject",
+    "simulate_protocol",
+    "virtual_subject",
+    "write_protocol",
+]

@@ -1,0 +1,238 @@
+"""One arm of a virtual subject: reach a hand pose, and swivel the elbow around it.
+
+The self-motion comes from the Jacobian alone: its null direction is followed, and the
+hand pose is put back by Newton steps after every step of the way. Nothing here knows
+about directions that were learned from a recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.linalg.lapack import dposv
+
+from ikns.errors import InvalidInput
+from ikns.motion import SIDES, chain_joints
+from ikns.skeleton import Skeleton
+from ikns.subspace import null_space
+
+__all__ = ["Arm", "SelfMotion", "self_motion"]
+
+Array = NDArray[np.float64]
+
+#: Hand pose error at which Newton stops, m and rad: a thousandth of the 0.1 mm that
+#: cameras resolve, far above rounding.
+POSE_TOLERANCE = 1e-7
+#: A Newton step moves no joint further than this, rad.
+_LONGEST_STEP = 0.3
+#: Step along the self-motion, rad of joint-space length. A cubic through the steps then
+#: misses the curve by about stride^4 / 384 = 1e-8 rad.
+_STRIDE = 0.04
+#: The self-motion stays this far from every joint limit, rad: nobody holds a hand still
+#: with a joint at its stop.
+_MARGIN = np.radians(5.0)
+
+
+class Arm:
+    """The kinematics of one arm, clavicle included.
+
+    A *posture* is the arm's (9,) angles in the order of the chain ``*_arm_clavicle``;
+    `angles` are the (18,) joint angles of the whole body.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The body.
+    side : {"right", "left"}
+        Which arm.
+    """
+
+    def __init__(self, skeleton: Skeleton, side: str) -> None:
+        if side not in SIDES:
+            raise InvalidInput(f"side must be 'right' or 'left', not '{side}'.")
+        self.skeleton, self.side, self.chain = skeleton, side, f"{side}_arm"
+        names = skeleton.joint_names
+        self.columns = [names.index(j) for j in chain_joints(f"{side}_arm_clavicle")]
+        self.lower = skeleton.lower[self.columns]
+        self.upper = skeleton.upper[self.columns]
+        self._seven = self.columns[2:]
+        self._outward = 1.0 if side == "right" else -1.0
+
+    def put(self, angles: Array, posture: ArrayLike) -> Array:
+        """Return the body's joint angles with this arm in a posture."""
+        changed = np.array(angles)
+        changed[self.columns] = posture
+        return changed
+
+    def hand(self, angles: Array) -> tuple[Array, Array]:
+        """Hand position (3,) m and orientation (3, 3) in the thorax frame."""
+        return self.skeleton.link_in_thorax(angles, f"{self.side}_knuckle")
+
+    def shoulder(self, angles: Array) -> Array:
+        """Shoulder joint center in the thorax frame, (3,) m."""
+        return self.skeleton.link_in_thorax(angles, f"{self.side}_upper_arm")[0]
+
+    def swivel(self, angles: Array) -> float:
+        """Elbow angle about the line from shoulder to wrist, rad.
+
+        Zero with the elbow straight below the line, positive where it is lifted
+        outwards; NaN for a straight arm.
+        """
+        sx, sy, sz = self.shoulder(angles)
+        wx, wy, wz = self.skeleton.link_in_thorax(angles, f"{self.side}_hand")[0]
+        ex, ey, ez = self.skeleton.link_in_thorax(angles, f"{self.side}_forearm")[0]
+        lx, ly, lz = wx - sx, wy - sy, wz - sz
+        ex, ey, ez = ex - sx, ey - sy, ez - sz
+        # The direction below the line is -Y less its part along the line; what stands
+        # out sideways is that direction crossed with the line. Both have length
+        # hypot(lx, lz) / |line|, which the ratio does not see.
+        length = np.sqrt(lx * lx + ly * ly + lz * lz)
+        along = (ex * lx + ey * ly + ez * lz) / length**2
+        down = along * ly - ey
+        outward = (ez * lx - ex * lz) / length * self._outward
+        return float(np.arctan2(outward, down)) if outward or down else float("nan")
+
+    def to_pose(self, angles: Array, position: Array, rotation: Array) -> Array:
+        """Return the posture nearest to `angles` that puts the hand at a pose.
+
+        Newton's method with minimum-norm steps of the seven arm joints, so that
+        self-motion and clavicle are left alone.
+
+        Parameters
+        ----------
+        angles : (18,) array
+            Joint angles of the body to start from.
+        position : (3,) array
+            Hand position in the thorax frame, m.
+        rotation : (3, 3) array
+            Hand orientation in the thorax frame.
+
+        Raises
+        ------
+        InvalidInput
+            When the pose is out of reach.
+        """
+        angles = np.array(angles)
+        for _ in range(50):
+            p, R = self.hand(angles)
+            D = rotation @ R.T
+            turn = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
+            error = np.concatenate([position - p, turn / 2])
+            if np.abs(error).max() < POSE_TOLERANCE:
+                return angles
+            J = self.skeleton.chain_jacobian(angles, self.chain)
+            # Cholesky without the checks of ready-made solvers, for speed.
+            _, weights, failed = dposv(J @ J.T, error)
+            if failed:
+                break
+            step = J.T @ weights
+            angles[self._seven] += step * min(1.0, _LONGEST_STEP / np.abs(step).max())
+        raise InvalidInput(
+            f"the {self.side} hand cannot be brought to {np.round(position, 3)} m "
+            "(thorax frame) in the orientation asked for; choose a nearer point."
+        )
+
+
+def girdle(posture: Array, rest: Array, *, follow: float) -> Array:
+    """Clavicle angles that go with where the upper arm points, (2,) rad.
+
+    ``protraction = rest + follow * sin(flexion)``,
+    ``elevation = rest + follow * (1 - cos(abduction) cos(flexion))``:
+    both are at rest with a hanging arm and turned by `follow` with the arm forward.
+
+    Parameters
+    ----------
+    posture : (9,) array
+        Posture of the arm.
+    rest : (2,) array
+        Clavicle angles with the arm hanging, rad.
+    follow : float
+        Clavicle angle per unit of the upper arm's direction, rad.
+    """
+    abduction, flexion = posture[2:4]
+    return rest + follow * np.array(
+        [np.sin(flexion), 1 - np.cos(abduction) * np.cos(flexion)]
+    )
+
+
+@dataclass(frozen=True)
+class SelfMotion:
+    """Postures of one arm that share a hand pose.
+
+    Parameters
+    ----------
+    swivel : (K,) array
+        Elbow swivel, rad, increasing.
+    postures : (K, 9) array
+        Postures of the arm.
+    """
+
+    swivel: Array
+    postures: Array
+
+    def at(self, swivel: ArrayLike) -> Array:
+        """Postures with the elbow at these swivels (rad), (..., 9)."""
+        return np.asarray(CubicSpline(self.swivel, self.postures)(swivel))
+
+
+def self_motion(
+    arm: Arm,
+    angles: Array,
+    *,
+    lowest: float,
+    highest: float,
+    girdle_follow: float = 0.0,
+) -> SelfMotion:
+    """Follow the self-motion from a posture both ways.
+
+    Each step goes along the null direction of the pose Jacobian and is then corrected
+    to the hand pose of the start. The walk ends before a joint comes near its limit.
+
+    Parameters
+    ----------
+    arm : Arm
+        The arm.
+    angles : (18,) array
+        Joint angles of the body at the start.
+    lowest, highest : float
+        Swivels at which to stop, rad.
+    girdle_follow : float
+        How the clavicle follows the upper arm meanwhile, see :func:`girdle`.
+
+    Returns
+    -------
+    SelfMotion
+        Of at least the starting posture.
+    """
+    position, rotation = arm.hand(angles)
+    start = angles[arm.columns]
+    rest = start[:2] - girdle(start, np.zeros(2), follow=girdle_follow)
+    swivels, postures = [arm.swivel(angles)], [start]
+    for way in (1.0, -1.0):
+        current, swivel = angles, swivels[0 if way < 0 else -1]
+        ahead: Array | None = None
+        while lowest < swivel < highest:
+            null = np.append(
+                np.zeros(2),
+                null_space(arm.skeleton.chain_jacobian(current, arm.chain))[0],
+            )
+            if ahead is None:
+                posture = current[arm.columns]
+                turned = arm.swivel(arm.put(current, posture + 1e-4 * null)) - swivel
+                ahead = null * np.sign(turned) * way
+            ahead = null * np.sign(null @ ahead)
+            posture = current[arm.columns] + _STRIDE * ahead
+            posture[:2] = girdle(posture, rest, follow=girdle_follow)
+            current = arm.to_pose(arm.put(current, posture), position, rotation)
+            before, swivel = swivel, arm.swivel(current)
+            posture = current[arm.columns]
+            stopped = np.minimum(posture - arm.lower, arm.upper - posture) < _MARGIN
+            if stopped[2:].any() or way * (swivel - before) < 0.1 * _STRIDE:
+                break
+            end = len(swivels) if way > 0 else 0
+            swivels.insert(end, swivel)
+            postures.insert(end, posture)
+    return SelfMotion(np.array(swivels), np.array(postures))

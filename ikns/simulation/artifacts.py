@@ -1,0 +1,188 @@
+"""What cameras and skin do to markers: noise, soft tissue, occlusion."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import InvalidInput
+from ikns.motion import SIDES, chain_joints
+from ikns.simulation.wander import wander
+from ikns.skeleton import Skeleton
+
+__all__ = ["SoftTissue", "occlusions"]
+
+Array = NDArray[np.float64]
+
+#: Shares of the variance: the cluster moves as one, each marker on its own with the
+#: posture, each marker slowly at random. Translations and rotations of the whole
+#: cluster dominate (Andersen et al. 2012, Gait & Posture 35:606); the numbers are ours.
+_CLUSTER, _OWN, _RANDOM = 0.5, 0.25, 0.25
+#: Cut-off of the random part, Hz: slow slip and muscle contraction (assumption).
+_RANDOM_HZ = 0.3
+#: How far from the cluster's middle a marker sits when turning the cluster moves it as
+#: much as shifting it, m: the radius of an upper arm.
+_LEVER = 0.05
+#: Shortest, mean and longest time that a marker is hidden, s (assumption).
+_BURST_S = (0.05, 0.12, 0.30)
+#: Share of occlusions that hide neighbors on the same segment too (assumption).
+_TOGETHER = 0.3
+
+
+class SoftTissue:
+    """Skin that moves over bone with the posture, in the frame of each segment.
+
+    The displacement of a marker is linear in the angles of the joints at both ends of
+    its segment, counted from a reference posture (a linear model explains about 95 % of
+    the variance seen with bone pins, Andersen et al. 2012, Gait & Posture 35:606). One
+    part shifts and turns all markers of a segment alike, one is each marker's own;
+    a slow random part is added. Directions are random, drawn once per person.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The person.
+    size : float
+        Root mean square length of the displacement over `angles`, on average over the
+        markers of a segment, m; the same for every segment.
+    reference : (18,) array
+        Joint angles at which the posture moves no skin.
+    angles : (T, 18) array
+        Joint angles over which `size` is meant.
+    rng : numpy.random.Generator
+        Source of randomness.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        size: float,
+        *,
+        reference: Array,
+        angles: Array,
+        rng: np.random.Generator,
+    ) -> None:
+        self.skeleton, self.size, self.reference = skeleton, size, reference
+        markers = skeleton.marker_set.markers
+        self.links = np.array([marker.link for marker in markers])
+        n_joints = len(skeleton.joint_names)
+        self._gains = np.zeros((len(markers), 3, n_joints))
+        places = skeleton.marker_positions
+        for link in np.unique(self.links):
+            rows = self.links == link
+            near = np.array(
+                [joint in _joints_at(str(link)) for joint in skeleton.joint_names]
+            )
+            shift = rng.normal(size=(3, n_joints)) * near
+            turn = rng.normal(size=(3, n_joints)) * near / _LEVER
+            arms = places[rows] - places[rows].mean(axis=0)
+            cluster = shift + np.cross(turn.T[None], arms[:, None], axis=2).swapaxes(
+                1, 2
+            )
+            own = rng.normal(size=(int(rows.sum()), 3, n_joints)) * near
+            for share, gains in ((_CLUSTER, cluster), (_OWN, own)):
+                length = np.linalg.norm(self._moved(gains, angles), axis=2)
+                rms = np.sqrt(np.mean(length**2))
+                self._gains[rows] += gains * (size * np.sqrt(share) / rms)
+
+    def displacement(self, q: Array, *, rate: float, rng: np.random.Generator) -> Array:
+        """Displacement of the markers in the world, (T, M, 3) m.
+
+        Parameters
+        ----------
+        q : (T, nq) array
+            True configurations.
+        rate : float
+            Samples per second.
+        rng : numpy.random.Generator
+            Source of the random part.
+        """
+        n, m = len(q), len(self.links)
+        local = self._moved(self._gains, q[:, -len(self.reference) :])
+        sd = self.size * np.sqrt(_RANDOM / 3)
+        slow = wander(rng, n, 3 * m, sd=sd, cutoff=_RANDOM_HZ, rate=rate)
+        local += slow.reshape(n, m, 3)
+        in_world = np.empty_like(local)
+        for i in range(n):
+            root = _rotation(q[i, 3:7])
+            for link in np.unique(self.links):
+                rows = self.links == link
+                turned = root @ self.skeleton.link_in_thorax(q[i], str(link))[1]
+                in_world[i, rows] = local[i, rows] @ turned.T
+        return in_world
+
+    def _moved(self, gains: Array, angles: Array) -> Array:
+        return np.asarray(np.einsum("mkj,tj->tmk", gains, angles - self.reference))
+
+
+def occlusions(
+    rng: np.random.Generator,
+    n: int,
+    links: NDArray[np.str_],
+    *,
+    share: float,
+    rate: float,
+) -> NDArray[np.bool_]:
+    """Which markers the cameras do not see, in bursts, (n, M).
+
+    Bursts of geometrically distributed length start anywhere, until `share` of all
+    marker frames are hidden. Some hide a second and a third marker of the segment.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Source of randomness.
+    n : int
+        Frames.
+    links : (M,) array of str
+        Segment of each marker.
+    share : float
+        Share of marker frames to hide, 0 to 0.5.
+    rate : float
+        Frames per second.
+    """
+    if not 0 <= share <= 0.5:
+        raise InvalidInput(
+            f"the share of occluded markers must be 0 to 0.5, not {share}."
+        )
+    hidden = np.zeros((n, len(links)), dtype=bool)
+    shortest, mean, longest = (max(1, round(s * rate)) for s in _BURST_S)
+    while hidden.mean() < share:
+        burst = shortest + rng.geometric(1 / (mean - shortest + 1)) - 1
+        start = rng.integers(-shortest, n)
+        rows = slice(max(0, start), start + min(burst, longest))
+        marker = rng.integers(len(links))
+        columns = [marker]
+        neighbors = np.flatnonzero(links == links[marker])
+        neighbors = neighbors[neighbors != marker]
+        if len(neighbors) and rng.random() < _TOGETHER:
+            count = min(len(neighbors), int(rng.integers(1, 3)))
+            columns.extend(rng.choice(neighbors, count, replace=False))
+        hidden[rows, columns] = True
+    return hidden
+
+
+def _joints_at(link: str) -> set[str]:
+    """Joints at both ends of a segment."""
+    if link == "thorax":
+        return {j for s in SIDES for j in chain_joints(f"{s}_arm_clavicle")[:5]}
+    side, segment = link.split("_", 1)
+    names = chain_joints(f"{side}_arm_clavicle")
+    spans = {
+        "clavicle": slice(0, 5),
+        "upper_arm": slice(2, 6),
+        "forearm": slice(5, 9),
+        "hand": slice(7, 9),
+    }
+    return set(names[spans[segment]])
+
+
+def _rotation(quaternion: Array) -> Array:
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )

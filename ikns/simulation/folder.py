@@ -1,0 +1,110 @@
+"""A simulated protocol on disk: C3D files, and the truth beside them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from ikns.errors import FileError
+from ikns.files import write_c3d
+from ikns.simulation.protocol import Protocol
+from ikns.simulation.trial import Trial
+
+__all__ = ["write_protocol"]
+
+_FORMAT = 1
+
+
+def write_protocol(
+    folder: str | Path, protocol: Protocol, *, force: bool = False
+) -> list[Path]:
+    """Write ``static.c3d``, ``free.c3d``, ``points.c3d`` and what is true of them.
+
+    Beside each recording lies ``<name>_truth.csv``: time (s), every joint angle (deg),
+    the elbow swivel of the arm that explores (deg), hand position in the thorax frame
+    (mm) and point (-1 on the way). ``truth.json`` has the person, segment lengths (m),
+    places of the markers in their links (m), points (m) and all settings;
+    ``truth.urdf`` the body.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Made when missing.
+    protocol : Protocol
+        From :func:`simulate_protocol`.
+    force : bool
+        Whether to replace files that exist.
+
+    Returns
+    -------
+    list of Path
+        The three recordings: static, free, points.
+
+    Raises
+    ------
+    FileError
+        When a file exists and `force` is false, or the folder cannot be written.
+    """
+    folder = Path(folder)
+    recordings = [folder / f"{trial.name}.c3d" for trial in protocol.trials]
+    tables = [folder / f"{trial.name}_truth.csv" for trial in protocol.trials]
+    body, summary = folder / "truth.urdf", folder / "truth.json"
+    for path in (*recordings, *tables, body, summary):
+        if path.exists() and not force:
+            raise FileError(f"{path}: the file exists already and was left as it is.")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for trial, recording, table in zip(
+            protocol.trials, recordings, tables, strict=True
+        ):
+            write_c3d(recording, trial.recording, force=force)
+            _write_table(table, trial, protocol.side)
+        protocol.subject.skeleton.write(body)
+        text = json.dumps(_summary(protocol), indent=2) + "\n"
+        summary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"{folder}: cannot be written: {error}.") from None
+    return recordings
+
+
+def _write_table(path: Path, trial: Trial, side: str) -> None:
+    truth = trial.truth
+    hand = truth.hand_in_thorax[:, ("right", "left").index(side)]
+    names = [f"{joint}_deg" for joint in truth.joint_names]
+    header = ["time_s", *names, "swivel_deg", *(f"hand_{x}_mm" for x in "xyz"), "point"]
+    columns = np.column_stack(
+        [
+            truth.time,
+            np.degrees(truth.angles),
+            np.degrees(trial.swivel),
+            1000 * hand,
+            trial.point,
+        ]
+    )
+    formats = ["%.4f"] + ["%.6f"] * (columns.shape[1] - 2) + ["%d"]
+    np.savetxt(
+        path, columns, fmt=formats, delimiter=",", header=",".join(header), comments=""
+    )
+
+
+def _summary(protocol: Protocol) -> dict[str, object]:
+    subject, adult = protocol.subject, protocol.subject.adult
+    markers = subject.skeleton.marker_set.markers
+    return {
+        "format": _FORMAT,
+        "simulated": True,
+        "person": {
+            "seed": subject.seed,
+            "sex": adult.sex,
+            "stature_m": adult.stature_m,
+            "mass_kg": adult.mass_kg,
+        },
+        "marker_set": subject.marker_set,
+        "side": protocol.side,
+        "segment_lengths_m": subject.skeleton.segment_lengths,
+        "marker_positions_m": {m.label: list(m.position) for m in markers},
+        "points_in_thorax_m": protocol.places.tolist(),
+        "settings": protocol.settings,
+    }

@@ -1,0 +1,170 @@
+"""One simulated recording: the body's truth, and what cameras make of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ikns.motion import Motion
+from ikns.recording import Recording
+from ikns.simulation.arm import Arm
+from ikns.simulation.artifacts import SoftTissue, occlusions
+from ikns.simulation.wander import wander
+from ikns.skeleton import Skeleton
+
+__all__ = ["Trial", "film", "place_in_room", "true_motion"]
+
+Array = NDArray[np.float64]
+
+#: Cut-off of the trunk's sway, Hz (quiet sitting and standing sway mostly below it).
+_SWAY_HZ = 0.3
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One simulated recording and the truth behind it.
+
+    Parameters
+    ----------
+    name : str
+        "static", "free" or "points".
+    recording : Recording
+        What the cameras saw.
+    truth : Motion
+        What the body did, on the same frames.
+    swivel : (T,) array
+        True elbow swivel of the arm that explores, rad; NaN for a straight arm.
+    point : (T,) integer array
+        Index of the point at which the hand is held, -1 elsewhere.
+    """
+
+    name: str
+    recording: Recording
+    truth: Motion
+    swivel: Array
+    point: NDArray[np.int64]
+
+
+def place_in_room(
+    angles: Array,
+    *,
+    height: float,
+    heading: float,
+    sway: tuple[float, float],
+    rate: float,
+    rng: np.random.Generator,
+) -> Array:
+    """Put a body into a room with Z up, its trunk swaying, (T, 25).
+
+    Parameters
+    ----------
+    angles : (T, 18) array
+        Joint angles.
+    height : float
+        Of the thorax frame over the floor, m.
+    heading : float
+        Direction that the body faces, rad about Z.
+    sway : (float, float)
+        Standard deviations of the trunk's sway, m and rad per axis.
+    rate : float
+        Samples per second.
+    rng : numpy.random.Generator
+        Source of randomness.
+    """
+    n = len(angles)
+    upright = Rotation.from_euler("z", heading) * Rotation.from_euler("x", np.pi / 2)
+    turned = wander(rng, n, 3, sd=sway[1], cutoff=_SWAY_HZ, rate=rate)
+    shifted = wander(rng, n, 3, sd=sway[0], cutoff=_SWAY_HZ, rate=rate)
+    quaternion = (upright * Rotation.from_rotvec(turned)).as_quat()
+    # q and -q are one rotation; without jumps, differences stay small.
+    flips = np.cumprod(np.sign(np.sum(quaternion[1:] * quaternion[:-1], axis=1)))
+    quaternion[1:] *= flips[:, None]
+    return np.hstack([shifted + [0.0, 0.0, height], quaternion, angles])
+
+
+def true_motion(skeleton: Skeleton, time: Array, q: Array) -> Motion:
+    """Write the truth as a motion; velocities are central differences."""
+    hands = [skeleton.hands_in_thorax(row) for row in q]
+    position = np.stack([p for p, _ in hands])
+    steps = np.stack([skeleton.difference(*pair) for pair in pairwise(q)])
+    path = np.vstack([np.zeros(skeleton.nv), np.cumsum(steps, axis=0)])
+    n = len(q)
+    return Motion(
+        time=time,
+        q=q,
+        v=np.gradient(path, time, axis=0),
+        joint_names=skeleton.joint_names,
+        hand_in_thorax=position,
+        hand_rotation_in_thorax=np.stack([R for _, R in hands]),
+        hand_velocity_in_thorax=np.gradient(position, time, axis=0),
+        residual=np.zeros(n),
+        iterations=np.zeros(n, dtype=np.int64),
+        converged=np.ones(n, dtype=bool),
+    )
+
+
+def film(
+    arm: Arm,
+    q: Array,
+    *,
+    name: str,
+    point: NDArray[np.int64],
+    with_static_only: bool,
+    noise: float,
+    skin: SoftTissue | None,
+    occluded: float,
+    rate: float,
+    rng: np.random.Generator,
+) -> Trial:
+    """Record a body with cameras.
+
+    Parameters
+    ----------
+    arm : Arm
+        The arm that explores, and the person it belongs to.
+    q : (T, 25) array
+        Configurations.
+    name : str
+        Of the trial.
+    point : (T,) integer array
+        See :class:`Trial`.
+    with_static_only : bool
+        Whether the person wears the static-only markers in this trial.
+    noise : float
+        Camera noise, m, standard deviation per axis.
+    skin : SoftTissue or None
+        How skin moves the markers over the bones.
+    occluded : float
+        Share of marker frames not seen.
+    rate : float
+        Frames per second.
+    rng : numpy.random.Generator
+        Source of randomness.
+    """
+    skeleton = arm.skeleton
+    of_noise, of_skin, of_gaps = rng.spawn(3)
+    time = np.arange(len(q)) / rate
+    markers = np.stack([skeleton.markers_in_world(row) for row in q])
+    markers += noise * of_noise.normal(size=markers.shape)
+    if skin is not None:
+        markers += skin.displacement(q, rate=rate, rng=of_skin)
+    worn = [
+        i
+        for i, marker in enumerate(skeleton.marker_set.markers)
+        if with_static_only or not marker.static_only
+    ]
+    links = np.array([skeleton.marker_set.markers[i].link for i in worn])
+    labels = [skeleton.marker_set.labels[i] for i in worn]
+    markers = markers[:, worn]
+    markers[occlusions(of_gaps, len(q), links, share=occluded, rate=rate)] = np.nan
+    return Trial(
+        name=name,
+        recording=Recording(time, markers, labels, f"simulated {name} trial"),
+        truth=true_motion(skeleton, time, q),
+        swivel=np.array([arm.swivel(row) for row in q]),
+        point=point,
+    )

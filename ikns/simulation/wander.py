@@ -1,0 +1,89 @@
+"""Smooth random processes: what a body does without meaning to."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfilt
+
+__all__ = ["minimum_jerk", "tremor", "wander"]
+
+Array = NDArray[np.float64]
+
+
+def wander(
+    rng: np.random.Generator,
+    n: int,
+    width: int,
+    *,
+    sd: float,
+    cutoff: float,
+    rate: float,
+) -> Array:
+    """Slow drift around zero: Gaussian noise through a second-order low-pass.
+
+    Its velocity has a standard deviation of ``2 pi cutoff sd`` (the second moment of
+    the Butterworth spectrum of order two is the square of its cut-off).
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Source of randomness.
+    n, width : int
+        Samples and independent channels.
+    sd : float
+        Standard deviation over many realizations, in the unit of the result.
+    cutoff : float
+        Hz.
+    rate : float
+        Samples per second.
+
+    Returns
+    -------
+    (n, width) array
+    """
+    sos = butter(2, cutoff, fs=rate, output="sos")
+    return _filtered(rng, n, width, sd, sos, settle=int(3 * rate / cutoff))
+
+
+def tremor(
+    rng: np.random.Generator, n: int, width: int, *, sd: float, rate: float
+) -> Array:
+    """Physiological tremor: Gaussian noise in the band of 8 to 12 Hz.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Source of randomness.
+    n, width : int
+        Samples and independent channels.
+    sd : float
+        Standard deviation, in the unit of the result.
+    rate : float
+        Samples per second, above 24.
+
+    Returns
+    -------
+    (n, width) array
+    """
+    sos = butter(2, (8.0, 12.0), btype="bandpass", fs=rate, output="sos")
+    return _filtered(rng, n, width, sd, sos, settle=int(rate))
+
+
+def minimum_jerk(n: int) -> Array:
+    """Way from 0 to 1 with the least jerk (Flash and Hogan 1985), (n,).
+
+    ``10 s^3 - 15 s^4 + 6 s^5``, s from one sample after the start to the end.
+    """
+    s = np.arange(1, n + 1) / n
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def _filtered(
+    rng: np.random.Generator, n: int, width: int, sd: float, sos: Array, settle: int
+) -> Array:
+    impulse = np.zeros(20 * settle)
+    impulse[0] = 1.0
+    gain = np.sqrt(np.sum(sosfilt(sos, impulse) ** 2))
+    noise = rng.normal(size=(settle + n, width))
+    return np.asarray(sosfilt(sos, noise, axis=0)[settle:]) * (sd / gain)
