@@ -317,7 +317,7 @@ class Skeleton:
         """Elbow angle about the line from shoulder to wrist, (2,) rad.
 
         Zero with the elbow straight below the line, positive where the elbow is lifted
-        outwards (the right one to the right). Undefined (NaN) for a straight arm.
+        outwards (the right one to the right).
         """
         angles = np.empty(2)
         for i, side in enumerate(SIDES):
@@ -328,12 +328,8 @@ class Skeleton:
             line = (wrist - shoulder) / np.linalg.norm(wrist - shoulder)
             radial = elbow - shoulder - line * np.dot(elbow - shoulder, line)
             down = -np.eye(3)[1] + line * line[1]
-            outward = np.cross(down, line) * (1 if side == "left" else -1)
-            # 1 deg of elbow flexion leaves about 2 mm between elbow and line.
-            straight = np.linalg.norm(radial) < 2e-3
-            angles[i] = (
-                np.nan if straight else np.arctan2(radial @ outward, radial @ down)
-            )
+            outward = np.cross(down, line) * (1 if side == "right" else -1)
+            angles[i] = np.arctan2(radial @ outward, radial @ down)
         return angles
 
     # --- inside -----------------------------------------------------------------------
