@@ -63,12 +63,20 @@ def test_workspace_draws_every_sample_once_in_the_color_of_its_point() -> None:
             np.testing.assert_allclose(color, point_color(point), rtol=1e-12)
 
 
-def test_workspace_numbers_the_points_from_one_at_their_places() -> None:
+def test_workspace_marks_the_points_and_numbers_them_from_one_close_by() -> None:
     right = workspace().axes[1]
+    (marks,) = [c for c in right.collections if c.get_label() == "PCA point"]
+    drawn = box()[:, [2, 0, 1]]
+    np.testing.assert_allclose(np.transpose(marks._offsets3d), drawn, rtol=1e-12)
     places = {text.get_text(): text.get_position_3d() for text in right.texts}
     assert list(places) == [str(k) for k in range(1, 9)]
-    drawn = np.array(list(places.values()))
-    np.testing.assert_allclose(drawn, box()[:, [2, 0, 1]], rtol=1e-12)
+    # Straight outwards and nearer to its own point than to any other.
+    away = np.array(list(places.values()))[:, None] - drawn
+    assert (np.linalg.norm(away, axis=2).argmin(axis=1) == np.arange(8)).all()
+    outward = drawn - drawn.mean(axis=0)
+    own = away[np.arange(8), np.arange(8)]
+    np.testing.assert_allclose(np.cross(own, outward), 0, atol=1e-15)
+    assert ((own * outward).sum(axis=1) > 0).all()
 
 
 def test_workspace_has_one_scale_on_all_axes() -> None:

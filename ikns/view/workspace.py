@@ -12,7 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 from ikns.view.body import body_surfaces
-from ikns.view.style import BLUE, GREY, VOLUME, house_style, new_figure, point_color
+from ikns.view.style import (
+    BLUE,
+    GREY,
+    INK,
+    VOLUME,
+    house_style,
+    new_figure,
+    point_color,
+)
 
 __all__ = ["workspace_figure"]
 
@@ -21,6 +29,8 @@ Array = NDArray[np.float64]
 #: Thorax frame (X forward, Y up, Z right) to the drawing's right, forward, up.
 _TO_DRAWING = [2, 0, 1]
 _MARGIN = 0.04  # m around everything that is drawn
+_ELEVATION, _AZIMUTH = 17.0, 38.0  # of the viewer, deg above and to the right of front
+_NUMBER_AWAY = 0.13  # from its PCA point, share of the volume's radius
 
 
 def workspace_figure(
@@ -78,7 +88,7 @@ def workspace_figure(
         right: Any = figure.add_axes((0.5, 0.06, 0.48, 0.85), projection="3d")
         _draw_body(left, body, rightwards=rightwards)
         _draw_volume(left, point, facets)
-        left.plot(*_drawn(path), color=BLUE, lw=0.8, alpha=0.8, zorder=6, label="hand")
+        left.plot(*_drawn(path), color=BLUE, lw=0.7, alpha=0.7, zorder=6, label="hand")
         _frame(left, [path, point, *body], rightwards=rightwards, tick=0.2)
         _draw_volume(right, point, facets)
         _draw_samples(right, still, of_sample, len(point))
@@ -133,7 +143,7 @@ def _draw_volume(axes: Any, centers: Array, facets: ArrayLike | None) -> None:
 
 
 def _draw_samples(axes: Any, samples: Array, labels: Array, n_points: int) -> None:
-    dots = {"s": 7, "linewidths": 0, "depthshade": False}
+    dots = {"s": 12, "linewidths": 0, "depthshade": False}
     axes.scatter(
         *_drawn(samples[labels < 0]),
         color=GREY,
@@ -156,15 +166,30 @@ def _draw_samples(axes: Any, samples: Array, labels: Array, n_points: int) -> No
 def _draw_points(axes: Any, centers: Array) -> None:
     axes.scatter(
         *_drawn(centers),
-        s=95,
-        color="white",
-        edgecolors=[point_color(point) for point in range(len(centers))],
-        linewidths=1.6,
+        marker="+",
+        s=28,
+        color=INK,
+        linewidths=1.0,
         depthshade=False,
         zorder=8,
         label="PCA point",
     )
-    for point, place in enumerate(centers):
+    # The numbers stand outside the volume, so that no sample is hidden.
+    outward = centers - centers.mean(axis=0)
+    length = np.linalg.norm(outward, axis=1, keepdims=True)
+    outward = np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
+    places = centers + _NUMBER_AWAY * max(0.1, float(length.max())) * outward
+    axes.scatter(
+        *_drawn(places),
+        s=90,
+        color="white",
+        edgecolors=[point_color(point) for point in range(len(centers))],
+        linewidths=1.6,
+        depthshade=False,
+        zorder=9,
+        label="number",
+    )
+    for point, place in enumerate(places):
         axes.text(
             *_drawn(place),
             str(point + 1),
@@ -172,7 +197,7 @@ def _draw_points(axes: Any, centers: Array) -> None:
             va="center",
             fontsize=6,
             fontweight="bold",
-            zorder=9,
+            zorder=10,
         )
 
 
@@ -187,15 +212,26 @@ def _frame(axes: Any, drawn: list[Array], *, rightwards: bool, tick: float) -> N
         axis.set_pane_color((1, 1, 1, 0))
         axis.labelpad = -1
     axes.tick_params(pad=-1)
-    axes.set_box_aspect(high - low, zoom=1.0)
+    axes.set_box_aspect(high - low, zoom=_zoom(high - low))
     axes.set_proj_type("ortho")
     # Otherwise matplotlib puts whole artists in front of each other by their mean.
     axes.computed_zorder = False
     # From the front, on the side of the hand that moves.
-    axes.view_init(elev=17, azim=38 if rightwards else 142)
+    axes.view_init(elev=_ELEVATION, azim=_AZIMUTH if rightwards else 180 - _AZIMUTH)
     axes.set_xlabel("Z right (m)")
     axes.set_ylabel("X forward (m)")
     axes.set_zlabel("Y up (m)")
+
+
+def _zoom(size: Array) -> float:
+    """Shrink long and tall boxes, which matplotlib scales by their diagonal alone."""
+    turn, tilt = np.deg2rad([_AZIMUTH, _ELEVATION])
+    right, forward, up = size / np.linalg.norm(size)
+    width = right * np.sin(turn) + forward * np.cos(turn)
+    depth = right * np.cos(turn) + forward * np.sin(turn)
+    height = up * np.cos(tilt) + depth * np.sin(tilt)
+    # What fits into the panels with tick labels, found by looking.
+    return float(min(1.0, 0.85 / width, 0.8 / height))
 
 
 def _title(figure: Figure, axes: Any, text: str) -> None:
@@ -205,12 +241,16 @@ def _title(figure: Figure, axes: Any, text: str) -> None:
 def _legend(figure: Figure, axes: Any) -> None:
     handles, names = axes.get_legend_handles_labels()
     named = dict(zip(names, handles, strict=True))
-    shown = [n for n in ("interpolation volume", "still, discarded") if n in named]
+    shown = [
+        n
+        for n in ("PCA point", "interpolation volume", "still, discarded")
+        if n in named
+    ]
     figure.legend(
         [named[name] for name in shown],
         shown,
         loc="lower right",
-        ncols=2,
-        markerscale=2.5,
+        ncols=3,
+        markerscale=1.6,
         borderaxespad=0.3,
     )
