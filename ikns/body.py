@@ -23,6 +23,7 @@ __all__ = [
     "Inertial",
     "link_inertials",
     "resize_urdf",
+    "segment_ends",
     "segment_lengths",
     "urdf_folder",
 ]
@@ -82,9 +83,17 @@ def segment_lengths(urdf: str) -> dict[str, float]:
     >>> 0.25 < segment_lengths(text)["right_upper_arm"] < 0.30
     True
     """
+    return {
+        segment: float(np.linalg.norm(end))
+        for segment, end in segment_ends(urdf).items()
+    }
+
+
+def segment_ends(urdf: str) -> dict[str, NDArray[np.float64]]:
+    """Joint that ends each limb segment, in its link's frame, (3,) m."""
     joints = {joint.get("name"): joint for joint in ET.fromstring(urdf).iter("joint")}
     return {
-        segment: float(np.linalg.norm(_vector(joints[end].find("origin"), "xyz")))
+        segment: _vector(joints[end].find("origin"), "xyz")
         for segment, end in SEGMENTS.items()
         if end in joints
     }
@@ -101,7 +110,6 @@ def link_inertials(urdf: str, parts: Mapping[str, Segment]) -> dict[str, Inertia
         As from :func:`ikns.anthropometry.segments`: principal moments about the
         front-back axis, the long axis, and the axis across both, palms forward.
     """
-    joints = {joint.get("name"): joint for joint in ET.fromstring(urdf).iter("joint")}
     trunk = parts["trunk_head"]
     inertials = {
         "thorax": Inertial(
@@ -110,11 +118,8 @@ def link_inertials(urdf: str, parts: Mapping[str, Segment]) -> dict[str, Inertia
             trunk.inertia_kg_m2,
         )
     }
-    for name, end in SEGMENTS.items():
-        if end is None:
-            continue
+    for name, along in segment_ends(urdf).items():
         part = parts[name.split("_", 1)[1]]
-        along = _vector(joints[end].find("origin"), "xyz")
         center = part.com_m * along / np.linalg.norm(along)
         front, long, across = part.inertia_kg_m2
         moments = {

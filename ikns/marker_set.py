@@ -35,9 +35,10 @@ class Marker:
         The URDF link that carries it.
     position : (3,) tuple
         Nominal place in the link's frame, meters.
-    placement_sd : float
-        How far from the nominal place people put it, standard deviation per axis,
-        meters: small on a bony landmark, large for a technical marker.
+    placement_sd : (3,) tuple
+        How far from the nominal place people put it along each axis, standard
+        deviation, meters: small on a bony landmark, large for a technical marker. One
+        number in the file stands for all three.
     static_only : bool
         Worn in the static trial only.
     aliases : tuple of str
@@ -50,7 +51,7 @@ class Marker:
     label: str
     link: str
     position: tuple[float, float, float]
-    placement_sd: float
+    placement_sd: tuple[float, float, float]
     static_only: bool = False
     aliases: tuple[str, ...] = ()
     weight: float = 1.0
@@ -198,11 +199,16 @@ class MarkerSet:
 
 def _read_marker(label: str, table: Mapping[str, Any]) -> Marker:
     x, y, z = (float(value) / 1000 for value in table["position_mm"])
+    spread = table["placement_sd_mm"]
+    sx, sy, sz = (
+        float(value) / 1000
+        for value in (spread if isinstance(spread, list) else 3 * [spread])
+    )
     return Marker(
         label,
         str(table["link"]),
         (x, y, z),
-        float(table["placement_sd_mm"]) / 1000,
+        (sx, sy, sz),
         bool(table.get("static_only", False)),
         tuple(table.get("aliases", ())),
         float(table.get("weight", 1.0)),
@@ -213,7 +219,7 @@ def _write_marker(marker: Marker) -> dict[str, object]:
     table: dict[str, object] = {
         "link": marker.link,
         "position_mm": [1000 * value for value in marker.position],
-        "placement_sd_mm": 1000 * marker.placement_sd,
+        "placement_sd_mm": [1000 * value for value in marker.placement_sd],
     }
     if marker.static_only:
         table["static_only"] = True

@@ -245,7 +245,7 @@ def _fit(generic: Skeleton, target: Array) -> tuple[Array, Array, Array, Array, 
         return np.concatenate(
             [
                 (positions[seen] - target[seen]).ravel() / MARKER_SD,
-                (offsets / placement[:, None]).ravel(),
+                (offsets / placement).ravel(),
                 weight @ sizes,
                 q[-n_joints:] / POSE_SD,
             ]
@@ -318,7 +318,7 @@ def _assemble(
     top /= MARKER_SD
     start = 3 * n_seen
     rows = np.arange(3 * n_markers)
-    J[start + rows, n_sizes + rows] = 1 / np.repeat(placement, 3)
+    J[start + rows, n_sizes + rows] = 1 / placement.ravel()
     start += 3 * n_markers
     J[start : start + n_sizes, :n_sizes] = weight
     start += n_sizes

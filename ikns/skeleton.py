@@ -22,6 +22,7 @@ from ikns.body import (
     Inertial,
     link_inertials,
     resize_urdf,
+    segment_ends,
     segment_lengths,
     urdf_folder,
 )
@@ -146,7 +147,7 @@ class Skeleton:
         *,
         inertials: Mapping[str, Inertial] | None = None,
     ) -> Skeleton:
-        """Return a skeleton with segments, and the markers on them, resized.
+        """Return a skeleton with segments resized; markers keep their place along them.
 
         Parameters
         ----------
@@ -156,8 +157,9 @@ class Skeleton:
             New inertial properties by link name.
         """
         urdf = resize_urdf(self.urdf, factors, inertials=inertials)
-        scale = [factors.get(m.link, 1.0) for m in self.marker_set.markers]
-        positions = self.marker_positions * np.array(scale).reshape(-1, 1)
+        growth = [factors.get(m.link, 1.0) - 1 for m in self.marker_set.markers]
+        positions = self.marker_positions
+        positions += np.array(growth).reshape(-1, 1) * self._along(positions)
         return Skeleton(urdf, self.marker_set.at(positions))
 
     def with_markers(self, marker_set: MarkerSet) -> Skeleton:
@@ -238,7 +240,7 @@ class Skeleton:
         -------
         by_size : (M, 3, S) array
             d position / d log(factor) of each segment of
-            :data:`ikns.body.SEGMENTS`, when markers grow with their segment, m.
+            :data:`ikns.body.SEGMENTS`, m.
         by_position : (M, 3, 3) array
             d position / d (marker position in its link): the link's orientation.
         """
@@ -255,7 +257,7 @@ class Skeleton:
                     rotation @ model.jointPlacements[joint].translation
                 )
             own = self._marker_joint == carrier
-            by_size[own, :, s] = self._marker_in_joint[own] @ rotation.T
+            by_size[own, :, s] = self._along(self._marker_in_joint)[own] @ rotation.T
         by_position = np.stack([data.oMi[int(j)].rotation for j in self._marker_joint])
         return by_size, by_position
 
@@ -333,6 +335,21 @@ class Skeleton:
         return angles
 
     # --- inside -----------------------------------------------------------------------
+
+    def _along(self, positions: Array) -> Array:
+        """Part of the markers' places (M, 3) that grows with their segment.
+
+        Along a limb; girth is not a matter of length. On the thorax, all of it.
+        """
+        ends = segment_ends(self.urdf)
+        axes = np.zeros((len(positions), 3, 3))
+        for axis, marker in zip(axes, self.marker_set.markers, strict=True):
+            if marker.link in ends:
+                unit = ends[marker.link] / np.linalg.norm(ends[marker.link])
+                axis[:] = np.outer(unit, unit)
+            elif marker.link in SEGMENTS:
+                axis[:] = np.eye(3)
+        return np.einsum("mij,mj->mi", axes, positions)
 
     def _frame(self, link: str) -> int:
         # Pinocchio answers an unknown name with the number of frames.

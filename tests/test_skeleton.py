@@ -147,6 +147,6 @@ def test_a_missing_file_is_named(tmp_path):
 
 def test_a_marker_on_an_unknown_link_is_refused(skeleton):
     other = MarkerSet.load("oxford24")
-    lost = other.markers[0].__class__("TAIL", "tail", (0, 0, 0), 0.01)
+    lost = other.markers[0].__class__("TAIL", "tail", (0, 0, 0), (0.01, 0.01, 0.01))
     with pytest.raises(MarkerMismatch, match="TAIL sits on link 'tail'"):
         skeleton.with_markers(MarkerSet("odd", (lost,)))

@@ -95,7 +95,7 @@ def virtual_subject(
     worn = body.marker_set
     sd = np.array(
         [
-            technical_sd if marker.placement_sd > _TECHNICAL else palpation_sd
+            technical_sd if min(marker.placement_sd) > _TECHNICAL else palpation_sd
             for marker in worn.markers
         ]
     )
