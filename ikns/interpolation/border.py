@@ -1,0 +1,65 @@
+"""What interpolation accepts, checked once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.errors import InvalidInput, NotEnoughData
+
+__all__ = ["checked_points", "checked_values"]
+
+Floats = NDArray[np.float64]
+
+# In sizes of the set: closer sites are taken for one, thinner sets for flat.
+_COINCIDENT = 1e-10
+_FLAT = 1e-9
+
+
+def checked_points(points: ArrayLike) -> Floats:
+    """Return sites as an (N, 3) array, or say what is wrong with them."""
+    found = np.array(points, dtype=np.float64)
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise InvalidInput(f"expected points of shape (N, 3), found {found.shape}.")
+    if not np.isfinite(found).all():
+        first = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
+        raise InvalidInput(
+            f"all points must be finite, found {found[first]} at {first}."
+        )
+    if len(found) < 4:
+        raise NotEnoughData(
+            f"interpolation in space needs at least 4 points, found {len(found)}."
+        )
+    size = float(np.ptp(found, axis=0).max())
+    for i in range(len(found) - 1):
+        distance = np.abs(found[i + 1 :] - found[i]).max(axis=1)
+        j = int(distance.argmin())
+        if distance[j] <= _COINCIDENT * size:
+            raise NotEnoughData(
+                f"all points must differ, but points {i} and {i + 1 + j} are "
+                f"{distance[j]:.1g} m apart in a set {size:.1g} m wide."
+            )
+    centered = found / size - (found / size).mean(axis=0)
+    axes = np.linalg.svd(centered, full_matrices=False)[2]
+    _, width, thickness = np.ptp(centered @ axes.T, axis=0) * size
+    if thickness <= _FLAT * size:
+        where = "on one line" if width <= _FLAT * size else "in one plane"
+        raise NotEnoughData(
+            f"the {len(found)} points must span a volume, but they lie {where} to "
+            f"within {max(width if where == 'on one line' else 0, thickness):.1g} m."
+        )
+    return found
+
+
+def checked_values(values: ArrayLike, points: Floats) -> Floats:
+    """Return values as a read-only (N, ...) array, or say what is wrong with them."""
+    found = np.array(values, dtype=np.float64)
+    if found.ndim == 0 or len(found) != len(points):
+        raise InvalidInput(
+            f"expected one value for each of the {len(points)} points, found values of "
+            f"shape {found.shape}."
+        )
+    if not np.isfinite(found).all():
+        raise InvalidInput("all values must be finite, found NaN or infinity.")
+    found.flags.writeable = False
+    return found

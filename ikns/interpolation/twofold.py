@@ -1,0 +1,40 @@
+"""Sums and products with twice a float's digits: a float, and what it rounds off."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["difference", "product", "twofold_dot"]
+
+Floats = NDArray[np.float64]
+
+
+def difference(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return a - b as a float, and what that float rounds off (Knuth)."""
+    value = a - b
+    back = value - a
+    return value, (a - (value - back)) - (b + back)
+
+
+def product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return a * b as a float, and what that float rounds off (Dekker, Veltkamp)."""
+    value = a * b
+    high = []
+    for factor in (a, b):
+        moved = 134217729.0 * factor  # 2**27 + 1: splits 53 digits into 26 and 27
+        high.append(moved - (moved - factor))
+    (p, r) = high
+    q, s = a - p, b - r
+    return value, ((p * r - value) + p * s + q * r) + q * s
+
+
+def twofold_dot(a: Floats, a_rest: Floats, b: Floats, b_rest: Floats) -> Floats:
+    """Scalar products of rows of three, to about 1e-30 of their largest term."""
+    value, rest = product(a, b)
+    rest = rest + a * b_rest + a_rest * b
+    total, low = value[:, 0], rest.sum(axis=1)
+    for k in (1, 2):
+        total, lost = difference(total, -value[:, k])
+        low = low + lost
+    return total + low
