@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
 from ikns.body import SEGMENTS
 from ikns.errors import MarkerMismatch, NotEnoughData
@@ -54,6 +55,9 @@ SEGMENT_SD = {
 SIDE_SD = 0.01
 #: Static poses are anything from hanging arms to a T: rad.
 POSE_SD = 1.0
+#: The fit has converged when a step promises less than this; one is what a single
+#: residual of one standard deviation costs.
+GAIN_TOLERANCE = 1e-4
 #: Steps until the fit is given up; it takes about ten.
 _MAX_STEPS = 100
 
@@ -263,7 +267,11 @@ def _fit(generic: Skeleton, target: Array) -> tuple[Array, Array, Array, Array, 
     for _ in range(_MAX_STEPS):
         by_size, by_place = sized.size_jacobian(q)
         J = _assemble(by_size, by_place, by_pose, seen, weight, placement, free)
-        step, *_ = np.linalg.lstsq(J, -errors)
+        step = cho_solve(cho_factor(J.T @ J), -J.T @ errors)
+        # What the linear model still promises to gain, in squared standard deviations.
+        if -(J.T @ errors) @ step < GAIN_TOLERANCE:
+            converged = True
+            break
         d_sizes = step[:n_sizes]
         d_offsets = step[n_sizes : n_sizes + 3 * n_markers].reshape(-1, 3)
         d_pose = np.zeros(generic.nv)
@@ -281,15 +289,11 @@ def _fit(generic: Skeleton, target: Array) -> tuple[Array, Array, Array, Array, 
             if trial_errors @ trial_errors <= errors @ errors * (1 + 1e-12):
                 break
             length /= 2
-        gain = errors @ errors - trial_errors @ trial_errors
         sizes, offsets, q = trial
         errors = trial_errors
-        if gain < 1e-9 * (1 + errors @ errors):
-            converged = True
-            break
     by_size, by_place = sized.size_jacobian(q)
     J = _assemble(by_size, by_place, by_pose, seen, weight, placement, free)
-    covariance = np.linalg.pinv(J.T @ J)[:n_sizes, :n_sizes]
+    covariance = cho_solve(cho_factor(J.T @ J), np.eye(J.shape[1], n_sizes))[:n_sizes]
     return sizes, sized.marker_positions + offsets, q, covariance, converged
 
 

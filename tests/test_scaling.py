@@ -122,9 +122,9 @@ def test_where_the_person_stands_does_not_matter(generic):
     there = Recording(here.time, here.markers @ turn.T + [3, -2, 1], here.labels)
     one, two = (scale(generic, r)[1].lengths for r in (here, there))
     for name, length in one.items():
-        # Both stop within the fit's tolerance: 1e-9 of a cost of order 100 over a
-        # curvature of (1 / 3 mm)^2 is 1 um.
-        assert two[name] == pytest.approx(length, abs=1e-5)
+        # Both stop where 1e-4 is left to gain; at a length SD of up to 8 mm that is
+        # within sqrt(1e-4) 8 mm of the minimum, two fits twice that.
+        assert two[name] == pytest.approx(length, abs=1.6e-4)
 
 
 def test_static_only_markers_are_dropped_and_named(generic):
