@@ -1,0 +1,139 @@
+"""A learned map against an analytic one: how alike, and what the difference costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.clustering import nearest_center
+from ikns.errors import InvalidInput
+from ikns.motion import Motion
+from ikns.nullspace_map import NullSpaceMap, null_space_samples
+from ikns.subspace import principal_angles
+
+__all__ = ["Comparison", "compare"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What :func:`compare` found, one entry a PCA point.
+
+    Parameters
+    ----------
+    centers : (P, 3) array
+        PCA points in the thorax frame, m.
+    counts : (P,) integer array
+        Still samples of the motion near each point.
+    angles : (P, d) array
+        Principal angles between learned and analytic directions, rad, smallest first.
+    inside : (P,) array
+        Share of the samples' joint variance that lies along the analytic directions.
+    learned_leak, analytic_leak : (P,) array
+        How far the hand goes while c goes from 0 to 1 there, m: the slope of hand
+        position on c over the samples. It should be zero.
+    agreement : (P,) array
+        Correlation of the two control signals over the samples (first degree of
+        freedom); NaN with fewer than three samples or no motion.
+    """
+
+    centers: Array
+    counts: NDArray[np.int64]
+    angles: Array
+    inside: Array
+    learned_leak: Array
+    analytic_leak: Array
+    agreement: Array
+
+
+def compare(
+    learned: NullSpaceMap,
+    analytic: NullSpaceMap,
+    motion: Motion,
+    *,
+    chain: str = "right_arm",
+    max_hand_speed: float = 0.05,
+) -> Comparison:
+    """Compare two maps with the same PCA points on a motion.
+
+    Parameters
+    ----------
+    learned, analytic : NullSpaceMap
+        As from :meth:`NullSpaceMap.fit` and :func:`ikns.nullspace_map.analytic_map` at
+        ``learned.centers_``.
+    motion : Motion
+        Any motion with still hands near the points.
+    chain : str
+        See :data:`ikns.motion.CHAINS`.
+    max_hand_speed : float
+        Gate on the hand, m/s.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InvalidInput
+        When the maps have different points or degrees of freedom.
+    NotEnoughData
+        When no sample passes the gate.
+    """
+    if learned.directions_.shape != analytic.directions_.shape or not np.allclose(
+        learned.centers_, analytic.centers_
+    ):
+        raise InvalidInput(
+            "both maps must have the same PCA points, joints and degrees of freedom; "
+            f"found directions {learned.directions_.shape} and "
+            f"{analytic.directions_.shape}."
+        )
+    x, q = null_space_samples(motion, chain, max_hand_speed=max_hand_speed)
+    radius = getattr(learned, "radius_", None)
+    labels, _ = nearest_center(x, learned.centers_, radius=radius)
+    n = len(learned.centers_)
+    inside, agreement, leaks = np.full(n, np.nan), np.full(n, np.nan), np.zeros((2, n))
+    for i in range(n):
+        own = labels == i
+        # The points' own directions: what is asked is how good each is where it holds.
+        signals = [_local_signal(m, i, q[own]) for m in (learned, analytic)]
+        leaks[:, i] = [_slope_norm(x[own], c) for c in signals]
+        centered = q[own] - q[own].mean(axis=0) if own.any() else q[own]
+        total = float(np.sum(centered**2))
+        if total > 0:
+            along = centered @ analytic.directions_[i].T
+            inside[i] = float(np.sum(along**2)) / total
+        if own.sum() > 2 and all(np.ptp(c) > 0 for c in signals):
+            agreement[i] = float(np.corrcoef(*signals)[0, 1])
+    return Comparison(
+        centers=learned.centers_,
+        counts=np.bincount(labels[labels >= 0], minlength=n),
+        angles=np.stack(
+            [
+                principal_angles(a, b)
+                for a, b in zip(learned.directions_, analytic.directions_, strict=True)
+            ]
+        ),
+        inside=inside,
+        learned_leak=leaks[0],
+        analytic_leak=leaks[1],
+        agreement=agreement,
+    )
+
+
+def _local_signal(mapped: NullSpaceMap, point: int, q: Array) -> Array:
+    """First control signal of one point's own direction, (N,)."""
+    lower, upper = mapped.lower_[point, 0], mapped.upper_[point, 0]
+    width = upper - lower if upper > lower else np.nan
+    return np.asarray((q @ mapped.directions_[point, 0] - lower) / width)
+
+
+def _slope_norm(x: Array, c: Array) -> float:
+    """Length of the slope of x (N, 3) on c (N,); NaN without variation of c."""
+    if len(c) < 3 or not np.ptp(c) > 0:
+        return float("nan")
+    deviation = c - c.mean()
+    slope = deviation @ (x - x.mean(axis=0)) / (deviation @ deviation)
+    return float(np.linalg.norm(slope))
