@@ -15,7 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput, NotEnoughData
 
-__all__ = ["mean_null_direction", "null_projector", "null_space", "principal_angles"]
+__all__ = [
+    "largest_entry_positive",
+    "mean_null_direction",
+    "null_projector",
+    "null_space",
+    "principal_angles",
+    "principal_components",
+]
 
 
 def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
@@ -173,9 +180,42 @@ def mean_null_direction(
     if not len(J):
         raise NotEnoughData("no posture has a finite Jacobian to average over.")
     values, vectors = np.linalg.eigh(null_projector(J, rtol=rtol).mean(axis=0))
-    rows = vectors[:, ::-1].T[:d]
+    directions = largest_entry_positive(vectors[:, ::-1].T[:d])
+    return directions, np.clip(values[::-1], 0.0, 1.0)
+
+
+def principal_components(
+    rows: NDArray[np.float64], *, centered: bool = True
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Directions in which vectors vary most.
+
+    Parameters
+    ----------
+    rows : (N, n) array
+        Vectors.
+    centered : bool
+        About their mean, or about zero.
+
+    Returns
+    -------
+    components : (n, n) array
+        Orthonormal rows of either sign, the one with most variance first.
+    ratio : (n,) array
+        Part of the total variance that each explains, decreasing; zeros where there is
+        none but for rounding.
+    """
+    around = rows - rows.mean(axis=0) if centered else rows
+    if np.abs(around).max() <= 1e-12 * np.abs(rows).max():
+        return np.eye(rows.shape[1]), np.zeros(rows.shape[1])
+    variances, vectors = np.linalg.eigh(around.T @ around)
+    variances = np.clip(variances[::-1], 0.0, None)
+    return vectors[:, ::-1].T, variances / variances.sum()
+
+
+def largest_entry_positive(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows (d, n) turned over where their entry of largest magnitude is negative."""
     largest = np.take_along_axis(rows, np.abs(rows).argmax(axis=1)[:, None], axis=1)
-    return rows * np.sign(largest), np.clip(values[::-1], 0.0, 1.0)
+    return np.where(largest < 0, -rows, rows)
 
 
 def _seen(s: NDArray[np.float64], rtol: float) -> NDArray[np.bool_]:

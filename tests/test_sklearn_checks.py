@@ -4,6 +4,7 @@ import pytest
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from ikns.clustering import BoundingBoxKMeans
+from ikns.nullspace_map import NullSpaceMap
 
 
 @pytest.fixture(autouse=True)
@@ -12,6 +13,8 @@ def array_api(monkeypatch):
     monkeypatch.setenv("SCIPY_ARRAY_API", "1")
 
 
-@parametrize_with_checks([BoundingBoxKMeans()])
+# The checks fit a few dozen random samples, about which a map rightly warns.
+@pytest.mark.filterwarnings("ignore::ikns.nullspace_map.MapWarning")
+@parametrize_with_checks([BoundingBoxKMeans(), NullSpaceMap()])
 def test_estimators_keep_the_conventions_of_scikit_learn(estimator, check):
     check(estimator)
