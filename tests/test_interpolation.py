@@ -341,19 +341,14 @@ def test_edges_connect_all_sites(name, jitter):
     assert connected(pairs(net), len(net.points))
 
 
-def test_edges_are_delaunays_and_join_the_two_sites_nearest_to_any_place():
-    rng = np.random.default_rng(9)
-    points = rng.random((40, 3))
+def test_edges_of_sites_in_general_position_are_delaunays():
+    points = np.random.default_rng(9).random((40, 3))
     known = {
         tuple(sorted((int(i), int(j))))
         for simplex in Delaunay(points).simplices
         for i, j in itertools.combinations(simplex, 2)
     }
-    found = pairs(NaturalNeighborInterpolator(points))
-    places = inside_queries(points, 5000, rng)
-    distance = np.linalg.norm(places[:, None] - points, axis=2)
-    two = np.sort(distance.argsort(axis=1)[:, :2], axis=1)
-    assert {(int(i), int(j)) for i, j in two} <= found <= known
+    assert pairs(NaturalNeighborInterpolator(points)) == known
 
 
 @pytest.mark.parametrize("jitter", JITTERS)

@@ -17,7 +17,7 @@ from ikns.errors import InvalidInput
 from ikns.interpolation.border import checked_points, checked_values
 from ikns.interpolation.hull import nearest_on_hull
 from ikns.interpolation.sibson import depths, stolen_volumes
-from ikns.interpolation.voronoi import share_a_face, voronoi
+from ikns.interpolation.voronoi import solid_angles, voronoi
 
 __all__ = ["NaturalNeighborInterpolator", "Outside"]
 
@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 #: there. The hull of a box whose corners are rounded is uneven by 1e-16, and this near
 #: to it weights would tell which way.
 _SKIN = 1e-11
+#: Faces that fill less than this much of a site's view, steradian, make no neighbors.
+_GLIMPSE = 1e-9
 #: Queries farther out are brought this near: only their direction matters there.
 _FAR = 1e9
 
@@ -55,10 +57,10 @@ class NaturalNeighborInterpolator:
     points : (N, 3) array
     values : (N, ...) array or None
     edges : (E, 2) integer array
-        Pairs of sites whose Voronoi cells share a face, as a connected graph. Cells
-        that only touch in a point or a line do not count, so co-spherical sites have no
-        accidental diagonals: a box has its 12 edges. A face counts when its area within
-        twice the set's size of the pair is above 1e-9 of the pair's distance squared.
+        Pairs of sites whose Voronoi cells share a face: the Delaunay edges. Together
+        they connect all sites. Cells that only touch in a point or a line do not count
+        (a face must fill 1e-9 sr of its site's view), so there are no accidental
+        diagonals: a box has 12 edges however its corners are rounded.
     simplices : (T, 4) integer array
         A Delaunay triangulation; ties are broken by the order of the sites.
     hull_facets : (H, 3) integer array
@@ -116,7 +118,9 @@ class NaturalNeighborInterpolator:
         self._rounding = 8 * np.finfo(float).eps * max(1.0, np.abs(self._sites).max())
         self.simplices = self._voronoi.simplices
         self.hull_facets = self._voronoi.hull_facets
-        self.edges = self._voronoi.edges[share_a_face(self._voronoi, self._sites)]
+        self.edges = self._voronoi.edges[
+            solid_angles(self._voronoi, self._sites) >= _GLIMPSE
+        ]
         for array in (self.points, self.simplices, self.hull_facets, self.edges):
             array.flags.writeable = False
 

@@ -36,7 +36,7 @@ from ikns.interpolation.delaunay import (
     on_lattice,
 )
 
-__all__ = ["Voronoi", "share_a_face", "voronoi"]
+__all__ = ["Voronoi", "solid_angles", "voronoi"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -266,40 +266,45 @@ def _direction(v: Vector) -> list[tuple[float, float]]:
     return [_rounded(*(value / length).as_integer_ratio()) for value in v]
 
 
-def share_a_face(diagram: Voronoi, points: Floats) -> NDArray[np.bool_]:
-    """Which edges stand for a face between two cells near the sites.
+def solid_angles(diagram: Voronoi, points: Floats) -> Floats:
+    """How much of site i's view the face that it shares with site j fills.
 
-    Diagonals of co-spherical sites are chosen by chance or by rounding, and their
-    polygons have no area, or hardly any; those of sites on a common edge of the hull
-    are far away.
+    Diagonals of co-spherical sites are chosen by chance or by rounding; their polygons
+    have no area, or hardly any, or they are far away. This tells them from the others
+    on any scale.
 
     Parameters
     ----------
     diagram : Voronoi
     points : (N, 3) array
-        The sites that it was built from, about 1 wide.
+        The sites that it was built from.
 
     Returns
     -------
-    (E,) boolean array
-        Whether two sides, as far as they are within 2 sizes of the edge's middle, span
-        at least 1e-9 of the edge's length squared.
+    (E,) array
+        Steradian, to about 1e-15; the whole view is 4 pi.
     """
-    d, reach = diagram, 2.0
-    base = np.vstack([d.corner + points[d.simplices[:, 0]], np.full(3, 1e300)])
-    behind, ahead = base[d.behind][d.side_facet], base[d.ahead][d.side_facet]
-    middle = points[d.edges].mean(axis=1)[d.side_edge]
-    # Along the line from its corner that is nearer: the other may be 1e15 away.
-    turned = np.abs(ahead - middle).max(axis=1) < np.abs(behind - middle).max(axis=1)
-    onward = np.where(turned[:, None], -1, 1) * d.normal[d.side_facet]
-    away = np.where(turned[:, None], ahead, behind) - middle
-    foot = -(away * onward).sum(axis=1)
-    lateral = ((away + foot[:, None] * onward) ** 2).sum(axis=1)
-    half = np.sqrt((reach**2 - lateral).clip(0, None))
-    length = np.minimum(d.length[d.side_facet], foot + half) - (foot - half).clip(
-        0, None
+    d, outside = diagram, len(diagram.simplices)
+    corner = np.vstack([d.corner + points[d.simplices[:, 0]], np.zeros(3)])
+
+    def seen(at: Indices) -> Floats:
+        away = corner[at] - points[d.edges[d.side_edge, 0]]
+        away[at == outside] = d.normal[d.side_facet[at == outside]]
+        return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+    start, end = seen(d.entering), seen(d.leaving)
+    angle = np.add.reduceat(
+        _solid_angle(d.axis[d.side_edge], start, end),
+        np.searchsorted(d.side_edge, np.arange(len(d.edges))),
     )
-    length = length.clip(0, None)
-    spanned = length[d.first] * length[d.second] * np.abs(d.sine)
-    square = (np.diff(points[d.edges], axis=1)[:, 0] ** 2).sum(axis=1)
-    return np.maximum.reduceat(spanned, d.pairs) >= 1e-9 * square
+    # From ray to ray along the horizon, where the polygon is open.
+    last, first = (np.flatnonzero(at == outside) for at in (d.leaving, d.entering))
+    edge = d.side_edge[first]
+    angle[edge] += _solid_angle(d.axis[edge], end[last], start[first])
+    return angle
+
+
+def _solid_angle(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Signed solid angle of three unit vectors (Van Oosterom and Strackee, 1983)."""
+    volume = (a * np.cross(b, c)).sum(axis=1)
+    return 2 * np.arctan2(volume, 1 + (a * b + b * c + c * a).sum(axis=1))
