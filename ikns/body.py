@@ -22,6 +22,7 @@ __all__ = [
     "SEGMENTS",
     "Inertial",
     "link_inertials",
+    "relative_sizes",
     "resize_urdf",
     "segment_ends",
     "segment_lengths",
@@ -97,6 +98,26 @@ def segment_ends(urdf: str) -> dict[str, NDArray[np.float64]]:
         for segment, end in SEGMENTS.items()
         if end in joints
     }
+
+
+def relative_sizes(urdf: str, reference: str) -> dict[str, float]:
+    """Size of each segment over the same segment of a reference URDF."""
+    sizes = []
+    for text in (urdf, reference):
+        joints = {
+            joint.get("name"): joint for joint in ET.fromstring(text).iter("joint")
+        }
+        # The trunk grows with the place of the joint that hangs on it.
+        ends = {
+            name: end or "right_clavicle_protraction" for name, end in SEGMENTS.items()
+        }
+        sizes.append(
+            {
+                name: float(np.linalg.norm(_vector(joints[end].find("origin"), "xyz")))
+                for name, end in ends.items()
+            }
+        )
+    return {name: sizes[0][name] / sizes[1][name] for name in SEGMENTS}
 
 
 def link_inertials(urdf: str, parts: Mapping[str, Segment]) -> dict[str, Inertial]:

@@ -145,10 +145,9 @@ def scale(
         )
     target = _mean_posture(static, worn)
     worn = replace(worn, held=worn.held + _absent_joints(static, worn, target))
-    factors, positions, q, covariance, converged = _fit(
-        generic.with_markers(worn), target
-    )
-    sized = generic.with_markers(worn).resized(_named(factors))
+    dressed = generic.wearing(worn)
+    factors, positions, q, covariance, converged = _fit(dressed, target)
+    sized = dressed.resized(_named(factors))
     nominal = sized.marker_positions
     skeleton = sized.with_markers(worn.at(positions).without_static())
     at_fit = sized.with_markers(worn.at(positions)).markers_in_world(q)

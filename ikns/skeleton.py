@@ -21,6 +21,7 @@ from ikns.body import (
     SEGMENTS,
     Inertial,
     link_inertials,
+    relative_sizes,
     resize_urdf,
     segment_ends,
     segment_lengths,
@@ -163,8 +164,19 @@ class Skeleton:
         return Skeleton(urdf, self.marker_set.at(positions))
 
     def with_markers(self, marker_set: MarkerSet) -> Skeleton:
-        """Return the same body wearing other markers."""
+        """Return the same body wearing these markers where the set says."""
         return Skeleton(self.urdf, marker_set)
+
+    def wearing(self, marker_set: MarkerSet) -> Skeleton:
+        """Return the same body with markers at the nominal places for its size.
+
+        A shipped set's places are those on the generic body; along a longer limb they
+        lie farther apart.
+        """
+        generic = Skeleton.load().urdf
+        sizes = relative_sizes(self.urdf, generic)
+        sized = Skeleton(generic, marker_set).resized(sizes).marker_set
+        return Skeleton(self.urdf, sized)
 
     def write(self, path: str | Path) -> None:
         """Write the URDF."""

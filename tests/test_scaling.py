@@ -127,6 +127,16 @@ def test_where_the_person_stands_does_not_matter(generic):
         assert two[name] == pytest.approx(length, abs=1.6e-4)
 
 
+def test_starting_from_the_persons_own_measures_fits_their_markers(generic):
+    tall = Skeleton.from_anthropometry(1.95, 100, "male")
+    recording = standing(tall, 9, noise=0, hidden=0)
+    skeleton, report = scale(tall, recording)
+    # Nothing to correct: the start is the truth, markers where the set says.
+    assert max(report.offsets.values()) < 5e-4
+    for name, length in skeleton.segment_lengths.items():
+        assert length == pytest.approx(tall.segment_lengths[name], abs=1e-3)
+
+
 def test_static_only_markers_are_dropped_and_named(generic):
     body = person(generic, 1)
     skeleton, report = scale(generic, standing(body, 1))
