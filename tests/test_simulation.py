@@ -30,7 +30,13 @@ from ikns.simulation import (
 from ikns.simulation.arm import Arm
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.movement import explore, reach
-from ikns.simulation.places import BOX_HIGH, BOX_LOW, box_places
+from ikns.simulation.places import (
+    BOX_HIGH,
+    BOX_LOW,
+    Place,
+    box_points,
+    explored_places,
+)
 from ikns.simulation.wander import minimum_jerk, tremor, wander
 from ikns.subspace import null_space
 
@@ -65,6 +71,20 @@ def hand(run: Protocol) -> tuple[np.ndarray, np.ndarray]:
     """Return true position and orientation of the exploring hand at the points."""
     truth, side = run.points.truth, SIDES.index(run.side)
     return truth.hand_in_thorax[:, side], truth.hand_rotation_in_thorax[:, side]
+
+
+def box(arm: Arm, *, n: int) -> list[Place]:
+    """Return points of the protocol for one arm."""
+    rng = np.random.default_rng(1)
+    (positions,) = box_points([arm], np.zeros(18), n=n, rng=rng)
+    return explored_places(
+        arm,
+        np.zeros(18),
+        positions,
+        rng=rng,
+        girdle_rest=np.zeros(2),
+        girdle_follow=0.0,
+    )
 
 
 # --- the person -----------------------------------------------------------------------
@@ -227,14 +247,7 @@ def test_lifting_the_elbow_outwards_is_positive_swivel() -> None:
 def test_points_stand_near_the_box_and_away_from_full_reach(side: str) -> None:
     skeleton = virtual_subject(8).skeleton
     arm, lengths = Arm(skeleton, side), skeleton.segment_lengths
-    places = box_places(
-        arm,
-        np.zeros(18),
-        n=10,
-        rng=np.random.default_rng(0),
-        girdle_rest=np.zeros(2),
-        girdle_follow=0.0,
-    )
+    places = box(arm, n=10)
     reach_m = sum(lengths[f"{side}_{s}"] for s in ("upper_arm", "forearm", "hand"))
     outward = np.array([1, 1, 1 if side == "right" else -1])
     relative = np.stack([p.position for p in places]) - arm.shoulder(np.zeros(18))
@@ -250,17 +263,39 @@ def test_points_stand_near_the_box_and_away_from_full_reach(side: str) -> None:
         assert (np.diff(place.motion.swivel) > 0).all()
 
 
+def test_two_arms_hold_an_object_while_each_elbow_moves_by_itself() -> None:
+    run = simulate_protocol(
+        virtual_subject(6),
+        seed=6,
+        side="both",
+        n_points=2,
+        static_seconds=0.1,
+        free_seconds=0.1,
+        unsteadiness=STEADY,
+        quick=True,
+        **CLEAN,
+    )
+    skeleton, trial = run.subject.skeleton, run.points
+    for k in range(2):
+        rows = np.flatnonzero(trial.point == k)
+        hands = trial.truth.hand_in_thorax[rows]
+        assert np.abs(hands.mean(axis=1) - run.places[k]).max() < 2e-7
+        assert np.linalg.norm(hands[:, 0] - hands[:, 1], axis=1) == pytest.approx(
+            0.3, abs=1e-6
+        )
+        assert (np.ptp(trial.swivel[rows], axis=0) > np.radians(40)).all()
+        # Two sines of different frequency: neither tells the other.
+        assert abs(np.corrcoef(trial.swivel[rows].T)[0, 1]) < 0.9
+        J = skeleton.chain_jacobian(trial.truth.q[rows[50]], "both_arms")
+        speed = trial.truth.chain_velocities("both_arms")[rows[50]]
+        # Self-motion of the whole chain; differences over 10 ms are good to 0.2 %.
+        assert np.linalg.norm(J @ speed) < 2e-3 * np.linalg.norm(speed)
+
+
 def test_reaches_are_straight_with_minimum_jerk() -> None:
     arm = Arm(virtual_subject(2).skeleton, "right")
-    start, end = box_places(
-        arm,
-        np.zeros(18),
-        n=2,
-        rng=np.random.default_rng(1),
-        girdle_rest=np.zeros(2),
-        girdle_follow=0.0,
-    )
-    plan = reach(start, end, rate=100.0)
+    start, end = box(arm, n=2)
+    plan = reach(start, end, n=90)
     way = end.position - start.position
     along = (plan.position - start.position) @ way / (way @ way)
     np.testing.assert_allclose(
@@ -272,14 +307,7 @@ def test_reaches_are_straight_with_minimum_jerk() -> None:
 
 def test_exploring_uses_the_range_from_rest_to_rest() -> None:
     arm = Arm(virtual_subject(2).skeleton, "right")
-    (place,) = box_places(
-        arm,
-        np.zeros(18),
-        n=1,
-        rng=np.random.default_rng(1),
-        girdle_rest=np.zeros(2),
-        girdle_follow=0.0,
-    )
+    (place,) = box(arm, n=1)
     plan = explore(
         place, seconds=5.0, rate=100.0, rng=np.random.default_rng(3), index=7
     )
@@ -428,7 +456,7 @@ def test_written_files_read_back(run: Protocol, tmp_path: Path) -> None:
             path.with_name(f"{trial.name}_truth.csv"), delimiter=",", names=True
         )
         np.testing.assert_allclose(
-            table["swivel_deg"], np.degrees(trial.swivel), atol=1e-5
+            table["right_swivel_deg"], np.degrees(trial.swivel), atol=1e-5
         )
         np.testing.assert_array_equal(table["point"], trial.point)
         elbow = trial.truth.chain_angles("right_arm")[:, 3]

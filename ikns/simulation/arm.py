@@ -59,7 +59,7 @@ class Arm:
         self.lower = skeleton.lower[self.columns]
         self.upper = skeleton.upper[self.columns]
         self._seven = self.columns[2:]
-        self._outward = 1.0 if side == "right" else -1.0
+        self.outward = 1.0 if side == "right" else -1.0
 
     def put(self, angles: Array, posture: ArrayLike) -> Array:
         """Return the body's joint angles with this arm in a posture."""
@@ -92,7 +92,7 @@ class Arm:
         length = np.sqrt(lx * lx + ly * ly + lz * lz)
         along = (ex * lx + ey * ly + ez * lz) / length**2
         down = along * ly - ey
-        outward = (ez * lx - ex * lz) / length * self._outward
+        outward = (ez * lx - ex * lz) / length * self.outward
         return float(np.arctan2(outward, down)) if outward or down else float("nan")
 
     def to_pose(self, angles: Array, position: Array, rotation: Array) -> Array:

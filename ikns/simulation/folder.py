@@ -9,6 +9,7 @@ import numpy as np
 
 from ikns.errors import FileError
 from ikns.files import write_c3d
+from ikns.motion import SIDES
 from ikns.simulation.protocol import Protocol
 from ikns.simulation.trial import Trial
 
@@ -23,9 +24,9 @@ def write_protocol(
     """Write ``static.c3d``, ``free.c3d``, ``points.c3d`` and what is true of them.
 
     Beside each recording lies ``<name>_truth.csv``: time (s), every joint angle (deg),
-    the elbow swivel of the arm that explores (deg), hand position in the thorax frame
-    (mm) and point (-1 on the way). ``truth.json`` has the person, segment lengths (m),
-    places of the markers in their links (m), points (m) and all settings;
+    swivel of each exploring elbow (deg) and position of its hand in the thorax frame
+    (mm), and the point (-1 on the way). ``truth.json`` has the person, segment lengths
+    (m), places of the markers in their links (m), points (m) and all settings;
     ``truth.urdf`` the body.
 
     Parameters
@@ -71,15 +72,17 @@ def write_protocol(
 
 def _write_table(path: Path, trial: Trial, side: str) -> None:
     truth = trial.truth
-    hand = truth.hand_in_thorax[:, ("right", "left").index(side)]
-    names = [f"{joint}_deg" for joint in truth.joint_names]
-    header = ["time_s", *names, "swivel_deg", *(f"hand_{x}_mm" for x in "xyz"), "point"]
+    sides = SIDES if side == "both" else (side,)
+    hands = truth.hand_in_thorax[:, [SIDES.index(name) for name in sides]]
+    header = ["time_s", *(f"{joint}_deg" for joint in truth.joint_names)]
+    header += [f"{name}_swivel_deg" for name in sides]
+    header += [f"{name}_hand_{axis}_mm" for name in sides for axis in "xyz"] + ["point"]
     columns = np.column_stack(
         [
             truth.time,
             np.degrees(truth.angles),
             np.degrees(trial.swivel),
-            1000 * hand,
+            1000 * hands.reshape(len(hands), -1),
             trial.point,
         ]
     )

@@ -8,6 +8,7 @@ inverse kinematics, changing the planned posture no more than the hand pose asks
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,15 @@ from ikns.simulation.arm import Arm
 from ikns.simulation.places import Place
 from ikns.simulation.wander import minimum_jerk, tremor, wander
 
-__all__ = ["Plan", "Unsteadiness", "carry_out", "explore", "join", "reach"]
+__all__ = [
+    "Plan",
+    "Unsteadiness",
+    "carry_out",
+    "explore",
+    "join",
+    "reach",
+    "reach_samples",
+]
 
 Array = NDArray[np.float64]
 
@@ -90,10 +99,14 @@ class Unsteadiness:
     tremor_tilt: float = np.radians(0.03)
 
 
-def reach(start: Place, end: Place, *, rate: float) -> Plan:
-    """Minimum-jerk reach from place to place, straight in space."""
+def reach_samples(start: Place, end: Place, *, rate: float) -> int:
+    """How many samples an unhurried reach takes."""
     distance = float(np.linalg.norm(end.position - start.position))
-    n = max(2, round(rate * (_REACH_S + _REACH_S_PER_M * distance)))
+    return max(2, round(rate * (_REACH_S + _REACH_S_PER_M * distance)))
+
+
+def reach(start: Place, end: Place, *, n: int) -> Plan:
+    """Minimum-jerk reach from place to place in `n` samples, straight in space."""
     share = minimum_jerk(n)
     turn = Slerp([0.0, 1.0], Rotation.from_matrix([start.rotation, end.rotation]))
     return Plan(
@@ -140,7 +153,7 @@ def explore(
     )
 
 
-def join(plans: list[Plan]) -> Plan:
+def join(plans: Sequence[Plan]) -> Plan:
     """One plan after the other."""
     return Plan(
         *(

@@ -8,6 +8,7 @@ near ones by 120 deg: the dexterous region, without its boundary.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,13 @@ from scipy.optimize import least_squares
 from ikns.errors import InvalidInput
 from ikns.simulation.arm import Arm, SelfMotion, girdle, self_motion
 
-__all__ = ["Place", "box_places", "comfortable_posture", "random_place"]
+__all__ = [
+    "Place",
+    "box_points",
+    "comfortable_posture",
+    "explored_places",
+    "random_place",
+]
 
 Array = NDArray[np.float64]
 
@@ -28,6 +35,8 @@ BOX_LOW = np.array([0.42, -0.42, -0.27])
 BOX_HIGH = np.array([0.70, 0.10, 0.27])
 #: "Near" the vertices of an imagined box: error per axis, m (assumption).
 _VERTEX_SD = 0.012
+#: Size of what two hands hold between them, and how far its middle goes sideways, m.
+_OBJECT, _SIDEWAYS = 0.30, 0.20
 #: Swivel that people explore: from the elbow straight below the shoulder-wrist line to
 #: nearly level with it, rad (assumption; joint limits cut it further).
 LOWEST, HIGHEST = np.radians(0.0), np.radians(80.0)
@@ -140,30 +149,65 @@ def random_place(
     return _place(arm, angles, posture)
 
 
-def box_places(
-    arm: Arm,
-    angles: Array,
-    *,
-    n: int,
-    rng: np.random.Generator,
-    girdle_rest: Array,
-    girdle_follow: float,
-) -> list[Place]:
-    """Return the points of the protocol, each with its self-motion.
+def box_points(
+    arms: Sequence[Arm], angles: Array, *, n: int, rng: np.random.Generator
+) -> list[Array]:
+    """Where each hand goes at the points of the protocol, one (n, 3) array an arm, m.
 
-    Near the vertices of the box, then in the centers of its lower and upper face; the
-    upper points come first. Fewer than 10 are the first ones. The forearm's pronation
-    is the one, of a few, that leaves the elbow most room.
+    Near the vertices of the box, then near the centers of its upper and lower face; the
+    upper points come first. Fewer than 10 are the first ones. Two hands hold an object
+    between them, and the box is that of its middle.
     """
     corners = itertools.product((1, 0), ((1, 0), (1, 1), (0, 1), (0, 0)))
     shares = [(x, y, z) for y, (x, z) in corners] + [(0.5, 1, 0.5), (0.5, 0, 0.5)]
     if not 1 <= n <= len(shares):
         raise InvalidInput(f"n_points must be 1 to {len(shares)}, not {n}.")
+    share = np.array(shares[:n], dtype=np.float64)
+    goals = BOX_LOW + share * (BOX_HIGH - BOX_LOW)
+    near = rng.normal(0.0, _VERTEX_SD, (n, 3))
+    if len(arms) == 1:
+        return [_from_box(arms[0], angles, goals) + near]
+    ahead = [_from_box(arm, angles, goals * [1, 1, 0]) for arm in arms]
+    middle = np.mean(ahead, axis=0) + near
+    middle[:, 2] += (share[:, 2] - 0.5) * _SIDEWAYS
+    half = np.array([0.0, 0.0, _OBJECT / 2])
+    return [middle + half * arm.outward for arm in arms]
+
+
+def explored_places(
+    arm: Arm,
+    angles: Array,
+    positions: Array,
+    *,
+    rng: np.random.Generator,
+    girdle_rest: Array,
+    girdle_follow: float,
+) -> list[Place]:
+    """Return places to explore at these hand positions, each with its self-motion.
+
+    The forearm's pronation is the one, of a few, that leaves the elbow most room.
+
+    Parameters
+    ----------
+    arm : Arm
+        The arm.
+    angles : (18,) array
+        The rest of the body.
+    positions : (n, 3) array
+        Hand in the thorax frame, m.
+    rng : numpy.random.Generator
+        Source of the person's habits.
+    girdle_rest, girdle_follow
+        See :func:`ikns.simulation.arm.girdle`; `girdle_follow` while the hand is held.
+
+    Raises
+    ------
+    InvalidInput
+        When a position is out of reach, or leaves the elbow no room.
+    """
     comfortable = rng.normal(np.radians(38.0), np.radians(4.0))
     places = []
-    for share in shares[:n]:
-        goal = BOX_LOW + np.array(share) * (BOX_HIGH - BOX_LOW)
-        position = _from_box(arm, angles, goal) + rng.normal(0.0, _VERTEX_SD, 3)
+    for position in positions:
         swivel = comfortable + rng.normal(0.0, np.radians(3.0))
         farthest = rng.uniform(*_FARTHEST)
         habit = rng.normal(0.0, np.radians([8, 4, 3]))
@@ -209,8 +253,7 @@ def _room(motion: SelfMotion | None) -> float:
 
 
 def _from_box(arm: Arm, angles: Array, share: Array) -> Array:
-    """Position in the thorax frame of a place in arm lengths from the shoulder."""
+    """Positions in the thorax frame of places in arm lengths from the shoulder."""
     lengths = arm.skeleton.segment_lengths
     reach = sum(lengths[f"{arm.side}_{s}"] for s in ("upper_arm", "forearm", "hand"))
-    outward = 1.0 if arm.side == "right" else -1.0
-    return arm.shoulder(angles) + reach * share * np.array([1.0, 1.0, outward])
+    return arm.shoulder(angles) + reach * share * np.array([1.0, 1.0, arm.outward])

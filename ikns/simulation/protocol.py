@@ -15,18 +15,13 @@ from numpy.typing import NDArray
 from ikns.motion import SIDES
 from ikns.simulation.arm import Arm
 from ikns.simulation.artifacts import SoftTissue
-from ikns.simulation.movement import (
-    Plan,
-    Unsteadiness,
-    carry_out,
-    explore,
-    join,
-    reach,
-)
-from ikns.simulation.places import GIRDLE_FOLLOW, Place, box_places, random_place
+from ikns.simulation.exercise import roam, visit
+from ikns.simulation.movement import Plan, Unsteadiness, carry_out
+from ikns.simulation.places import GIRDLE_FOLLOW, box_points, explored_places
 from ikns.simulation.subject import VirtualSubject
 from ikns.simulation.trial import Trial, film, place_in_room
 from ikns.simulation.wander import wander
+from ikns.skeleton import Skeleton
 
 __all__ = ["Protocol", "simulate_protocol"]
 
@@ -56,12 +51,13 @@ class Protocol:
     ----------
     subject : VirtualSubject
         Who.
-    side : {"right", "left"}
-        The arm that explored.
+    side : {"right", "left", "both"}
+        What explored.
     static, free, points : Trial
         Standing still; free exploration; the points with the reaches between them.
     places : (P, 3) array
-        Where the hand was meant to be at each point, thorax frame, m.
+        Where the hand, or the middle of both, was meant to be at each point, thorax
+        frame, m.
     settings : dict
         Every setting, for the record.
     """
@@ -106,8 +102,9 @@ def simulate_protocol(
     seed : int
         Same seed and settings, same recordings. The motion does not depend on the
         settings of markers, so two kinds of artifacts can be compared on one motion.
-    side : {"right", "left"}
-        The arm that explores; the other rests.
+    side : {"right", "left", "both"}
+        The arm that explores while the other rests; or both, as if holding an object
+        between the hands, each elbow with a rhythm of its own.
     n_points : int
         Points of the box, at most 10.
     static_seconds, free_seconds, point_seconds : float
@@ -161,34 +158,41 @@ def simulate_protocol(
         "girdle_rhythm": girdle_rhythm,
         "rate": rate,
     }
-    arm = Arm(subject.skeleton, side)
+    sides = SIDES if side == "both" else (side,)
+    arms = [Arm(subject.skeleton, name) for name in sides]
     # A stream for each use, so that changing one thing leaves the others as they are.
     of_person, of_static, of_free, of_points, of_skin, of_cameras = (
         np.random.default_rng(seed).spawn(6)
     )
     girdle_rest = of_person.normal(0.0, np.radians([3.0, 2.0]))
     heading = of_person.uniform(-np.pi, np.pi)
-    sitting, standing = _pose(arm, _RESTING), _pose(arm, _STATIC)
+    sitting = _pose(subject.skeleton, _RESTING)
+    standing = _pose(subject.skeleton, _STATIC)
     standing += of_person.normal(0.0, _STATIC_SD, len(standing))
-    standing[arm.columns[:2]] = girdle_rest
-    places = box_places(
-        arm,
-        sitting,
-        n=n_points,
-        rng=of_person,
-        girdle_rest=girdle_rest,
-        girdle_follow=girdle_rhythm * GIRDLE_FOLLOW,
-    )
-
-    def seated(plan: Plan, rng: np.random.Generator) -> Array:
-        angles = _still(sitting, len(plan.point), rate, rng)
-        angles = carry_out(
-            arm, angles, plan, unsteadiness=unsteadiness, rate=rate, rng=rng
+    for arm in arms:
+        standing[arm.columns[:2]] = girdle_rest
+    positions = box_points(arms, sitting, n=n_points, rng=of_person)
+    places = [
+        explored_places(
+            arm,
+            sitting,
+            position,
+            rng=of_person,
+            girdle_rest=girdle_rest,
+            girdle_follow=girdle_rhythm * GIRDLE_FOLLOW,
         )
-        height = _SEATED * subject.adult.stature_m
+        for arm, position in zip(arms, positions, strict=True)
+    ]
+
+    def seated(plans: list[Plan], rng: np.random.Generator) -> Array:
+        angles = _still(sitting, len(plans[0].point), rate, rng)
+        for arm, plan in zip(arms, plans, strict=True):
+            angles = carry_out(
+                arm, angles, plan, unsteadiness=unsteadiness, rate=rate, rng=rng
+            )
         return place_in_room(
             angles,
-            height=height,
+            height=_SEATED * subject.adult.stature_m,
             heading=heading,
             sway=_SWAY_SEATED,
             rate=rate,
@@ -196,8 +200,15 @@ def simulate_protocol(
         )
 
     n_static = max(2, round(static_seconds * rate))
-    free_plan = _roam(arm, sitting, girdle_rest, free_seconds, rate, of_free)
-    points_plan = _visit(places, point_seconds, rate, of_points)
+    free = roam(
+        arms,
+        sitting,
+        seconds=free_seconds,
+        rate=rate,
+        girdle_rest=girdle_rest,
+        rng=of_free,
+    )
+    points = visit(places, seconds=point_seconds, rate=rate, rng=of_points)
     q = {
         "static": place_in_room(
             _still(standing, n_static, rate, of_static),
@@ -207,13 +218,13 @@ def simulate_protocol(
             rate=rate,
             rng=of_static,
         ),
-        "free": seated(free_plan, of_free),
-        "points": seated(points_plan, of_points),
+        "free": seated(free, of_free),
+        "points": seated(points, of_points),
     }
     point = {
         "static": np.full(n_static, -1),
-        "free": free_plan.point,
-        "points": points_plan.point,
+        "free": free[0].point,
+        "points": points[0].point,
     }
     skin = None
     if soft_tissue > 0:
@@ -226,7 +237,7 @@ def simulate_protocol(
         )
     trials = {
         name: film(
-            arm,
+            arms,
             q[name],
             name=name,
             point=point[name],
@@ -242,50 +253,17 @@ def simulate_protocol(
     return Protocol(
         subject=subject,
         side=side,
-        places=np.stack([place.position for place in places]),
+        places=np.mean(positions, axis=0),
         settings=settings,
         **trials,
     )
 
 
-def _roam(
-    arm: Arm,
-    angles: Array,
-    girdle_rest: Array,
-    seconds: float,
-    rate: float,
-    rng: np.random.Generator,
-) -> Plan:
-    """Reach from one random place to the next."""
-    place = random_place(arm, angles, rng=rng, girdle_rest=girdle_rest)
-    plans: list[Plan] = []
-    left = max(2, round(seconds * rate))
-    while left > 0:
-        start = place
-        place = random_place(arm, angles, rng=rng, girdle_rest=girdle_rest)
-        plans.append(reach(start, place, rate=rate))
-        left -= len(plans[-1].point)
-    plan = join(plans)
-    return plan if left == 0 else plan.first(len(plan.point) + left)
-
-
-def _visit(
-    places: list[Place], seconds: float, rate: float, rng: np.random.Generator
-) -> Plan:
-    """Explore one place after the other."""
-    plans = []
-    for i, place in enumerate(places):
-        if i:
-            plans.append(reach(places[i - 1], place, rate=rate))
-        plans.append(explore(place, seconds=seconds, rate=rate, rng=rng, index=i))
-    return join(plans)
-
-
-def _pose(arm: Arm, posture: Array) -> Array:
+def _pose(skeleton: Skeleton, posture: Array) -> Array:
     """Joint angles with both arms in the same posture, (18,)."""
-    angles = np.zeros(len(arm.skeleton.joint_names))
+    angles = np.zeros(len(skeleton.joint_names))
     for side in SIDES:
-        angles = Arm(arm.skeleton, side).put(angles, posture)
+        angles = Arm(skeleton, side).put(angles, posture)
     return angles
 
 

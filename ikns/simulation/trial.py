@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -36,8 +37,8 @@ class Trial:
         What the cameras saw.
     truth : Motion
         What the body did, on the same frames.
-    swivel : (T,) array
-        True elbow swivel of the arm that explores, rad; NaN for a straight arm.
+    swivel : (T,) or (T, 2) array
+        True elbow swivel of the arm that explores, or of both (right, left), rad.
     point : (T,) integer array
         Index of the point at which the hand is held, -1 elsewhere.
     """
@@ -108,7 +109,7 @@ def true_motion(skeleton: Skeleton, time: Array, q: Array) -> Motion:
 
 
 def film(
-    arm: Arm,
+    arms: Sequence[Arm],
     q: Array,
     *,
     name: str,
@@ -124,8 +125,8 @@ def film(
 
     Parameters
     ----------
-    arm : Arm
-        The arm that explores, and the person it belongs to.
+    arms : sequence of Arm
+        Those that explore, and the person they belong to.
     q : (T, 25) array
         Configurations.
     name : str
@@ -145,7 +146,7 @@ def film(
     rng : numpy.random.Generator
         Source of randomness.
     """
-    skeleton = arm.skeleton
+    skeleton = arms[0].skeleton
     of_noise, of_skin, of_gaps = rng.spawn(3)
     time = np.arange(len(q)) / rate
     markers = np.stack([skeleton.markers_in_world(row) for row in q])
@@ -161,10 +162,11 @@ def film(
     labels = [skeleton.marker_set.labels[i] for i in worn]
     markers = markers[:, worn]
     markers[occlusions(of_gaps, len(q), links, share=occluded, rate=rate)] = np.nan
+    swivel = np.array([[arm.swivel(row) for arm in arms] for row in q])
     return Trial(
         name=name,
         recording=Recording(time, markers, labels, f"simulated {name} trial"),
         truth=true_motion(skeleton, time, q),
-        swivel=np.array([arm.swivel(row) for row in q]),
+        swivel=swivel[:, 0] if len(arms) == 1 else swivel,
         point=point,
     )

@@ -1,0 +1,93 @@
+"""The exercises of the protocol as plans, one an arm and all of the same length."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.simulation.arm import Arm
+from ikns.simulation.movement import Plan, explore, join, reach, reach_samples
+from ikns.simulation.places import Place, random_place
+
+__all__ = ["roam", "visit"]
+
+
+def roam(
+    arms: Sequence[Arm],
+    angles: NDArray[np.float64],
+    *,
+    seconds: float,
+    rate: float,
+    girdle_rest: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> list[Plan]:
+    """Free exploration: reach from one random place to the next.
+
+    Parameters
+    ----------
+    arms : sequence of Arm
+        Those that move, each to places of its own.
+    angles : (18,) array
+        Joint angles of the rest of the body.
+    seconds, rate : float
+        Duration and samples per second.
+    girdle_rest : (2,) array
+        Clavicle angles with the arm hanging, rad.
+    rng : numpy.random.Generator
+        Source of randomness.
+    """
+
+    def somewhere() -> list[Place]:
+        return [
+            random_place(arm, angles, rng=rng, girdle_rest=girdle_rest) for arm in arms
+        ]
+
+    n = max(2, round(seconds * rate))
+    stops, reaches, done = somewhere(), [], 0
+    while done < n:
+        before, stops = stops, somewhere()
+        reaches.append(_reach_together(before, stops, rate))
+        done += len(reaches[-1][0].point)
+    return [join(plans).first(n) for plans in zip(*reaches, strict=True)]
+
+
+def visit(
+    places: Sequence[Sequence[Place]],
+    *,
+    seconds: float,
+    rate: float,
+    rng: np.random.Generator,
+) -> list[Plan]:
+    """Explore one place after the other, with reaches between.
+
+    Parameters
+    ----------
+    places : sequence of sequence of Place
+        For each arm its places, in order.
+    seconds, rate : float
+        Stay at each place, and samples per second.
+    rng : numpy.random.Generator
+        Source of randomness.
+    """
+    parts: list[list[Plan]] = []
+    stops = list(zip(*places, strict=True))
+    for i, stop in enumerate(stops):
+        if i:
+            parts.append(_reach_together(stops[i - 1], stop, rate))
+        parts.append(
+            [
+                explore(place, seconds=seconds, rate=rate, rng=rng, index=i)
+                for place in stop
+            ]
+        )
+    return [join(plans) for plans in zip(*parts, strict=True)]
+
+
+def _reach_together(
+    starts: Sequence[Place], ends: Sequence[Place], rate: float
+) -> list[Plan]:
+    pairs = list(zip(starts, ends, strict=True))
+    n = max(reach_samples(start, end, rate=rate) for start, end in pairs)
+    return [reach(start, end, n=n) for start, end in pairs]
