@@ -1,0 +1,11 @@
+"""Calibration: a static trial and explorations in, a subject and an honest report out.
+
+Read `procedure` first; `elbow` says which way c rises, `sight` which frames show the
+chain, `report` what is written down.
+"""
+
+from ikns.calibration.elbow import elbow_reference
+from ikns.calibration.procedure import calibrate
+from ikns.calibration.sight import in_sight
+
+__all__ = ["calibrate", "elbow_reference", "in_sight"]

@@ -1,0 +1,59 @@
+"""Which way c rises: with the elbow."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.motion import chain_joints, chain_sides
+from ikns.skeleton import Skeleton
+
+__all__ = ["elbow_reference"]
+
+Array = NDArray[np.float64]
+
+#: Angle step of the central difference, rad: its error is of the order of the step
+#: squared (1e-10 m/rad), that of rounding 1e-16 m over the step (1e-11 m/rad).
+_STEP = 1e-5
+
+
+def elbow_reference(
+    skeleton: Skeleton, q: Array, chain: str, *, n_dof: int = 1
+) -> Array | None:
+    """Return what should rise with c: the height of the elbow in the thorax frame.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    q : (25,) or (18,) array
+        Posture, rad.
+    chain : str
+        Of two arms both elbows count.
+    n_dof : int
+        With several degrees of freedom each elbow has its own row, then come forearm
+        pronation, wrist flexion and wrist deviation of each side.
+
+    Returns
+    -------
+    (n_dof, n) array or None
+        Height gradients along the chain's joints, m/rad; rows of single joints are 1.
+        None when there are fewer rows than degrees of freedom.
+    """
+    joints, sides = chain_joints(chain), chain_sides(chain)
+    first = len(q) - len(skeleton.joint_names)
+    height = np.zeros((len(sides), len(joints)))
+    for j, joint in enumerate(joints):
+        for step in (_STEP, -_STEP):
+            moved = np.array(q, dtype=np.float64)
+            moved[first + skeleton.joint_names.index(joint)] += step
+            elbows = [skeleton.link_in_thorax(moved, f"{s}_forearm")[0] for s in sides]
+            height[:, j] += np.array(elbows)[:, 1] / (2 * step)
+    if n_dof == 1:
+        return height.sum(axis=0, keepdims=True)
+    single = [
+        np.eye(len(joints))[joints.index(f"{side}_{joint}")]
+        for joint in ("forearm_pronation", "wrist_flexion", "wrist_deviation")
+        for side in sides
+    ]
+    rows = np.vstack([height, *single])
+    return rows[:n_dof] if len(rows) >= n_dof else None

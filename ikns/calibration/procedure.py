@@ -1,0 +1,173 @@
+"""The line as one call: scale, track markers, keep still samples, fit the map."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ikns.calibration.elbow import elbow_reference
+from ikns.calibration.report import (
+    exploration_report,
+    extrinsic_report,
+    points_report,
+    static_report,
+)
+from ikns.calibration.sight import check_segments, in_sight
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.marker_ik import MarkerIK
+from ikns.motion import Motion, chain_joints
+from ikns.nullspace_map import MapWarning, NullSpaceMap, still
+from ikns.recording import Recording
+from ikns.scaling import scale
+from ikns.skeleton import Skeleton
+from ikns.subject import Subject
+
+__all__ = ["calibrate"]
+
+
+def calibrate(
+    static: Recording,
+    explorations: Sequence[Recording],
+    *,
+    generic: Skeleton | None = None,
+    marker_set: str | Path = "oxford24",
+    chain: str = "right_arm",
+    n_points: int = 10,
+    n_dof: int = 1,
+    max_hand_speed: float = 0.05,
+    variance: float = 0.8,
+    radius: float | None = None,
+    outside: Literal["nearest", "project", "nan"] = "nearest",
+    min_static: float = 1.0,
+    min_still: float = 0.5,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Subject:
+    """Calibrate a person.
+
+    Parameters
+    ----------
+    static : Recording
+        The person standing or sitting still.
+    explorations : sequence of Recording
+        The hand at the PCA points, the arm moving freely.
+    generic : Skeleton, optional
+        Body to start from; :meth:`Skeleton.from_anthropometry` when stature, mass and
+        sex are known. Default: the generic adult.
+    marker_set : str or Path
+        What the person wears.
+    chain : str
+        Joints of the task, see :data:`ikns.motion.CHAINS`. All others are extrinsic:
+        how much they moved is reported.
+    n_points, n_dof, variance, radius, outside
+        Of :class:`NullSpaceMap`; radius in m.
+    max_hand_speed : float
+        Gate on the hand, m/s.
+    min_static : float
+        Shortest static trial to accept, s.
+    min_still : float
+        A PCA point with less time of still samples is left out, s. The default is a
+        tenth of the 5 s that the protocol spends at each.
+    progress : callable, optional
+        Called with (step, done, total).
+
+    Returns
+    -------
+    Subject
+        Its report says for every PCA point how many still samples there were, and why
+        it was left out where it was.
+
+    Raises
+    ------
+    MarkerMismatch
+        When a segment of the chain has no marker in a recording.
+    NotEnoughData
+        When the static trial is too short, no sample is still, or the usable points
+        are fewer than 4 or in one plane.
+    InvalidInput
+        When a parameter is out of its range.
+    """
+    if not explorations:
+        raise InvalidInput("expected at least one exploration recording, found none.")
+    names = ", ".join(recording.source for recording in explorations)
+    body = Skeleton.load() if generic is None else generic
+    skeleton, scaling = scale(
+        body, static, marker_set=marker_set, min_duration=min_static
+    )
+    for recording in explorations:
+        check_segments(skeleton, recording, chain)
+    motions = tuple(
+        _track(skeleton, recording, chain, progress) for recording in explorations
+    )
+    gates = [still(motion, chain, max_hand_speed=max_hand_speed) for motion in motions]
+    if not any(gate.any() for gate in gates):
+        speeds = np.concatenate([motion.hand_speed(chain) for motion in motions])
+        raise NotEnoughData(
+            f"{names}: expected samples with the hand slower than {max_hand_speed:g} "
+            f"m/s, found none below {np.nanmin(speeds, initial=np.inf):.3g} m/s."
+        )
+    pairs = list(zip(motions, gates, strict=True))
+    x = np.concatenate([motion.place(chain)[gate] for motion, gate in pairs])
+    q = np.concatenate([motion.chain_angles(chain)[gate] for motion, gate in pairs])
+    posture = np.concatenate([motion.angles[gate] for motion, gate in pairs])
+    # More samples than joints, or they cannot span the joint space.
+    enough = int(np.ceil(min_still * explorations[0].rate))
+    learned = NullSpaceMap(
+        n_points,
+        n_dof=n_dof,
+        variance=variance,
+        radius=radius,
+        outside=outside,
+        reference=elbow_reference(skeleton, posture.mean(axis=0), chain, n_dof=n_dof),
+        min_samples=max(enough, len(chain_joints(chain)) + 1),
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", MapWarning)
+        try:
+            learned.fit(x, q)
+        except NotEnoughData as error:
+            raise NotEnoughData(f"{names}: {error}") from None
+    report = {
+        "chain": chain,
+        "marker_set": skeleton.marker_set.name,
+        "settings": {
+            "n_points": n_points,
+            "n_dof": n_dof,
+            "variance": variance,
+            "max_hand_speed_m_s": max_hand_speed,
+            "min_samples": learned.min_samples,
+        },
+        "static": static_report(static, scaling),
+        "explorations": [
+            exploration_report(recording, motion, gate)
+            for recording, (motion, gate) in zip(explorations, pairs, strict=True)
+        ],
+        "points": points_report(learned, rate=explorations[0].rate),
+        "extrinsic": extrinsic_report(skeleton, pairs, chain),
+        "warnings": [str(warning.message) for warning in caught],
+    }
+    return Subject(skeleton, learned, chain, report, motions)
+
+
+def _track(
+    skeleton: Skeleton,
+    recording: Recording,
+    chain: str,
+    progress: Callable[[str, int, int], None] | None,
+) -> Motion:
+    """Track a recording; where a segment is out of sight the hand's speed is unknown.
+
+    There the joints stay as they were, which would pass for a hand held still.
+    """
+    step = Path(recording.source).name
+    motion = MarkerIK(skeleton).track(
+        recording, progress=None if progress is None else partial(progress, step)
+    )
+    known = np.all(list(in_sight(skeleton, recording, chain).values()), axis=0)
+    velocity = np.where(known[:, None, None], motion.hand_velocity_in_thorax, np.nan)
+    return replace(motion, hand_velocity_in_thorax=velocity)

@@ -1,0 +1,105 @@
+"""What a calibration writes down: plain text and numbers, ready for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.motion import Motion, chain_joints
+from ikns.nullspace_map import NullSpaceMap
+from ikns.recording import Recording
+from ikns.scaling import ScalingReport
+from ikns.skeleton import Skeleton
+
+__all__ = [
+    "exploration_report",
+    "extrinsic_report",
+    "points_report",
+    "static_report",
+]
+
+
+def static_report(static: Recording, scaling: ScalingReport) -> dict[str, Any]:
+    """How well the static trial settled the body."""
+    return {
+        "source": static.source,
+        "duration_s": scaling.duration,
+        "converged": bool(scaling.converged),
+        "lengths_m": scaling.lengths,
+        "length_sd_m": scaling.length_sd,
+        "residuals_m": scaling.residuals,
+        "offsets_m": scaling.offsets,
+        "unused": list(scaling.unused),
+        "dropped": list(scaling.dropped),
+        "held": list(scaling.held),
+    }
+
+
+def exploration_report(
+    recording: Recording, motion: Motion, gate: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """How a recording was tracked and how much of it is still."""
+    residual = motion.residual[np.isfinite(motion.residual)]
+    return {
+        "source": recording.source,
+        "duration_s": len(motion.time) / recording.rate,
+        "frames": len(motion.time),
+        "frames_converged": int(motion.converged.sum()),
+        "still_samples": int(gate.sum()),
+        "still_s": float(gate.sum() / recording.rate),
+        "residual_median_m": float(np.median(residual)) if residual.size else None,
+    }
+
+
+def points_report(learned: NullSpaceMap, *, rate: float) -> list[dict[str, Any]]:
+    """Every PCA point asked for; `point` is its number in the map, from 1."""
+    used = iter(range(len(learned.centers_)))
+    rows: list[dict[str, Any]] = []
+    for center, count in zip(learned.all_centers_, learned.all_counts_, strict=True):
+        row: dict[str, Any] = {
+            "point": None,
+            "center_m": center.tolist(),
+            "samples": int(count),
+            "still_s": float(count / rate),
+        }
+        if count >= learned.min_samples:
+            k = next(used)
+            n = int(learned.n_components_[k])
+            ratios = learned.explained_variance_ratio_[k]
+            row |= {
+                "point": k + 1,
+                "components": n,
+                "explained_variance": float(ratios[:n].sum()),
+                "range_rad": (learned.upper_[k] - learned.lower_[k]).tolist(),
+            }
+        rows.append(row)
+    return rows
+
+
+def extrinsic_report(
+    skeleton: Skeleton,
+    pairs: Sequence[tuple[Motion, NDArray[np.bool_]]],
+    chain: str,
+) -> dict[str, Any]:
+    """How far what is outside the chain moved while the hand was still.
+
+    The width that holds 90 % of the samples, for the exploration that moved it most.
+    """
+    spans = []
+    for motion, gate in pairs:
+        if gate.any():
+            poses = motion.q[gate]
+            moved = np.stack([skeleton.difference(poses[0], pose) for pose in poses])
+            low, high = np.percentile(moved, [5, 95], axis=0)
+            spans.append(high - low)
+    span = np.max(spans, axis=0)
+    own = chain_joints(chain)
+    angles = zip(skeleton.joint_names, np.degrees(span[6:]).tolist(), strict=True)
+    return {
+        "thorax_translation_m": float(np.linalg.norm(span[:3])),
+        "thorax_rotation_deg": float(np.degrees(np.linalg.norm(span[3:6]))),
+        "joints_deg": {joint: angle for joint, angle in angles if joint not in own},
+    }

@@ -1,0 +1,221 @@
+"""A calibrated person: body, markers and null-space map, in memory and on disk.
+
+A subject folder is plain text: ``skeleton.urdf``, ``markers.toml``, ``map.json`` and
+``calibration.json``, the last two with a format version.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ikns.errors import FileError, IknsError, InvalidInput
+from ikns.motion import Motion, chain_joints
+from ikns.nullspace_map import NullSpaceMap
+from ikns.skeleton import Skeleton
+
+__all__ = ["FILES", "FORMAT", "Subject", "check_target"]
+
+#: Version of the folder's layout and of the JSON files in it.
+FORMAT = 1
+#: What a subject folder holds, and nothing else.
+FILES = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What a calibration found out about a person.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The scaled body with its markers.
+    null_space_map : NullSpaceMap
+        Fitted, or from a file.
+    chain : str
+        Joints of the map, see :data:`ikns.motion.CHAINS`.
+    report : dict
+        How the calibration went: strings, finite numbers, None, lists and dicts.
+    motions : tuple of Motion
+        The explorations as tracked. They are not saved.
+    """
+
+    skeleton: Skeleton
+    null_space_map: NullSpaceMap
+    chain: str
+    report: dict[str, Any]
+    motions: tuple[Motion, ...] = field(default=(), repr=False)
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Write the subject folder; it appears whole or not at all.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Made when missing; its parent must exist.
+        force : bool
+            Whether to replace a subject folder that exists.
+
+        Raises
+        ------
+        InvalidInput
+            When the folder exists and may not be replaced.
+        FileError
+            When it cannot be written.
+        """
+        target = Path(folder)
+        check_target(target, force=force)
+        part = target.absolute().with_name(f".{target.name}.{os.getpid()}.part")
+        old = part.with_suffix(".old")
+        try:
+            part.mkdir()
+            self.skeleton.write(part / "skeleton.urdf")
+            self.skeleton.marker_set.write(part / "markers.toml")
+            _write_json(part / "map.json", self._map())
+            _write_json(part / "calibration.json", {"format": FORMAT} | self.report)
+            if target.exists():
+                target.rename(old)
+            try:
+                part.rename(target)
+            except OSError:
+                if old.exists():
+                    old.rename(target)
+                raise
+        except OSError as error:
+            raise FileError(f"{target}: cannot be written: {error.strerror}.") from None
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+            if target.exists():
+                shutil.rmtree(old, ignore_errors=True)
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Subject:
+        """Read a subject folder.
+
+        Raises
+        ------
+        FileError
+            When a file is missing, damaged or of an unknown version.
+        """
+        place = Path(folder)
+        if not place.is_dir():
+            raise FileError(
+                f"{place}: expected a folder that `ikns calibrate` wrote, found "
+                f"{'a file' if place.exists() else 'nothing there'}."
+            )
+        missing = [name for name in FILES if not (place / name).is_file()]
+        if missing:
+            raise FileError(
+                f"{place}: expected a subject folder with {', '.join(FILES)}, found no "
+                f"{', '.join(missing)}."
+            )
+        urdf = place / "skeleton.urdf"
+        try:
+            skeleton = Skeleton.load(urdf, marker_set=place / "markers.toml")
+        except IknsError as error:
+            where = "" if str(place) in str(error) else f"{urdf}: "
+            raise FileError(f"{where}{error}") from None
+        report = _read_json(place / "calibration.json")
+        del report["format"]
+        table = _read_json(place / "map.json")
+        try:
+            chain = table["chain"]
+            if tuple(table["joints"]) != chain_joints(chain):
+                raise InvalidInput(
+                    f"expected the joints {', '.join(chain_joints(chain))}, found "
+                    f"{', '.join(map(str, table['joints']))}."
+                )
+            points = table["points"]
+            learned = NullSpaceMap.from_arrays(
+                *(
+                    [point[key] for point in points]
+                    for key in ("center_m", "directions", "lower_rad", "upper_rad")
+                ),
+                counts=[int(point["samples"]) for point in points],
+                outside=table["outside"],
+            )
+            learned.radius_ = float(table["radius_m"])
+            if learned.directions_.shape[2] != len(table["joints"]):
+                raise InvalidInput("a direction needs one entry a joint.")
+        except (LookupError, TypeError, ValueError) as error:
+            fault = f"{error}" if isinstance(error, IknsError) else f"({error!r})."
+            raise FileError(
+                f"{place / 'map.json'}: cannot be read as a null-space map: {fault}"
+            ) from None
+        return cls(skeleton, learned, chain, report)
+
+    def _map(self) -> dict[str, Any]:
+        learned = self.null_space_map
+        return {
+            "format": FORMAT,
+            "chain": self.chain,
+            "joints": list(chain_joints(self.chain)),
+            "outside": learned.outside,
+            "radius_m": learned.radius_,
+            "points": [
+                {
+                    "center_m": center.tolist(),
+                    "directions": directions.tolist(),
+                    "lower_rad": lower.tolist(),
+                    "upper_rad": upper.tolist(),
+                    "samples": int(count),
+                }
+                for center, directions, lower, upper, count in zip(
+                    learned.centers_,
+                    learned.directions_,
+                    learned.lower_,
+                    learned.upper_,
+                    learned.counts_,
+                    strict=True,
+                )
+            ],
+        }
+
+
+def check_target(folder: Path, *, force: bool) -> None:
+    """Make sure, before any work, that a subject folder may be written.
+
+    Raises
+    ------
+    InvalidInput
+        When something is in the way that `force` does not cover: a file, or a folder
+        that holds anything but a subject. Nothing is ever deleted that was not ours.
+    """
+    if not folder.absolute().parent.is_dir():
+        raise InvalidInput(f"{folder}: expected an existing folder to write into.")
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InvalidInput(f"{folder}: expected the name of a folder, found a file.")
+    found = sorted(path.name for path in folder.iterdir())
+    foreign = [name for name in found if name not in FILES]
+    if foreign:
+        raise InvalidInput(
+            f"{folder}: expected a new or a subject folder, found one that holds "
+            f"{foreign[0]}; choose another name."
+        )
+    if found and not force:
+        raise InvalidInput(f"{folder}: exists already; use --force to overwrite it.")
+
+
+def _write_json(path: Path, table: dict[str, Any]) -> None:
+    text = json.dumps(table, indent=1, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise FileError(f"{path}: cannot be read as JSON: {error}.") from None
+    version = table.get("format") if isinstance(table, dict) else None
+    if version != FORMAT:
+        raise FileError(
+            f"{path}: expected format version {FORMAT}, found {version!r}; calibrate "
+            "again or use the version of ikns that wrote it."
+        )
+    return dict(table)
