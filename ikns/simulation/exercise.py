@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.simulation.arm import Arm
-from ikns.simulation.movement import Plan, explore, join, reach, reach_samples
+from ikns.simulation.movement import (
+    SWIVEL_HZ,
+    Plan,
+    explore,
+    join,
+    reach,
+    reach_samples,
+)
 from ikns.simulation.places import Place, random_place
 
 __all__ = ["roam", "visit"]
@@ -62,6 +69,10 @@ def visit(
 ) -> list[Plan]:
     """Explore one place after the other, with reaches between.
 
+    Two elbows are told to move each in its own rhythm: one takes the slow third of the
+    frequencies, the other the fast third. Moved in step they would show one degree of
+    freedom, not two.
+
     Parameters
     ----------
     places : sequence of sequence of Place
@@ -72,14 +83,23 @@ def visit(
         Source of randomness.
     """
     parts: list[list[Plan]] = []
+    low, high = SWIVEL_HZ
+    third = (high - low) / 3
+    bands = (
+        [(low, high)]
+        if len(places) == 1
+        else [(low, low + third), (high - third, high)]
+    )
     stops = list(zip(*places, strict=True))
     for i, stop in enumerate(stops):
         if i:
             parts.append(_reach_together(stops[i - 1], stop, rate))
         parts.append(
             [
-                explore(place, seconds=seconds, rate=rate, rng=rng, index=i)
-                for place in stop
+                explore(
+                    place, seconds=seconds, rate=rate, rng=rng, index=i, swivel_hz=band
+                )
+                for place, band in zip(stop, bands, strict=True)
             ]
         )
     return [join(plans) for plans in zip(*parts, strict=True)]

@@ -20,6 +20,7 @@ from ikns.simulation.places import Place
 from ikns.simulation.wander import minimum_jerk, tremor, wander
 
 __all__ = [
+    "SWIVEL_HZ",
     "Plan",
     "Unsteadiness",
     "carry_out",
@@ -118,12 +119,31 @@ def reach(start: Place, end: Place, *, n: int) -> Plan:
 
 
 def explore(
-    place: Place, *, seconds: float, rate: float, rng: np.random.Generator, index: int
+    place: Place,
+    *,
+    seconds: float,
+    rate: float,
+    rng: np.random.Generator,
+    index: int,
+    swivel_hz: tuple[float, float] = SWIVEL_HZ,
 ) -> Plan:
     """Hold the hand and swivel the elbow through the range that the place allows.
 
     The swivel runs between the ends of the range like a sine of varying frequency and
     amplitude (70 to 100 % of the range), from rest to rest in the comfortable posture.
+
+    Parameters
+    ----------
+    place : Place
+        With its self-motion; without one the arm just stays.
+    seconds, rate : float
+        How long, and samples per second.
+    rng : numpy.random.Generator
+        Source of randomness.
+    index : int
+        Which point this is.
+    swivel_hz : (float, float)
+        Between which frequencies to choose, Hz.
     """
     n = max(2, round(seconds * rate))
     time = np.arange(n) / rate
@@ -131,7 +151,7 @@ def explore(
         postures = np.repeat(place.posture[None], n, axis=0)
     else:
         low, high = place.motion.swivel[[0, -1]]
-        hertz = rng.uniform(*SWIVEL_HZ)
+        hertz = rng.uniform(*swivel_hz)
         slow = wander(rng, n, 1, sd=0.1, cutoff=0.3, rate=rate)[:, 0]
         pace = hertz * np.exp(slow)
         phase = 2 * np.pi * (np.cumsum(pace) / rate + rng.integers(2) / 2)
