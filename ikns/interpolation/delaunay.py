@@ -206,7 +206,7 @@ def delaunay(points: NDArray[np.float64]) -> tuple[list[Simplex], list[list[int]
     Returns
     -------
     simplices : list of T tuples of 4 int
-        Tetrahedra of positive volume: from the last vertex, the others turn clockwise.
+        Tetrahedra of positive volume: seen from the last, the others turn left.
     neighbors : list of T lists of 4 int
         The tetrahedron across the facet that leaves out each vertex; -1 on the hull.
 

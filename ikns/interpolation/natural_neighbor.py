@@ -17,6 +17,7 @@ from ikns.errors import InvalidInput
 from ikns.interpolation.border import checked_points, checked_values
 from ikns.interpolation.hull import nearest_on_hull
 from ikns.interpolation.sibson import depths, stolen_volumes
+from ikns.interpolation.twofold import difference
 from ikns.interpolation.voronoi import solid_angles, voronoi
 
 __all__ = ["NaturalNeighborInterpolator", "Outside"]
@@ -76,9 +77,11 @@ class NaturalNeighborInterpolator:
 
     Notes
     -----
-    Measured against exact rational arithmetic, weights are off by about 1e-15 inside,
-    also for layouts jittered by anything from 1e-15 to 1e-1 and right under the hull.
-    Within 1e-11 of the way from the hull to the middle, weights are those at 1e-11.
+    Measured against exact integer arithmetic, weights are off by about 1e-16, at most
+    4e-14, on boxes, grids and random sites, turned, thin as 1e-7 of their width, or
+    jittered by 1e-17 to 1e-1. Within 1e-11 of the way from the hull to the middle,
+    weights are those at 1e-11. Where rounding leaves a query outside the hull it is
+    moved in as well: on sets thinner than 1e-6 of their width, by more than 1e-10.
 
     Examples
     --------
@@ -232,10 +235,10 @@ class NaturalNeighborInterpolator:
         """Weights of queries in the hull that are not sites."""
         # Part of the way from the hull to the middle: linear along every such ray.
         part = (depth / self._center_depth).min(axis=1, initial=np.inf)
-        rest = np.zeros_like(x)  # moved by less than a float at x could express
+        x, rest = x.copy(), np.zeros_like(x)  # may move by less than floats can tell
         low = np.flatnonzero(part < _SKIN)
         step = (_SKIN - part[low]) / (1 - part[low])
-        rest[low] = step[:, None] * (self._center - x[low])
+        x[low], rest[low] = difference(x[low], step[:, None] * (x[low] - self._center))
         depth[low] = depths(self._voronoi, self._sites, x[low], rest[low])
         volume = stolen_volumes(self._voronoi, self._sites, x, rest, depth)
         weights = volume / volume.sum(axis=1, keepdims=True)

@@ -54,7 +54,7 @@ def depths(diagram: Voronoi, sites: Floats, x: Floats, x_rest: Floats) -> Floats
         diagram.normal[diagram.hull],
         diagram.normal_rest[diagram.hull],
     )
-    depth = np.einsum("hk,qhk->qh", normal, anchor - (x + x_rest)[:, None])
+    depth = np.einsum("hk,qhk->qh", normal, anchor - x[:, None])
     q, h = np.nonzero(np.abs(depth) < _CANCELED)
     p, p_rest = difference(anchor[h], x[q])
     depth[q, h] = twofold_dot(normal[h], normal_rest[h], p, p_rest - x_rest[q])
@@ -64,7 +64,7 @@ def depths(diagram: Voronoi, sites: Floats, x: Floats, x_rest: Floats) -> Floats
 def _powers(diagram: Voronoi, sites: Floats, x: Floats, x_rest: Floats) -> Floats:
     """Squared radius less squared distance to the query, (Q, T): positive = stolen."""
     anchor = sites[diagram.simplices[:, 0]]
-    p = (x + x_rest)[:, None] - anchor
+    p = x[:, None] - anchor
     power = np.einsum("qtk,qtk->qt", 2 * diagram.corner - p, p)
     scale = 1 + np.abs(diagram.corner).max(axis=1)
     q, t = np.nonzero(np.abs(power) < _CANCELED * scale)
@@ -113,9 +113,7 @@ def stolen_volumes(
     volume = np.zeros((len(sites), len(x)))
     i, j = d.edges.T
     for mine, other, sign in ((i, j, 1.0), (j, i, -1.0)):
-        along = np.einsum(
-            "ek,qek->qe", sign * d.axis, sites[other] - (x + x_rest)[:, None]
-        )
+        along = np.einsum("ek,qek->qe", sign * d.axis, sites[other] - x[:, None])
         np.add.at(volume, mine, (area * along).T)
     return volume.T / 12
 
