@@ -267,6 +267,16 @@ def test_the_gate_keeps_slow_and_known_samples():
     assert still(moved, max_hand_speed=0.1).sum() == 3
 
 
+def test_rests_that_are_too_short_are_left_out():
+    speed = np.ones(40)
+    speed[2:10] = speed[20:31] = 0.0  # 0.07 s and 0.10 s from first to last sample
+    moved = motion(speed)
+    assert np.flatnonzero(still(moved, min_duration=0.1)).tolist() == [*range(20, 31)]
+    assert still(moved, min_duration=0.07).sum() == 19
+    with pytest.raises(NotEnoughData, match="for 0.2 s .* the 19 slower ones"):
+        null_space_samples(moved, min_duration=0.2)
+
+
 def test_both_arms_are_still_when_the_faster_hand_is():
     moved = motion([0.01, 0.2])
     x, q = null_space_samples(moved, "both_arms")

@@ -31,6 +31,7 @@ def analytic_map(
     chain: str = "right_arm",
     task: Literal["pose", "position"] = "pose",
     max_hand_speed: float = 0.05,
+    min_duration: float = 0.0,
     radius: float | None = None,
     **parameters: Any,
 ) -> NullSpaceMap:
@@ -40,6 +41,10 @@ def analytic_map(
     postures (:func:`ikns.subspace.mean_null_direction`): those of the still samples
     that are nearest to this center. m and M are the ends of ``Z @ q`` over the same
     samples, and signs agree as in a learned map.
+
+    Where the null space has more dimensions than `n_dof` (seven joints that hold the
+    position alone have four), Z is what varies least between postures, whether or not
+    the arm moved that way; a :class:`MapWarning` then tells of neighbors that disagree.
 
     Parameters
     ----------
@@ -53,8 +58,8 @@ def analytic_map(
         See :data:`ikns.motion.CHAINS`.
     task : {"pose", "position"}
         What is held: hand position and orientation, or position alone.
-    max_hand_speed : float
-        See :func:`ikns.nullspace_map.still`, m/s.
+    max_hand_speed, min_duration : float
+        See :func:`ikns.nullspace_map.still`, m/s and s.
     radius : float, optional
         Samples farther from their center are left out, m; the ``radius_`` of a learned
         map to use its samples. Default as in :func:`ikns.clustering.nearest_center`.
@@ -76,8 +81,9 @@ def analytic_map(
     places = np.asarray(centers, dtype=np.float64)
     if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
         raise InvalidInput(f"expected finite centers (P, 3), found {places.shape}.")
-    x, q = null_space_samples(motion, chain, max_hand_speed=max_hand_speed)
-    visited = motion.q[still(motion, chain, max_hand_speed=max_hand_speed)]
+    gate = {"max_hand_speed": max_hand_speed, "min_duration": min_duration}
+    x, q = null_space_samples(motion, chain, **gate)
+    visited = motion.q[still(motion, chain, **gate)]
     made = NullSpaceMap(len(places), **parameters)
     settings = checked_settings(made, q.shape)
     labels, _ = nearest_center(x, places, radius=radius)

@@ -9,8 +9,7 @@ interpolated with the natural-neighbor weights w of the hand position, so that
 is the mean of the local control signals (Z_i q - m_i) / (M_i - m_i), weighted with w_i
 times their range. Z^ is not normalized again: that would break this identity.
 
-T. Lisini Baldi et al., Exploiting intrinsic kinematic null space for supernumerary
-robotic limbs control (arXiv 2012.03600), section II.
+T. Lisini Baldi et al. (arXiv 2012.03600), section II.
 """
 
 from __future__ import annotations
@@ -52,11 +51,9 @@ class NullSpaceMap(BaseEstimator):
     opposite ways. So signs are made to agree between neighboring points, strongest
     agreement first (:func:`ikns.nullspace_map.alignment.align`), and one sign for all
     comes from `reference`. For ``n_dof = d > 1`` the directions are the d leading
-    components of each point, turned within their span to agree with its neighbors';
-    with a reference all are turned together to agree best with it.
-
-    Where natural neighbors have no meaning (fewer than 4 points asked for, or `X` not
-    in space) the values of the nearest point hold everywhere.
+    components of each point, turned within their span to agree with its neighbors', and
+    all together to agree best with the reference. Where natural neighbors mean nothing
+    (fewer than 4 points asked for, `X` not in space) the nearest point's values hold.
 
     Parameters
     ----------
@@ -80,9 +77,8 @@ class NullSpaceMap(BaseEstimator):
     max_iter : int
         Most iterations of the clustering.
     reference : (n,) or (d, n) array, optional
-        What should rise with c, as a gradient over the joints: the sum of all Z gets a
-        positive product with it, row by row. Default: the entry of largest magnitude of
-        that sum gets positive.
+        What rises with c, as a gradient over the joints: the sum of all Z gets a positive
+        product with it, row by row. Default: that sum's largest entry gets positive.
     min_samples : int, optional
         Points with fewer samples are left out, with a warning. Default: a tenth of an
         equal share, N / (10 n_points); half a second of 5 s at each point.
@@ -102,17 +98,17 @@ class NullSpaceMap(BaseEstimator):
     cluster_means_ : (P, n) array
         Mean joint vectors, rad.
     n_components_ : (P,) integer array
-        Components that it takes to explain `variance`. More than `n_dof` means that the
-        recording holds freedom besides that wanted, which warns. None where no joint
-        moves: Z, m and M are zero there, so that the point has no say in c.
+        Components that explain `variance`. More than `n_dof`, which warns: there is
+        freedom besides that wanted. Zero where no joint moves: Z, m, M are zero too,
+        and the point has no say in c.
     explained_variance_ratio_ : (P, n) array
         Of all components, decreasing.
     all_centers_, all_counts_ : (n_points, 3), (n_points,) array
         Every PCA point asked for, also those left out.
     radius_ : float
         Radius used, m.
-    interpolator_ : NaturalNeighborInterpolator, or NearestPoint
-    n_features_in_ : int
+    interpolator_ : object
+        Weights, hull and neighbors; see :mod:`ikns.interpolation`.
 
     Examples
     --------
@@ -174,13 +170,11 @@ class NullSpaceMap(BaseEstimator):
 
         Raises
         ------
-        InvalidInput
-            When a parameter is out of its range.
+        InvalidInput, ValueError
+            When a parameter is out of range, or samples are not finite or do not match.
         NotEnoughData
             When there are fewer samples than points, too few points have samples, or
             the points lie in a plane.
-        ValueError
-            When samples are not finite or their numbers differ (from scikit-learn).
         """
         x, q = validate_data(self, X, y, multi_output=True, y_numeric=True)
         x, q = np.asarray(x, float), np.asarray(q, float).reshape(len(x), -1)
@@ -230,7 +224,7 @@ class NullSpaceMap(BaseEstimator):
         lower: ArrayLike,
         upper: ArrayLike,
         *,
-        counts: ArrayLike | None = None,
+        counts: ArrayLike = 0,
         **parameters: Any,
     ) -> Self:
         """Make a map from what it consists of: one from a file, or an analytic one.
@@ -243,24 +237,22 @@ class NullSpaceMap(BaseEstimator):
             Z.
         lower, upper : (P,) or (P, d) array
             m and M, rad; ``lower <= upper``.
-        counts : (P,) array, optional
-            Samples at each point; zero when nobody counted.
+        counts : int or (P,) array
+            Samples at each point.
         **parameters
             Of the constructor; `n_points` and `n_dof` are those of the arrays.
 
         Raises
         ------
-        InvalidInput
-            When shapes disagree, values are not finite, or a range is negative.
-        NotEnoughData
-            When 4 or more points in space lie in a plane.
+        InvalidInput, NotEnoughData
+            When shapes disagree, values are not finite, a range is negative, or 4 or
+            more points in space lie in a plane.
         """
         places, z, m, M = checked_map(centers, directions, lower, upper)
         made = cls(**{**parameters, "n_points": len(places), "n_dof": z.shape[1]})
         made.n_features_in_ = places.shape[1]
         made.centers_, made.directions_, made.lower_, made.upper_ = places, z, m, M
-        known = np.zeros(len(places)) if counts is None else counts
-        made.counts_ = np.asarray(known, dtype=np.int64)
+        made.counts_ = np.full(len(places), counts, dtype=np.int64)
         made.interpolator_ = between(places, made.outside)
         return made
 
