@@ -106,7 +106,7 @@ def compare(
             along = centered @ analytic.directions_[i].T
             inside[i] = float(np.sum(along**2)) / total
         if own.sum() > 2 and all(np.ptp(c) > 0 for c in signals):
-            agreement[i] = float(np.corrcoef(*signals)[0, 1])
+            agreement[i] = float(np.corrcoef(signals[0], signals[1])[0, 1])
     return Comparison(
         centers=learned.centers_,
         counts=np.bincount(labels[labels >= 0], minlength=n),

@@ -18,14 +18,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.signal import savgol_filter
+from scipy.spatial.transform import Rotation
 
+from ikns.derivative import slope
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.motion import SIDES, Motion
 from ikns.recording import Recording
+from ikns.rigid import rigid_transform
 from ikns.skeleton import Skeleton
 
-__all__ = ["MarkerIK", "Pose", "rigid_transform"]
+__all__ = ["MarkerIK", "Pose", "motion_from_poses"]
 
 Array = NDArray[np.float64]
 
@@ -39,9 +41,6 @@ STEP_TOLERANCE = 1e-5
 #: Root mean square residual above which a frame is also tried from scratch, m. Soft
 #: tissue and modeling leave 10 to 20 mm (stoop lifts, see benchmarks/real_people.py).
 LOST = 0.06
-#: Time constant of the derivative: voluntary motion of the arm is below about 5 Hz.
-DERIVATIVE_WINDOW_S = 0.2
-
 #: Arm poses to start from when nothing is known: hanging, forearm forward, reaching
 #: forward, reaching sideways, hand at the mouth, hand overhead; rad.
 _STARTS: tuple[dict[str, float], ...] = (
@@ -194,7 +193,7 @@ class MarkerIK:
             model = skeleton.markers_in_world(q)
             if finite.sum() >= 3:
                 rotation, shift = rigid_transform(model[finite], seen[finite])
-                q[:3], q[3:7] = shift, _quaternion(rotation)
+                q[:3], q[3:7] = shift, Rotation.from_matrix(rotation).as_quat()
             solved.append(self._descend(seen, q, prior=False))
         best = min(solved, key=lambda pose: pose.residual)
         joined = best.q.copy()
@@ -293,14 +292,8 @@ class MarkerIK:
         return beyond, (beyond != 0).astype(np.float64)
 
 
-def motion_from_poses(
-    skeleton: Skeleton, time: Array, poses: Sequence[Pose], held: Sequence[str] = ()
-) -> Motion:
-    """Add hands and velocities to solved frames.
-
-    Velocities are the slope of a parabola fitted over ``DERIVATIVE_WINDOW_S`` around
-    each frame (Savitzky and Golay 1964).
-    """
+def motion_from_poses(skeleton: Skeleton, time: Array, poses: Sequence[Pose]) -> Motion:
+    """Add hands, and velocities by :func:`ikns.derivative.slope`, to solved frames."""
     q = np.stack([pose.q for pose in poses])
     hands = [skeleton.hands_in_thorax(row) for row in q]
     hand_in_thorax = np.stack([position for position, _ in hands])
@@ -310,54 +303,13 @@ def motion_from_poses(
     return Motion(
         time=np.array(time),
         q=q,
-        v=_slope(np.cumsum(steps, axis=0), time),
+        v=slope(np.cumsum(steps, axis=0), time),
         joint_names=skeleton.joint_names,
         hand_in_thorax=hand_in_thorax,
         hand_rotation_in_thorax=np.stack([rotation for _, rotation in hands]),
-        hand_velocity_in_thorax=_slope(hand_in_thorax, time),
+        hand_velocity_in_thorax=slope(hand_in_thorax, time),
         residual=np.array([pose.residual for pose in poses]),
         iterations=np.array([pose.iterations for pose in poses]),
         converged=np.array([pose.converged for pose in poses]),
         held=skeleton.marker_set.held,
-    )
-
-
-def rigid_transform(source: Array, target: Array) -> tuple[Array, Array]:
-    """Rotation and shift that carry points onto points best (Kabsch 1976).
-
-    Parameters
-    ----------
-    source, target : (N, 3) array
-        Matching points, N >= 3.
-
-    Returns
-    -------
-    rotation : (3, 3) array
-    shift : (3,) array
-        ``target ~ source @ rotation.T + shift``.
-    """
-    a, b = source.mean(axis=0), target.mean(axis=0)
-    u, _, vt = np.linalg.svd((target - b).T @ (source - a))
-    flip = np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(vt)])
-    rotation = u @ flip @ vt
-    return rotation, b - rotation @ a
-
-
-def _quaternion(rotation: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(rotation).as_quat())
-
-
-def _slope(values: Array, time: Array) -> Array:
-    """Time derivative of (T, ...) values by a moving parabola."""
-    if len(time) < 2:
-        return np.zeros_like(values)
-    step = float(time[-1] - time[0]) / (len(time) - 1)
-    window = 2 * int(round(DERIVATIVE_WINDOW_S / step / 2)) + 1
-    window = min(window, len(time) - 1 + len(time) % 2)
-    if window < 5:
-        return np.asarray(np.gradient(values, step, axis=0))
-    return np.asarray(
-        savgol_filter(values, window, polyorder=2, deriv=1, delta=step, axis=0)
     )

@@ -25,10 +25,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ikns.body import SEGMENTS
 from ikns.errors import MarkerMismatch, NotEnoughData
-from ikns.marker_ik import MarkerIK, rigid_transform
+from ikns.marker_ik import MarkerIK
 from ikns.marker_set import MarkerSet
 from ikns.motion import SIDES, chain_joints
 from ikns.recording import Recording
+from ikns.rigid import rigid_transform
 from ikns.skeleton import Skeleton
 
 __all__ = ["ScalingReport", "scale"]
@@ -151,7 +152,7 @@ def scale(
     nominal = sized.marker_positions
     skeleton = sized.with_markers(worn.at(positions).without_static())
     at_fit = sized.with_markers(worn.at(positions)).markers_in_world(q)
-    seen = np.isfinite(target).all(axis=1)
+    seen = _seen(target)
     sd = np.sqrt(np.diag(covariance))
     lengths = skeleton.segment_lengths
     labels = np.array(worn.labels)
@@ -181,7 +182,7 @@ def scale(
 def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
     """Mean marker positions with the sway of the whole body taken out, (M, 3) m."""
     markers = worn.pick(static.labels, static.markers)
-    seen = np.isfinite(markers).all(axis=2)
+    seen = _seen(markers)
     if not seen.any():
         raise MarkerMismatch(
             f"{static.source}: expected markers of {worn.name} "
@@ -191,11 +192,11 @@ def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
     reference = markers[int(np.argmax(seen.sum(axis=1)))]
     aligned = np.full_like(markers, np.nan)
     for i, frame in enumerate(markers):
-        common = seen[i] & np.isfinite(reference).all(axis=1)
+        common = seen[i] & _seen(reference)
         if common.sum() >= 3:
             rotation, shift = rigid_transform(frame[common], reference[common])
             aligned[i] = frame @ rotation.T + shift
-    known = np.isfinite(aligned).all(axis=2)
+    known = _seen(aligned)
     count = known.sum(axis=0)
     mean = np.full((len(worn.markers), 3), np.nan)
     some = count > 0
@@ -208,7 +209,7 @@ def _absent_joints(
     static: Recording, worn: MarkerSet, target: Array
 ) -> tuple[str, ...]:
     """Joints of an arm without any marker; a single bare segment is an error."""
-    seen = np.isfinite(target).all(axis=1)
+    seen = _seen(target)
     links = {m.link for m in worn.markers}
     shown = {m.link for m, s in zip(worn.markers, seen, strict=True) if s}
     absent: tuple[str, ...] = ()
@@ -234,7 +235,7 @@ def _fit(generic: Skeleton, target: Array) -> tuple[Array, Array, Array, Array, 
     log factors (S, S), and whether the fit converged.
     """
     worn = generic.marker_set
-    seen = np.isfinite(target).all(axis=1)
+    seen = _seen(target)
     weight = np.linalg.cholesky(np.linalg.inv(_size_covariance())).T
     placement = np.array([m.placement_sd for m in worn.markers])
     fixed = generic.columns(worn.held)
@@ -329,6 +330,11 @@ def _assemble(
         if dof >= 6:
             J[start + dof - 6, places.stop + column] = 1 / POSE_SD
     return J
+
+
+def _seen(markers: Array) -> NDArray[np.bool_]:
+    """Which markers (..., 3) were seen, (...)."""
+    return np.asarray(np.isfinite(markers).all(axis=-1))
 
 
 def _size_covariance() -> Array:

@@ -9,8 +9,8 @@ import pytest
 # from those before it, so imports never run in a circle.
 ROWS = (
     "errors _kernels",
-    "anthropometry body recording motion marker_set files subspace clustering "
-    "interpolation",
+    "anthropometry body recording motion marker_set files rigid derivative subspace "
+    "clustering interpolation output_folder",
     "skeleton isb finger stream session",
     "marker_ik scaling nullspace_map symbolic",
     "subject calibration control compare ucm",

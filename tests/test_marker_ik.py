@@ -7,9 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.files import read
-from ikns.marker_ik import LIMIT, PRIOR, MarkerIK, rigid_transform
+from ikns.marker_ik import LIMIT, PRIOR, MarkerIK
 from ikns.marker_set import MarkerSet
 from ikns.recording import Recording
+from ikns.rigid import rigid_transform
 from ikns.scaling import scale
 from ikns.skeleton import Skeleton
 

@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 from ikns import simulation
 from ikns.errors import FileError, InvalidInput
 from ikns.files import read
-from ikns.marker_ik import rigid_transform
 from ikns.motion import SIDES
+from ikns.rigid import rigid_transform
 from ikns.simulation import (
     Protocol,
     Unsteadiness,
