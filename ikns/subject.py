@@ -7,8 +7,6 @@ A subject folder is plain text: ``skeleton.urdf``, ``markers.toml``, ``map.json`
 from __future__ import annotations
 
 import json
-import os
-import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,9 +14,10 @@ from typing import Any
 from ikns.errors import FileError, IknsError, InvalidInput
 from ikns.motion import Motion, chain_joints
 from ikns.nullspace_map import NullSpaceMap
+from ikns.output_folder import check_output_folder, output_folder
 from ikns.skeleton import Skeleton
 
-__all__ = ["FILES", "FORMAT", "Subject", "check_target"]
+__all__ = ["FILES", "FORMAT", "Subject"]
 
 #: Version of the folder's layout and of the JSON files in it.
 FORMAT = 1
@@ -67,30 +66,12 @@ class Subject:
         FileError
             When it cannot be written.
         """
-        target = Path(folder)
-        check_target(target, force=force)
-        part = target.absolute().with_name(f".{target.name}.{os.getpid()}.part")
-        old = part.with_suffix(".old")
-        try:
-            part.mkdir()
+        check_output_folder(folder, FILES, force=force)
+        with output_folder(folder) as part:
             self.skeleton.write(part / "skeleton.urdf")
             self.skeleton.marker_set.write(part / "markers.toml")
             _write_json(part / "map.json", self._map())
             _write_json(part / "calibration.json", {"format": FORMAT} | self.report)
-            if target.exists():
-                target.rename(old)
-            try:
-                part.rename(target)
-            except OSError:
-                if old.exists():
-                    old.rename(target)
-                raise
-        except OSError as error:
-            raise FileError(f"{target}: cannot be written: {error.strerror}.") from None
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
-            if target.exists():
-                shutil.rmtree(old, ignore_errors=True)
 
     @classmethod
     def load(cls, folder: str | Path) -> Subject:
@@ -174,32 +155,6 @@ class Subject:
                 )
             ],
         }
-
-
-def check_target(folder: Path, *, force: bool) -> None:
-    """Make sure, before any work, that a subject folder may be written.
-
-    Raises
-    ------
-    InvalidInput
-        When something is in the way that `force` does not cover: a file, or a folder
-        that holds anything but a subject. Nothing is ever deleted that was not ours.
-    """
-    if not folder.absolute().parent.is_dir():
-        raise InvalidInput(f"{folder}: expected an existing folder to write into.")
-    if not folder.exists():
-        return
-    if not folder.is_dir():
-        raise InvalidInput(f"{folder}: expected the name of a folder, found a file.")
-    found = sorted(path.name for path in folder.iterdir())
-    foreign = [name for name in found if name not in FILES]
-    if foreign:
-        raise InvalidInput(
-            f"{folder}: expected a new or a subject folder, found one that holds "
-            f"{foreign[0]}; choose another name."
-        )
-    if found and not force:
-        raise InvalidInput(f"{folder}: exists already; use --force to overwrite it.")
 
 
 def _write_json(path: Path, table: dict[str, Any]) -> None:

@@ -1,0 +1,98 @@
+"""The commands, and how a fault becomes one sentence and exit code 2."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+import ikns
+from ikns.cli.calibrate import calibrate
+from ikns.cli.compare import compare
+from ikns.cli.control import control
+from ikns.cli.demo import demo
+from ikns.cli.ik import ik
+from ikns.cli.scale import scale
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="ikns",
+    help="Learn a person's kinematic null space and turn it into a control signal.",
+    no_args_is_help=True,
+    add_completion=False,
+)
+for command in (demo, scale, calibrate, ik, control, compare):
+    app.command()(command)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"ikns {ikns.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, help="Print the version.")
+    ] = False,
+) -> None: ...
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments after the program's name; those of the process by default.
+
+    Returns
+    -------
+    int
+        0 on success, 2 on bad input, 130 when interrupted.
+    """
+    try:
+        # Not standalone, so that typer raises what it would print over several lines.
+        code = typer.main.get_command(app).main(
+            args=_repeat("--exploration", sys.argv[1:] if argv is None else argv),
+            prog_name="ikns",
+            standalone_mode=False,
+        )
+    except typer.TyperException as error:  # such as an unknown option
+        fault = error.format_message()
+        if not fault:  # no arguments at all: the help is already on the screen
+            return 2
+        fault = f"{fault.rstrip('.')}; see ikns --help."
+    except ikns.IknsError as error:
+        fault = str(error)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        fault = f"{error.filename}: {(error.strerror or 'cannot be used').lower()}."
+    except typer.Abort:
+        return 130
+    else:
+        return code or 0
+    sys.stderr.write(f"ikns: {' '.join(fault.split())}\n")
+    return 2
+
+
+def _repeat(option: str, argv: Sequence[str]) -> list[str]:
+    """Let an option take several values, which typer only knows as repeated options.
+
+    >>> _repeat("--of", ["--of", "a", "b", "--to", "c"])
+    ['--of', 'a', '--of', 'b', '--to', 'c']
+    """
+    repeated: list[str] = []
+    values = False
+    for argument in argv:
+        if argument.startswith("-"):
+            values = argument == option
+        elif values and repeated[-1] != option:
+            repeated.append(option)
+        repeated.append(argument)
+    return repeated

@@ -1,0 +1,27 @@
+"""Options that several commands share, so they read and mean the same everywhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["AsJson", "Force", "MarkerSetName", "RecordingFile", "SubjectFolder"]
+
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object instead of a table.")
+]
+Force = Annotated[
+    bool, typer.Option("--force", help="Overwrite what an earlier run wrote.")
+]
+SubjectFolder = Annotated[
+    Path, typer.Option("--subject", help="Folder that `ikns calibrate` wrote.")
+]
+RecordingFile = Annotated[
+    Path, typer.Argument(help="Recording to read: .c3d, .trc or Vicon .csv.")
+]
+MarkerSetName = Annotated[
+    str,
+    typer.Option(help="oxford24, plug_in_gait, ue_adl, or the path of a .toml file."),
+]

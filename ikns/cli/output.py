@@ -1,0 +1,173 @@
+"""What a command leaves behind: a table or JSON on stdout, files that appear whole."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import statistics
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from ikns.errors import InvalidInput
+
+__all__ = [
+    "finite_median",
+    "json_text",
+    "notes",
+    "progress",
+    "refuse_overwriting",
+    "show",
+    "table",
+    "write_csv",
+    "write_text",
+]
+
+
+def json_text(value: Any) -> str:
+    """Return strict JSON; numbers that are not finite become null."""
+    return json.dumps(_plain(value), indent=2, allow_nan=False) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):  # NumPy's arrays and numbers
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
+
+
+def show(result: Mapping[str, Any], *parts: Any, as_json: bool) -> None:
+    """Print a command's result.
+
+    Parameters
+    ----------
+    result : mapping
+        Everything, for ``--json``.
+    *parts : str or rich table
+        The short version for people.
+    as_json : bool
+        Which of the two.
+    """
+    if as_json:
+        sys.stdout.write(json_text(result))
+        return
+    from rich.console import Console
+
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    for part in parts:
+        console.print(part)
+
+
+def table(title: str, columns: Mapping[str, str], rows: Iterable[Sequence[Any]]) -> Any:
+    """Return a rich table.
+
+    Parameters
+    ----------
+    title : str
+    columns : mapping
+        Format of the cells by header, such as ``.1f``; a column with ``s`` holds text
+        and is set left. A header may have several lines.
+    rows : iterable of sequence
+        What is missing (None, NaN) becomes a dash.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    made = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for header, form in columns.items():
+        made.add_column(header, justify="left" if form == "s" else "right")
+    for row in rows:
+        cells = zip(row, columns.values(), strict=True)
+        made.add_row(*("-" if _missing(x) else format(x, form) for x, form in cells))
+    return made
+
+
+def _missing(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value))
+
+
+def notes(sentences: Iterable[str]) -> list[str]:
+    """Mark sentences that a person should read."""
+    return [f"Note: {sentence}" for sentence in sentences]
+
+
+def finite_median(values: Any) -> float:
+    """Median of the values that are finite; NaN without any."""
+    finite = [value for value in values.tolist() if math.isfinite(value)]
+    return float(statistics.median(finite)) if finite else math.nan
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str, int, int], None]]:
+    """Bars on stderr while it is a terminal; call with (step, done, total)."""
+    if not sys.stderr.isatty():
+        yield lambda step, done, total: None
+        return
+    from rich import progress as bars
+    from rich.console import Console
+
+    columns = (
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.TaskProgressColumn(),
+        bars.TimeRemainingColumn(),
+    )
+    with bars.Progress(
+        *columns, console=Console(stderr=True), transient=True
+    ) as display:
+        tasks: dict[str, bars.TaskID] = {}
+
+        def report(step: str, done: int, total: int) -> None:
+            if step not in tasks:
+                tasks[step] = display.add_task(step)
+            display.update(tasks[step], completed=done, total=total)
+
+        yield report
+
+
+def refuse_overwriting(path: Path, *, force: bool) -> None:
+    """Make sure, before any work, that a file may be written.
+
+    Raises
+    ------
+    InvalidInput
+        When it exists and `force` is not set, or its folder does not exist.
+    """
+    if path.is_dir():
+        raise InvalidInput(f"{path}: expected the name of a file, found a folder.")
+    if path.exists() and not force:
+        raise InvalidInput(f"{path}: exists already; use --force to overwrite it.")
+    if not path.absolute().parent.is_dir():
+        raise InvalidInput(f"{path}: expected an existing folder to write into.")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file that appears whole or not at all."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_text(text, encoding="utf-8", newline="")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_csv(
+    path: Path, columns: Sequence[str], rows: Iterable[Sequence[float]]
+) -> None:
+    """Write a table of numbers; an empty cell where there is none."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for row in rows:
+        writer.writerow(["" if v != v else f"{v:.9g}" for v in row])
+    write_text(path, text.getvalue())

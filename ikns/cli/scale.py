@@ -1,0 +1,45 @@
+"""``ikns scale``: a body from stature, mass and sex alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import ikns
+from ikns.cli.options import AsJson, Force
+from ikns.cli.output import refuse_overwriting, show, table, write_text
+
+__all__ = ["scale"]
+
+
+def scale(
+    stature: Annotated[float, typer.Option(help="Standing height, m.")],
+    mass: Annotated[float, typer.Option(help="Body mass, kg.")],
+    sex: Annotated[str, typer.Option(help="'female' or 'male'.")],
+    out: Annotated[Path, typer.Option(help="URDF file to write.")],
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write a URDF scaled from anthropometric tables."""
+    refuse_overwriting(out, force=force)
+    skeleton = ikns.Skeleton.from_anthropometry(stature=stature, mass=mass, sex=sex)
+    write_text(out, skeleton.urdf)
+    lengths = skeleton.segment_lengths
+    show(
+        {
+            "urdf": out,
+            "stature_m": stature,
+            "mass_kg": mass,
+            "sex": sex,
+            "segment_lengths_m": lengths,
+        },
+        table(
+            f"{stature:g} m, {mass:g} kg, {sex}",
+            {"segment": "s", "length mm": ".1f"},
+            [[name, 1000 * length] for name, length in lengths.items()],
+        ),
+        f"Wrote {out}",
+        as_json=as_json,
+    )

@@ -1,0 +1,91 @@
+"""Folders of results: they appear whole or not at all and delete nothing foreign."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from ikns.errors import FileError, InvalidInput
+
+__all__ = ["check_output_folder", "output_folder"]
+
+
+def check_output_folder(
+    folder: str | Path, files: Sequence[str], *, force: bool
+) -> None:
+    """Make sure, before any work, that a folder may be written.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where results shall go.
+    files : sequence of str
+        Every file that such a folder may hold, relative to it.
+    force : bool
+        Whether to replace a folder of that kind.
+
+    Raises
+    ------
+    InvalidInput
+        When something is in the way that `force` does not cover: a file, or a folder
+        that holds anything else. So no run deletes what no run wrote.
+    """
+    target = Path(folder)
+    if not target.absolute().parent.is_dir():
+        raise InvalidInput(f"{target}: expected an existing folder to write into.")
+    if not target.exists():
+        return
+    if not target.is_dir():
+        raise InvalidInput(f"{target}: expected the name of a folder, found a file.")
+    found = [path for path in sorted(target.rglob("*")) if not path.is_dir()]
+    for path in found:
+        if path.relative_to(target).as_posix() not in files:
+            raise InvalidInput(
+                f"{target}: expected a new folder, found one that holds "
+                f"{path.relative_to(target)}; choose another name."
+            )
+    if found and not force:
+        raise InvalidInput(f"{target}: exists already; use --force to overwrite it.")
+
+
+@contextmanager
+def output_folder(folder: str | Path) -> Iterator[Path]:
+    """Give a hidden folder to write into; on leaving without error it takes its place.
+
+    A folder that was there before stays as it was until then, and for good when an
+    error comes first.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where the results shall be seen; cleared by :func:`check_output_folder`.
+
+    Raises
+    ------
+    FileError
+        When the folder cannot be written.
+    """
+    target = Path(folder).absolute()
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    old = part.with_suffix(".old")
+    try:
+        part.mkdir()
+        yield part
+        if target.exists():
+            target.rename(old)
+        try:
+            part.rename(target)
+        except OSError:
+            if old.exists():
+                old.rename(target)
+            raise
+        shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise FileError(
+            f"{folder}: cannot be written: {error.strerror or error}."
+        ) from None
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
