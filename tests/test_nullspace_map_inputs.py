@@ -121,7 +121,7 @@ def test_points_with_too_few_samples_are_left_out_and_named():
 def test_a_point_where_no_joint_moves_has_no_say():
     x, q = samples()
     q[:40] = [0.3, 0.2, 0.1]
-    with pytest.warns(MapWarning, match=r"no joint moves at point \d \("):
+    with pytest.warns(MapWarning, match=r"no joint moves at \("):
         learned = NullSpaceMap(n_points=8).fit(x, q)
     (silent,) = np.flatnonzero(learned.n_components_ == 0)
     assert not learned.directions_[silent].any()
@@ -160,10 +160,10 @@ def test_almost_orthogonal_neighbors_are_named():
     directions = np.tile([1.0, 0.0, 0.0], (8, 1))
     directions[7] = [0.1, 0.995, 0.0]
     x, q = samples(directions=directions)
-    with pytest.warns(MapWarning, match=r"uncertain: point \d .* and point \d") as said:
+    with pytest.warns(MapWarning, match=r"uncertain: \(.*\) and \(.*\) \(cos") as said:
         NullSpaceMap(n_points=8, reference=[1.0, 0, 0]).fit(x, q)
     assert len(said) == 1
-    assert str(said[0].message).count(" and point") == 1  # the one edge of the tree
+    assert str(said[0].message).count(") and (") == 1  # the one edge of the tree
 
 
 def test_neighbors_opposed_in_spite_of_the_tree_are_named():

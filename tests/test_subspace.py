@@ -12,6 +12,7 @@ from ikns.subspace import (
     null_projector,
     null_space,
     principal_angles,
+    principal_components,
 )
 
 EPS = np.finfo(float).eps
@@ -189,3 +190,25 @@ def test_postures_that_are_not_finite_are_left_out_of_the_average():
 def test_average_refuses_wrong_shapes_and_counts(shape, d):
     with pytest.raises(InvalidInput, match="expected"):
         mean_null_direction(np.zeros(shape), d)
+
+
+@given(seeds)
+def test_principal_components_are_those_of_a_planted_covariance(seed):
+    rng = np.random.default_rng(seed)
+    frame = ortho_group.rvs(4, random_state=rng)
+    # Pairs of opposite vectors: exactly these variances about a mean of zero.
+    rows = np.vstack([frame, -frame]) * np.tile([2.0, 1.5, 1.0, 0.5], 2)[:, None]
+    mean = rng.normal(size=4)
+    components, ratio = principal_components(rows + mean)
+    assert np.allclose(ratio, np.array([4, 2.25, 1, 0.25]) / 7.5, rtol=0, atol=1e-14)
+    # Variances differ by at least a tenth of the whole.
+    assert np.abs(np.abs(components @ frame.T) - np.eye(4)).max() < 1e-13
+    about_zero, _ = principal_components(rows + 100 * mean, centered=False)
+    along = mean / np.linalg.norm(mean)
+    assert abs(about_zero[0] @ along) > 0.99
+
+
+def test_vectors_that_are_all_the_same_explain_nothing():
+    components, ratio = principal_components(np.full((30, 3), 0.1))
+    assert np.array_equal(ratio, np.zeros(3))
+    assert np.array_equal(components, np.eye(3))

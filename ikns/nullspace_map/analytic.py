@@ -90,7 +90,9 @@ def analytic_map(
     rows = [np.flatnonzero(labels == k) for k in range(len(places))]
     for k, r in enumerate(rows):
         if not r.size:
-            raise NotEnoughData(f"expected still samples at {at(places, k)}, found 0.")
+            raise NotEnoughData(
+                f"expected still samples at the point {at(places, k)} m, found none."
+            )
     spans = []
     for r in rows:
         jacobians = [skeleton.chain_jacobian(s, chain, task=task) for s in visited[r]]

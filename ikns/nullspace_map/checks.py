@@ -227,7 +227,7 @@ def warn_of_components(
     none = [at(centers, k) for k in np.flatnonzero(n_components == 0).tolist()]
     if none:
         warnings.warn(
-            f"no joint moves at {'; '.join(none)}, so these have no say in c.",
+            f"no joint moves at {'; '.join(none)}, so these points have no say in c.",
             MapWarning,
             stacklevel=3,
         )
@@ -238,12 +238,12 @@ def warn_of_components(
     if more:
         warnings.warn(
             f"the recording holds more freedom than the {n_dof} wanted (the hand "
-            f"turned, the shoulder girdle moved, or noise): {'; '.join(more)}.",
+            f"turned, the shoulder girdle moved, or noise): at {'; '.join(more)}.",
             MapWarning,
             stacklevel=3,
         )
 
 
 def at(centers: Floats, k: int) -> str:
-    """Name a point by number and place, for messages."""
-    return f"point {k} ({', '.join(f'{x:.3f}' for x in centers[k])})"
+    """Name a point by its place, for messages: numbers change when points drop out."""
+    return f"({', '.join(f'{x:.3f}' for x in centers[k])})"

@@ -1,8 +1,8 @@
 """The method: from samples with a still hand to the control signal.
 
-Around each PCA point (a place where the user held the hand and moved the arm) the joint
-vectors q vary along a direction Z, between m and M. Between the points Z, m and M are
-interpolated with the natural-neighbor weights w of the hand position, so that
+Around each PCA point (where the user held the hand and moved the arm) joint vectors q
+vary along a direction Z, between m and M. Between the points Z, m and M are weighted
+with the natural-neighbor weights w of the hand position, so that
 
     c = (Z^ q - m^) / (M^ - m^) = sum_i w_i (Z_i q - m_i) / sum_i w_i (M_i - m_i)
 
@@ -35,7 +35,6 @@ from ikns.nullspace_map.checks import (
 from ikns.subspace import principal_components
 
 __all__ = ["NullSpaceMap"]
-
 Floats = NDArray[np.float64]
 
 
@@ -73,12 +72,12 @@ class NullSpaceMap(BaseEstimator):
         Outside the points' hull: the nearest point's values (the paper's rule; c jumps
         there), those at the nearest place of the hull (continuous), or NaN.
     quantiles : (float, float)
-        What counts as the ends m and M of the motion; (0, 1) are minimum and maximum.
+        What counts as the ends m and M; (0, 1) are minimum and maximum.
     max_iter : int
         Most iterations of the clustering.
     reference : (n,) or (d, n) array, optional
-        What rises with c, as a gradient over the joints: the sum of all Z gets a positive
-        product with it, row by row. Default: that sum's largest entry gets positive.
+        What rises with c, as a gradient over the joints: its product with the sum of
+        all Z is made positive, row by row. Default: that sum's largest entry is.
     min_samples : int, optional
         Points with fewer samples are left out, with a warning. Default: a tenth of an
         equal share, N / (10 n_points); half a second of 5 s at each point.
@@ -173,8 +172,7 @@ class NullSpaceMap(BaseEstimator):
         InvalidInput, ValueError
             When a parameter is out of range, or samples are not finite or do not match.
         NotEnoughData
-            When there are fewer samples than points, too few points have samples, or
-            the points lie in a plane.
+            With fewer samples than points, too few usable points, or points in a plane.
         """
         x, q = validate_data(self, X, y, multi_output=True, y_numeric=True)
         x, q = np.asarray(x, float), np.asarray(q, float).reshape(len(x), -1)
@@ -213,7 +211,7 @@ class NullSpaceMap(BaseEstimator):
             self.labels_[r] = k
         self.cluster_means_ = np.array([q[r].mean(axis=0) for r in rows])
         self.n_components_, self.explained_variance_ratio_ = n_components, ratios
-        self.radius_, self.interpolator_ = found.radius_, interpolator
+        self.interpolator_, self.radius_ = interpolator, found.radius_
         return self
 
     @classmethod
