@@ -111,9 +111,8 @@ class NaturalNeighborInterpolator:
             )
         self.outside: Outside = outside
         size = float(np.ptp(self.points, axis=0).max())
-        self._scale = 2.0 ** min(
-            1000, -round(math.log2(size))
-        )  # exact, unlike 1 / size
+        # A power of two scales exactly.
+        self._scale = 2.0 ** min(1000, -round(math.log2(size)))
         self._sites = self.points * self._scale
         self._voronoi = voronoi(self._sites)
         self._center = self._sites.mean(axis=0)
