@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -18,10 +16,9 @@ from ikns.calibration.report import (
     points_report,
     static_report,
 )
-from ikns.calibration.sight import check_segments, in_sight
+from ikns.calibration.sight import track_chain
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.marker_ik import MarkerIK
-from ikns.motion import Motion, chain_joints
+from ikns.motion import chain_joints
 from ikns.nullspace_map import MapWarning, NullSpaceMap, still
 from ikns.recording import Recording
 from ikns.scaling import scale
@@ -99,10 +96,9 @@ def calibrate(
     skeleton, scaling = scale(
         body, static, marker_set=marker_set, min_duration=min_static
     )
-    for recording in explorations:
-        check_segments(skeleton, recording, chain)
     motions = tuple(
-        _track(skeleton, recording, chain, progress) for recording in explorations
+        track_chain(skeleton, recording, chain, progress=progress)
+        for recording in explorations
     )
     gates = [still(motion, chain, max_hand_speed=max_hand_speed) for motion in motions]
     if not any(gate.any() for gate in gates):
@@ -152,22 +148,3 @@ def calibrate(
         "warnings": [str(warning.message) for warning in caught],
     }
     return Subject(skeleton, learned, chain, report, motions)
-
-
-def _track(
-    skeleton: Skeleton,
-    recording: Recording,
-    chain: str,
-    progress: Callable[[str, int, int], None] | None,
-) -> Motion:
-    """Track a recording; where a segment is out of sight the hand's speed is unknown.
-
-    There the joints stay as they were, which would pass for a hand held still.
-    """
-    step = Path(recording.source).name
-    motion = MarkerIK(skeleton).track(
-        recording, progress=None if progress is None else partial(progress, step)
-    )
-    known = np.all(list(in_sight(skeleton, recording, chain).values()), axis=0)
-    velocity = np.where(known[:, None, None], motion.hand_velocity_in_thorax, np.nan)
-    return replace(motion, hand_velocity_in_thorax=velocity)

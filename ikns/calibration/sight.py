@@ -1,53 +1,104 @@
-"""Which frames show the segments that a chain is made of."""
+"""Which frames show the segments that a chain is made of, and tracking that knows it.
+
+Marker inverse kinematics leaves a joint that no marker shows where it was. That would
+pass for a hand held still, so there the hand counts as unknown.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import MarkerMismatch
-from ikns.motion import chain_sides
+from ikns.marker_ik import MarkerIK
+from ikns.motion import Motion, chain_sides
 from ikns.recording import Recording
 from ikns.skeleton import Skeleton
 
-__all__ = ["check_segments", "in_sight"]
+__all__ = ["in_sight", "track_chain"]
+
+#: Markers that fix the thorax, to which all else is relative. A limb needs fewer: its
+#: joints tie it to the thorax.
+_FIX = 3
+
+
+def track_chain(
+    skeleton: Skeleton,
+    recording: Recording,
+    chain: str,
+    *,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Motion:
+    """Track a recording; the hands are NaN while the chain is not in sight.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    recording : Recording
+    chain : str
+        See :data:`ikns.motion.CHAINS`.
+    progress : callable, optional
+        Called with (name of the recording, frames done, frames in all).
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    MarkerMismatch
+        When a segment of the chain, or the thorax, is never in sight.
+    """
+    shown = in_sight(skeleton, recording, chain)
+    step = Path(recording.source).name
+    motion = MarkerIK(skeleton).track(
+        recording, progress=None if progress is None else partial(progress, step)
+    )
+    known = np.all(list(shown.values()), axis=0)[:, None, None]
+    return replace(
+        motion,
+        hand_in_thorax=np.where(known, motion.hand_in_thorax, np.nan),
+        hand_velocity_in_thorax=np.where(known, motion.hand_velocity_in_thorax, np.nan),
+    )
 
 
 def in_sight(
     skeleton: Skeleton, recording: Recording, chain: str
 ) -> dict[str, NDArray[np.bool_]]:
-    """Say in which frames each segment of a chain, and the thorax, shows a marker.
+    """Say in which frames each segment of a chain, and the thorax, is in sight.
+
+    A limb is with one marker, the thorax with three, or all of a set that has fewer.
 
     Returns
     -------
     dict of (T,) boolean array
-        By link; only links that carry markers.
-    """
-    worn = skeleton.marker_set
-    markers = worn.pick(recording.labels, recording.markers)
-    seen = np.all(np.isfinite(markers), axis=2)
-    rows: dict[str, list[int]] = {}
-    for column, marker in enumerate(worn.markers):
-        if marker.link.startswith(("thorax", *chain_sides(chain))):
-            rows.setdefault(marker.link, []).append(column)
-    return {link: np.any(seen[:, own], axis=1) for link, own in rows.items()}
-
-
-def check_segments(skeleton: Skeleton, recording: Recording, chain: str) -> None:
-    """Refuse a recording in which a segment of the chain is never seen.
+        By link, of those that carry markers.
 
     Raises
     ------
     MarkerMismatch
-        With the segment and the markers that would show it.
+        When a segment never is; with the markers that would show it.
     """
     worn = skeleton.marker_set
-    if (worn.columns(recording.labels) < 0).all():
-        return  # marker inverse kinematics says so better
-    for link, frames in in_sight(skeleton, recording, chain).items():
-        if not frames.any():
-            wanted = [marker.label for marker in worn.markers if marker.link == link]
+    markers = worn.pick(recording.labels, recording.markers)
+    seen = np.all(np.isfinite(markers), axis=2)
+    columns: dict[str, list[int]] = {}
+    for column, marker in enumerate(worn.markers):
+        if marker.link.startswith(("thorax", *chain_sides(chain))):
+            columns.setdefault(marker.link, []).append(column)
+    shown = {}
+    for link, own in columns.items():
+        need = min(_FIX, len(own)) if link == "thorax" else 1
+        shown[link] = np.count_nonzero(seen[:, own], axis=1) >= need
+        if not shown[link].any():
             raise MarkerMismatch(
-                f"{recording.source}: the segment {link} has no marker; expected at "
-                f"least one of {', '.join(wanted)} of {worn.name}."
+                f"{recording.source}: the segment {link} is never in sight; expected "
+                f"at least {need} of {', '.join(worn.labels[i] for i in own)} of "
+                f"{worn.name} in a frame."
             )
+    return shown

@@ -26,11 +26,13 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Compare learned and analytic directions at every PCA point."""
+    from ikns.calibration import track_chain
+
     calibrated = ikns.Subject.load(subject)
     frames = ikns.read(recording)
     with progress() as report:
-        motion = ikns.MarkerIK(calibrated.skeleton).track(
-            frames, progress=lambda done, total: report("joint angles", done, total)
+        motion = track_chain(
+            calibrated.skeleton, frames, calibrated.chain, progress=report
         )
     rows = comparison_rows(calibrated, motion, source=str(recording), task=task)
     show(

@@ -30,12 +30,14 @@ def control(
     as_json: AsJson = False,
 ) -> None:
     """Write what the live loop would have sent: c from 0 to 1, frame by frame."""
+    from ikns.calibration import track_chain
+
     refuse_overwriting(out, force=force)
     calibrated = ikns.Subject.load(subject)
     frames = ikns.read(recording)
     with progress() as report:
-        motion = ikns.MarkerIK(calibrated.skeleton).track(
-            frames, progress=lambda done, total: report("joint angles", done, total)
+        motion = track_chain(
+            calibrated.skeleton, frames, calibrated.chain, progress=report
         )
     result = write_control(out, calibrated, motion)
     show(
@@ -66,15 +68,13 @@ def write_control(
     """Write ``control.csv`` and return what it holds in short.
 
     The columns are time_s; c, clipped to 0 to 1 (c_1, c_2, ... for several degrees of
-    freedom), empty in frames without markers; hand_speed_m_s in the thorax frame;
+    freedom), empty while the chain is not in sight; hand_speed_m_s in the thorax frame;
     inside (1 within the volume of the PCA points); residual_m of the markers.
     """
     learned, chain = subject.null_space_map, subject.chain
     place = motion.place(chain)
     raw = learned.control_signal(motion.chain_angles(chain), place)
-    raw = np.where(
-        np.isfinite(motion.residual)[:, None], raw.reshape(len(place), -1), np.nan
-    )
+    raw = raw.reshape(len(place), -1)
     c = np.clip(raw, 0.0, 1.0)
     inside = learned.inside(place)
     names = ["c"] if c.shape[1] == 1 else [f"c_{k + 1}" for k in range(c.shape[1])]
@@ -90,7 +90,7 @@ def write_control(
     return {
         "frames": len(c),
         "frames_without_signal": int((~known).sum()),
-        "inside_share": float(inside.mean()),
+        "inside_share": float((inside & known).sum() / max(known.sum(), 1)),
         "c_median": finite_median(c[:, 0]),
         "clipped_share": float(beyond.sum() / max(known.sum(), 1)),
         "residual_median_m": finite_median(motion.residual),

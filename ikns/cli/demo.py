@@ -42,6 +42,7 @@ def demo(
     result comes. Its motion follows the Jacobian's null space, which the method never
     sees.
     """
+    from ikns.calibration import track_chain
     from ikns.cli.demo_report import still_samples, write_demo_report
     from ikns.subject import FILES
 
@@ -65,9 +66,7 @@ def demo(
         subject = ikns.calibrate(static, [points], progress=report)
         subject.save(folder / "subject")
         motion = subject.motions[0]
-        reaching = ikns.MarkerIK(subject.skeleton).track(
-            free, progress=lambda done, total: report("free.c3d", done, total)
-        )
+        reaching = track_chain(subject.skeleton, free, subject.chain, progress=report)
         control = write_control(folder / "control.csv", subject, reaching)
         rows = comparison_rows(subject, motion, source="points.c3d")
 
