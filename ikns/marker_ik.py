@@ -31,9 +31,13 @@ __all__ = ["MarkerIK", "Pose", "motion_from_poses"]
 
 Array = NDArray[np.float64]
 
-#: Pull towards the pose before, m/rad and m/m. Markers sit 0.05 to 0.3 m from a joint's
-#: axis, so an observed angle lags by at most (0.005 / 0.05)^2 = 1 % of a frame.
-PRIOR = 5e-3
+#: Pull towards the pose before, m/rad and m/m: the ratio of marker noise (1 mm) to
+#: what a joint typically turns within a frame (5 rad/s at 100 Hz is 0.05 rad). A joint
+#: with markers 50 mm from its axis lags by (0.02 / 0.05)^2 = 16 % of a frame, one with
+#: 200 mm by 1 %; what markers barely show no longer jitters.
+PRIOR = 2e-2
+#: The same from scratch, where the start is a guess: it only settles unseen joints.
+PRIOR_FROM_SCRATCH = 5e-4
 #: Stiffness of the joint limits, m/rad: 10 deg beyond a limit costs as much as 9 mm.
 LIMIT = 0.05
 #: A frame has converged when no joint moves more than this in a step, rad and m.
@@ -217,8 +221,7 @@ class MarkerIK:
         skeleton, free = self.skeleton, self._free
         rows = np.isfinite(seen).all(axis=1)
         target, weight = seen[rows], self._weight[rows, None]
-        # From scratch the pull only keeps unseen joints from drifting.
-        pull = PRIOR if prior else 0.1 * PRIOR
+        pull = PRIOR if prior else PRIOR_FROM_SCRATCH
         q, damping = before, 1e-8
         positions, jacobian = skeleton.marker_jacobian(q)
         cost = self._cost(weight * (positions[rows] - target), before, q, pull)

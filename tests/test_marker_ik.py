@@ -64,7 +64,7 @@ def test_from_scratch_finds_the_pose_that_made_the_markers(skeleton, seed):
     q = everyday(skeleton, rng.uniform(-1, 1, 18), rng.normal(0, 2, 6))
     pose = MarkerIK(skeleton).solve(skeleton.markers_in_world(q))
     assert pose.converged
-    # Without noise only the pull towards the start is left: 0.1 PRIOR = 5e-4 m/rad over
+    # Without noise only the pull towards the start is left: 5e-4 m/rad over
     # 1 rad against a marker lever of at least 20 mm, (5e-4 / 0.02)^2 = 6e-4 rad.
     assert np.abs(skeleton.difference(q, pose.q)).max() < 2e-3
     assert pose.residual < 1e-4
@@ -151,9 +151,10 @@ def test_angles_are_as_good_as_noise_allows(skeleton):
     predicted = 1e-3 * np.sqrt(np.mean(spread, axis=0))
     measured = np.sqrt(np.mean((motion.q[:, 7:] - q[:, 7:]) ** 2, axis=0))
     # Linear theory's standard deviation; 150 frames estimate it to 6 %, three times
-    # that and the slight help of the pull leave 0.7 to 1.25.
-    assert (measured < 1.25 * predicted).all()
-    assert (measured > 0.7 * predicted).all()
+    # that above. Below, the pull averages what a joint's markers barely show over
+    # frames: at best by half where a lever of 20 mm meets 20 mm/rad.
+    assert (measured < 1.2 * predicted).all()
+    assert (measured > 0.5 * predicted).all()
 
 
 def test_with_every_marker_gone_the_pose_stays_and_says_so(skeleton):
