@@ -67,8 +67,9 @@ def virtual_subject(
         Default: either.
     palpation_sd : float
         Placement error on bony landmarks, m per axis. 2 mm is an assumption: a trained
-        examiner on landmarks right under the skin; published spreads of palpation run
-        from 1 mm at the wrist to 20 mm at the trochanter.
+        examiner on landmarks right under the skin. Where tissue is thick, spreads of 15
+        to 20 mm are published (trochanter; review by Della Croce et al. 2005, Gait &
+        Posture 21:226).
     technical_sd : float
         Placement error of technical markers, m per axis (assumption).
 
