@@ -51,6 +51,9 @@ def calibrate(
     min_static: Annotated[
         float, typer.Option(help="Shortest static trial to accept, s.")
     ] = 1.0,
+    min_still: Annotated[
+        float, typer.Option(help="Least time of still samples at a point, s.")
+    ] = 0.5,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -87,6 +90,7 @@ def calibrate(
             radius=radius,
             outside=outside,
             min_static=min_static,
+            min_still=min_still,
             progress=report,
         )
     subject.save(out, force=force)
@@ -156,7 +160,7 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
 
 def _verdict(row: dict[str, Any], least: int, n_dof: int) -> str:
     if row["point"] is None:
-        return f"too few still samples (at least {least}), left out"
+        return f"left out: fewer than {least}"
     if row["components"] > n_dof:
-        return f"used; {row['components']} components, so more than self-motion"
+        return f"used, but took {row['components']} components"
     return "used"

@@ -1,0 +1,47 @@
+"""One virtual subject for tests of everything above a map: short trials at 50 Hz."""
+
+from functools import cache
+from pathlib import Path
+
+from ikns.calibration import calibrate
+from ikns.files import write_c3d
+from ikns.recording import Recording
+from ikns.simulation import Protocol, simulate_protocol, virtual_subject
+from ikns.subject import Subject
+
+
+@cache
+def protocol() -> Protocol:
+    """Ten points for 1.5 s each, 1 mm of marker noise, 3 % occluded."""
+    return simulate_protocol(
+        virtual_subject(1),
+        seed=1,
+        static_seconds=1.2,
+        free_seconds=1.0,
+        point_seconds=1.5,
+        rate=50,
+    )
+
+
+@cache
+def subject() -> Subject:
+    """The person as calibrated from the recordings."""
+    return calibrate(protocol().static.recording, [protocol().points.recording])
+
+
+def write(folder: Path, name: str, recording: Recording) -> Path:
+    """Write a recording into a folder as C3D."""
+    path = folder / f"{name}.c3d"
+    write_c3d(path, recording)
+    return path
+
+
+def cut(recording: Recording, start: int, stop: int) -> Recording:
+    """Frames from `start` to before `stop`."""
+    rows = slice(start, stop)
+    return Recording(
+        recording.time[rows] - recording.time[start],
+        recording.markers[rows],
+        recording.labels,
+        recording.source,
+    )

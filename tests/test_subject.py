@@ -1,0 +1,173 @@
+"""A subject folder holds the whole subject as plain text, or says what is wrong."""
+
+import dataclasses
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small_person
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ikns.errors import FileError, IknsError, InvalidInput
+from ikns.subject import FILES, Subject
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("subjects") / "person"
+    small_person.subject().save(made)
+    return made
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_a_loaded_subject_gives_the_same_control_signal(folder: Path) -> None:
+    made, loaded = small_person.subject(), Subject.load(folder)
+    motion = made.motions[0]
+    x, q = motion.place(made.chain), motion.chain_angles(made.chain)
+    # JSON prints floats so that they read back as the same bits.
+    np.testing.assert_array_equal(
+        loaded.null_space_map.control_signal(q, x),
+        made.null_space_map.control_signal(q, x),
+    )
+    np.testing.assert_array_equal(
+        loaded.null_space_map.inside(x), made.null_space_map.inside(x)
+    )
+    assert loaded.null_space_map.radius_ == made.null_space_map.radius_
+
+
+def test_a_loaded_subject_wears_the_same_markers_on_the_same_body(folder: Path) -> None:
+    made, loaded = small_person.subject(), Subject.load(folder)
+    q = made.motions[0].q[0]
+    # Millimeters in the file: two roundings of 1e-16 of a meter's place.
+    np.testing.assert_allclose(
+        loaded.skeleton.markers_in_world(q),
+        made.skeleton.markers_in_world(q),
+        rtol=0,
+        atol=1e-14,
+    )
+    assert loaded.skeleton.marker_set.held == made.skeleton.marker_set.held
+    assert loaded.chain == made.chain
+    assert loaded.report == json.loads(json.dumps(made.report))
+
+
+def test_saving_what_was_loaded_changes_nothing(folder: Path, tmp_path: Path) -> None:
+    Subject.load(folder).save(tmp_path / "again")
+    first, again = contents(folder), contents(tmp_path / "again")
+    for name in ("skeleton.urdf", "map.json", "calibration.json"):
+        assert again[name] == first[name]
+    assert sorted(again) == sorted(FILES)
+
+
+def test_all_files_are_text(folder: Path) -> None:
+    for path in folder.iterdir():
+        assert path.read_text(encoding="utf-8").replace("\n", "").isprintable()
+
+
+def test_a_folder_is_only_replaced_by_force(tmp_path: Path) -> None:
+    made = small_person.subject()
+    made.save(tmp_path / "person")
+    before = contents(tmp_path)
+    with pytest.raises(InvalidInput, match="--force"):
+        made.save(tmp_path / "person")
+    assert contents(tmp_path) == before
+    dataclasses.replace(made, report={"new": True}).save(
+        tmp_path / "person", force=True
+    )
+    assert Subject.load(tmp_path / "person").report == {"new": True}
+    assert [path.name for path in tmp_path.iterdir()] == ["person"]
+
+
+def test_force_never_deletes_what_is_not_a_subject(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(InvalidInput, match="thesis"):
+        small_person.subject().save(tmp_path, force=True)
+    assert contents(tmp_path) == {"thesis.tex": b"years of work"}
+
+
+def test_a_failed_save_leaves_the_earlier_folder(tmp_path: Path) -> None:
+    made = small_person.subject()
+    made.save(tmp_path / "person")
+    before = contents(tmp_path)
+    broken = dataclasses.replace(made, report={"not JSON": float("nan")})
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        broken.save(tmp_path / "person", force=True)
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_missing_file_is_named(folder: Path, tmp_path: Path, name: str) -> None:
+    shutil.copytree(folder, tmp_path / "person")
+    (tmp_path / "person" / name).unlink()
+    with pytest.raises(FileError, match=name):
+        Subject.load(tmp_path / "person")
+
+
+@pytest.mark.parametrize("name", ["map.json", "calibration.json"])
+@pytest.mark.parametrize("version", [0, 2, "1", None])
+def test_an_unknown_version_is_refused(
+    folder: Path, tmp_path: Path, name: str, version: object
+) -> None:
+    shutil.copytree(folder, tmp_path / "person")
+    path = tmp_path / "person" / name
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"format": version}))
+    with pytest.raises(FileError, match=f"{name}: expected format version 1"):
+        Subject.load(tmp_path / "person")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"chain": "third_arm"},
+        {"chain": "left_arm"},
+        {"chain": None},
+        {"joints": ["elbow"]},
+        {"joints": None},
+        {"points": []},
+        {"points": [{}]},
+        {"points": 3},
+        {"outside": "sideways"},
+        {"radius_m": "wide"},
+        {"radius_m": None},
+    ],
+)
+def test_a_map_that_makes_no_sense_is_refused(
+    folder: Path, tmp_path: Path, change: dict[str, object]
+) -> None:
+    shutil.copytree(folder, tmp_path / "person")
+    path = tmp_path / "person" / "map.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(FileError, match="map.json"):
+        Subject.load(tmp_path / "person")
+
+
+@pytest.mark.parametrize("name", FILES)
+@settings(
+    max_examples=15,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(where=st.floats(0, 1), rubbish=st.binary(max_size=8))
+def test_damage_is_told_in_one_sentence_or_is_harmless(
+    folder: Path, tmp_path: Path, name: str, where: float, rubbish: bytes
+) -> None:
+    shutil.rmtree(tmp_path / "person", ignore_errors=True)
+    shutil.copytree(folder, tmp_path / "person")
+    whole = (folder / name).read_bytes()
+    start = int(where * (len(whole) - 1))
+    (tmp_path / "person" / name).write_bytes(whole[:start] + rubbish)
+    fault = None
+    try:
+        Subject.load(tmp_path / "person")
+    except IknsError as error:
+        fault = str(error)
+    assert fault is None or str(tmp_path) in fault
