@@ -6,77 +6,28 @@ known to about 4 * 1.1e-16 / 1e-3 = 4e-13 and a weight, a ratio of sums of their
 products with at most as much cancellation again, to 1e-12. (Measured: 5e-15.)
 """
 
-import functools
-import itertools
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial import ConvexHull, Delaunay
+from interpolation_layouts import (
+    BOX,
+    CUBE,
+    JITTERS,
+    LAYOUTS,
+    built,
+    deep,
+    hull_queries,
+    inside_queries,
+    jittered,
+    turned,
+)
 from voronoi_oracle import sibson_weights
 
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.interpolation import NaturalNeighborInterpolator
-from ikns.interpolation.delaunay import delaunay
-from ikns.interpolation.hull import nearest_on_hull
 
 WEIGHT = 1e-12
-CUBE = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
-#: The paper's layout: the vertices of a box, the middles of its lower and upper face.
-BOX = np.vstack([CUBE * [0.5, 0.4, 0.3], [[0.25, 0.2, 0.0], [0.25, 0.2, 0.3]]])
-
-
-def turned(points, seed=5):
-    rotation, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    return points @ rotation
-
-
-LAYOUTS = {
-    "cube": CUBE,
-    "box": BOX,
-    "box turned": turned(BOX),
-    "box far away": turned(BOX) + [30.0, -20.0, 50.0],
-    "grid 3": np.array(list(np.ndindex(3, 3, 3))) / 2.0,
-    "grid 3 turned": turned(np.array(list(np.ndindex(3, 3, 3))) / 2.0),
-    "random": np.random.default_rng(1).random((10, 3)),
-    "nearly flat": np.random.default_rng(2).random((10, 3)) * [1, 1, 1e-5],
-    "sphere": turned(np.vstack([np.eye(3), -np.eye(3), CUBE * 2 - 1])) / 2,
-}
-JITTERS = (0.0, 1e-15, 1e-12, 1e-9, 1e-5, 0.03)
-
-
-def jittered(name, jitter, seed=0):
-    """A layout with every site moved by Gaussian noise, m."""
-    points = LAYOUTS[name]
-    noise = np.random.default_rng(seed).normal(scale=jitter or 1, size=points.shape)
-    scale = np.ptp(points, axis=0).clip(None, 1) if name == "nearly flat" else 1
-    return points + noise * scale * (jitter > 0)
-
-
-@functools.lru_cache
-def built(name, jitter, outside="nearest"):
-    return NaturalNeighborInterpolator(jittered(name, jitter), outside=outside)
-
-
-def deep(net, queries):
-    """Queries that are at least 2e-11 of the way from the hull to the middle."""
-    return queries[net.inside(queries + 2e-11 * (queries - net.points.mean(axis=0)))]
-
-
-def inside_queries(points, n, rng):
-    """Places all over the hull, many of them near its rim."""
-    return rng.dirichlet(np.full(len(points), 0.3), n) @ points
-
-
-def hull_queries(net, depth, n, rng):
-    """Places on the hull, every other almost on an edge, moved toward the middle."""
-    facets = net.points[net.hull_facets[rng.integers(len(net.hull_facets), size=n)]]
-    share = rng.dirichlet(np.ones(3), n)
-    share[::2, 0] *= 1e-9
-    share /= share.sum(axis=1, keepdims=True)
-    on = np.einsum("qk,qkd->qd", share, facets)
-    return on + depth * (net.points.mean(axis=0) - on)
 
 
 def exact(points, queries):
@@ -267,23 +218,6 @@ def test_projected_values_are_continuous_at_the_hull_and_nearest_ones_jump(
     assert (nearest.weights(outer).max(axis=1) == 1).all()
 
 
-def test_far_outside_the_projection_is_the_nearest_point_of_the_hull():
-    rng = np.random.default_rng(8)
-    for points in LAYOUTS.values():
-        net = NaturalNeighborInterpolator(points, outside="project")
-        center, size = points.mean(axis=0), np.ptp(points, axis=0).max()
-        direction = rng.normal(size=(100, 3))
-        x = center + direction * size * rng.uniform(0.5, 30, (100, 1))
-        x = x[~net.inside(x)]
-        y = nearest_on_hull(points, net.hull_facets, x)
-        # All sites lie behind the plane through y at a right angle to x - y.
-        normal = (x - y) / np.linalg.norm(x - y, axis=1, keepdims=True)
-        beyond = np.einsum("qk,qnk->qn", normal, points - y[:, None])
-        rounding = 1e-15 * (np.abs(points).max() + 30 * size)
-        assert beyond.max() < 10 * rounding
-        np.testing.assert_allclose(net.weights(x) @ points, y, atol=1e-10 * size)
-
-
 def test_outside_is_what_was_asked_for():
     x = [[0.2, 0.1, -3.0], [0.5, 0.5, 0.5], [1e300, 2.0, 1e300], [0.25, 0.5, 9.0]]
     height = 2 * CUBE[:, 2] + CUBE[:, 0]
@@ -318,86 +252,6 @@ def test_leading_shapes_of_queries_and_trailing_shapes_of_values_are_kept():
     assert net(x[0, 0]).shape == (2, 5)
     assert net.weights(np.empty((0, 3))).shape == (0, 8)
     np.testing.assert_allclose(net(x)[1, 2], net(x[1, 2]), atol=WEIGHT * values.max())
-
-
-def connected(edges, n):
-    reached = {0}
-    for _ in range(n):
-        reached |= {j for i, j in edges if i in reached}
-        reached |= {i for i, j in edges if j in reached}
-    return len(reached) == n
-
-
-def pairs(net):
-    return {(int(i), int(j)) for i, j in net.edges}
-
-
-@pytest.mark.parametrize("jitter", [0, 1e-15, 1e-12])
-def test_edges_of_a_cube_have_no_diagonals_whatever_the_rounding(jitter):
-    grid = {
-        (i, j)
-        for i, j in itertools.combinations(range(27), 2)
-        if np.isclose(np.abs(LAYOUTS["grid 3"][i] - LAYOUTS["grid 3"][j]).sum(), 0.5)
-    }
-    assert len(grid) == 54
-    for name in ("grid 3", "grid 3 turned"):
-        net = built(name, jitter)
-        assert pairs(net) == grid
-
-
-@pytest.mark.parametrize("jitter", JITTERS)
-@pytest.mark.parametrize("name", LAYOUTS)
-def test_edges_connect_all_sites(name, jitter):
-    net = built(name, jitter)
-    assert connected(pairs(net), len(net.points))
-
-
-def test_edges_of_sites_in_general_position_are_delaunays():
-    points = np.random.default_rng(9).random((40, 3))
-    known = {
-        tuple(sorted((int(i), int(j))))
-        for simplex in Delaunay(points).simplices
-        for i, j in itertools.combinations(simplex, 2)
-    }
-    assert pairs(NaturalNeighborInterpolator(points)) == known
-
-
-@pytest.mark.parametrize("jitter", JITTERS)
-@pytest.mark.parametrize("name", LAYOUTS)
-def test_tetrahedra_fill_the_hull_and_their_spheres_hold_no_site(name, jitter):
-    net = built(name, jitter)
-    points = net.points
-    centered = points - points.mean(axis=0)
-    edges = centered[net.simplices[:, 1:]] - centered[net.simplices[:, :1]]
-    volume = np.linalg.det(edges) / 6
-    hull = ConvexHull(centered, qhull_options="QJ1e-12").volume
-    # Determinants of 3 rows are rounded by 1e-15 of the rows' product, at most 5.
-    np.testing.assert_allclose(volume.sum(), hull, atol=1e-14 * len(points))
-    assert volume.min() > -1e-14
-    facets = centered[net.hull_facets]
-    outward = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
-    above = np.einsum("hk,hnk->hn", outward, centered - facets[:, :1])
-    assert above.max() < 1e-14
-    np.testing.assert_allclose(np.linalg.det(facets).sum() / 6, hull, atol=1e-13)
-    # In-sphere determinants, relative to the tetrahedron: negative = inside.
-    w = centered - centered[net.simplices[:, :1]]
-    square = (edges**2).sum(axis=2)
-    u, v, t = edges.transpose(1, 0, 2)
-    gradient = (
-        square[:, :1] * np.cross(v, t)
-        + square[:, 1:2] * np.cross(t, u)
-        + square[:, 2:] * np.cross(u, v)
-    )
-    lifted = (w**2).sum(axis=2) * 6 * volume[:, None]
-    assert (lifted - np.einsum("tk,tnk->tn", gradient, w)).min() > -1e-13
-
-
-def test_neighbors_of_a_tetrahedron_share_three_of_its_sites():
-    simplices, neighbors = delaunay(LAYOUTS["grid 3"])
-    for simplex, row in zip(simplices, neighbors, strict=True):
-        for vertex, other in zip(simplex, row, strict=True):
-            if other >= 0:
-                assert set(simplex) - {vertex} < set(simplices[other])
 
 
 @pytest.mark.parametrize(

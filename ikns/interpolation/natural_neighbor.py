@@ -15,10 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 from ikns.interpolation.border import checked_points, checked_values
+from ikns.interpolation.faces import solid_angles
 from ikns.interpolation.hull import nearest_on_hull
 from ikns.interpolation.sibson import depths, stolen_volumes
 from ikns.interpolation.twofold import difference
-from ikns.interpolation.voronoi import solid_angles, voronoi
+from ikns.interpolation.voronoi import voronoi
 
 __all__ = ["NaturalNeighborInterpolator", "Outside"]
 
