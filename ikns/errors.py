@@ -1,5 +1,8 @@
 """The errors a user can meet: one sentence with what, where and what would be right."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class IknsError(Exception):
     """Root of every error that this package raises on purpose."""
@@ -19,3 +22,20 @@ class NotEnoughData(IknsError, ValueError):
 
 class InvalidInput(IknsError, ValueError):
     """An argument is outside what the function accepts."""
+
+
+@contextmanager
+def naming(source: str) -> Iterator[None]:
+    """Put the name of a file before the sentence of an error that lacks it.
+
+    >>> with naming("walk.c3d"):
+    ...     raise NotEnoughData("no frame is still.")
+    Traceback (most recent call last):
+    ikns.errors.NotEnoughData: walk.c3d: no frame is still.
+    """
+    try:
+        yield
+    except IknsError as error:
+        if source in str(error):
+            raise
+        raise type(error)(f"{source}: {error}") from None

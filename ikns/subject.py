@@ -7,11 +7,13 @@ A subject folder is plain text: ``skeleton.urdf``, ``markers.toml``, ``map.json`
 from __future__ import annotations
 
 import json
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, IknsError, InvalidInput
+from ikns.errors import FileError, IknsError, InvalidInput, naming
+from ikns.marker_set import MarkerSet
 from ikns.motion import Motion, chain_joints
 from ikns.nullspace_map import NullSpaceMap
 from ikns.output_folder import check_output_folder, output_folder
@@ -81,6 +83,8 @@ class Subject:
         ------
         FileError
             When a file is missing, damaged or of an unknown version.
+        MarkerMismatch
+            When a marker sits on a link that the URDF does not have.
         """
         place = Path(folder)
         if not place.is_dir():
@@ -95,11 +99,9 @@ class Subject:
                 f"{', '.join(missing)}."
             )
         urdf = place / "skeleton.urdf"
-        try:
-            skeleton = Skeleton.load(urdf, marker_set=place / "markers.toml")
-        except IknsError as error:
-            where = "" if str(place) in str(error) else f"{urdf}: "
-            raise FileError(f"{where}{error}") from None
+        worn = MarkerSet.load(place / "markers.toml")
+        with naming(str(urdf)):
+            skeleton = Skeleton(_read_xml(urdf), worn)
         report = _read_json(place / "calibration.json")
         del report["format"]
         table = _read_json(place / "map.json")
@@ -160,6 +162,16 @@ class Subject:
 def _write_json(path: Path, table: dict[str, Any]) -> None:
     text = json.dumps(table, indent=1, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
+
+
+def _read_xml(path: Path) -> str:
+    # Pinocchio's parser would print what it stumbles over to stderr.
+    try:
+        text = path.read_text(encoding="utf-8")
+        ET.fromstring(text)
+    except (OSError, ValueError, ET.ParseError) as error:
+        raise FileError(f"{path}: cannot be read as XML: {error}.") from None
+    return text
 
 
 def _read_json(path: Path) -> dict[str, Any]:

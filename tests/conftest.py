@@ -1,9 +1,10 @@
-"""Where the real recordings are, and a reason to skip where they are not."""
+"""Recordings for the tests, real and simulated; in CI nothing may be skipped."""
 
 import os
 from pathlib import Path
 
 import pytest
+import small_person
 
 _BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 DATA = Path(os.environ.get("IKNS_TEST_DATA", _BESIDE))
@@ -15,3 +16,21 @@ def data() -> Path:
     if not DATA.is_dir():
         pytest.skip(f"real recordings are not at {DATA}; set IKNS_TEST_DATA")
     return DATA
+
+
+@pytest.fixture(scope="session")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """``static.c3d``, ``points.c3d``, ``free.c3d`` and the folder ``person``."""
+    folder = tmp_path_factory.mktemp("files")
+    run = small_person.protocol()
+    for trial in run.trials:
+        small_person.write(folder, trial.name, trial.recording)
+    small_person.subject().save(folder / "person")
+    return folder
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail where ``CI`` is set and a test was skipped."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if os.environ.get("CI") and reporter and reporter.stats.get("skipped"):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -10,7 +10,7 @@ import small_person
 from ikns.calibration import calibrate, elbow_reference, in_sight, track_chain
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
 from ikns.files import read
-from ikns.motion import chain_joints
+from ikns.motion import chain_joints, chain_sides
 from ikns.nullspace_map import still
 from ikns.recording import Recording
 from ikns.skeleton import Skeleton

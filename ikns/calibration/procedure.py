@@ -17,7 +17,7 @@ from ikns.calibration.report import (
     static_report,
 )
 from ikns.calibration.sight import track_chain
-from ikns.errors import InvalidInput, NotEnoughData
+from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion import chain_joints
 from ikns.nullspace_map import MapWarning, NullSpaceMap, still
 from ikns.recording import Recording
@@ -93,9 +93,10 @@ def calibrate(
         raise InvalidInput("expected at least one exploration recording, found none.")
     names = ", ".join(recording.source for recording in explorations)
     body = Skeleton.load() if generic is None else generic
-    skeleton, scaling = scale(
-        body, static, marker_set=marker_set, min_duration=min_static
-    )
+    with naming(static.source):
+        skeleton, scaling = scale(
+            body, static, marker_set=marker_set, min_duration=min_static
+        )
     motions = tuple(
         track_chain(skeleton, recording, chain, progress=progress)
         for recording in explorations
@@ -124,10 +125,8 @@ def calibrate(
     )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
-        try:
+        with naming(names):
             learned.fit(x, q)
-        except NotEnoughData as error:
-            raise NotEnoughData(f"{names}: {error}") from None
     report = {
         "chain": chain,
         "marker_set": skeleton.marker_set.name,

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.errors import MarkerMismatch
+from ikns.errors import MarkerMismatch, naming
 from ikns.marker_ik import MarkerIK
 from ikns.motion import Motion, chain_sides
 from ikns.recording import Recording
@@ -54,7 +54,8 @@ def track_chain(
     MarkerMismatch
         When a segment of the chain, or the thorax, is never in sight.
     """
-    shown = in_sight(skeleton, recording, chain)
+    with naming(recording.source):
+        shown = in_sight(skeleton, recording, chain)
     step = Path(recording.source).name
     motion = MarkerIK(skeleton).track(
         recording, progress=None if progress is None else partial(progress, step)

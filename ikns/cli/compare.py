@@ -9,7 +9,8 @@ import typer
 
 import ikns
 from ikns.cli.options import AsJson, RecordingFile, SubjectFolder
-from ikns.cli.output import progress, show, table
+from ikns.cli.output import notes, progress, show, table
+from ikns.errors import NotEnoughData, naming
 
 __all__ = ["compare", "comparison_rows", "comparison_table"]
 
@@ -34,15 +35,17 @@ def compare(
         motion = track_chain(
             calibrated.skeleton, frames, calibrated.chain, progress=report
         )
-    rows = comparison_rows(calibrated, motion, source=str(recording), task=task)
+    rows, warned = comparison_rows(calibrated, motion, source=str(recording), task=task)
     show(
         {
             "recording": recording,
             "chain": calibrated.chain,
             "task": task,
             "points": rows,
+            "warnings": warned,
         },
         comparison_table(rows, f"{recording}: learned against analytic, {task} held"),
+        *notes(warned),
         as_json=as_json,
     )
 
@@ -53,13 +56,17 @@ def comparison_rows(
     *,
     source: str,
     task: Literal["pose", "position"] = "pose",
-) -> list[dict[str, Any]]:
-    """Return one row a PCA point; where there is no sample it says just that."""
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return one row a PCA point, and what the analytic map warns of.
+
+    Where the recording has no still sample near a point, its row says just that.
+    """
     from ikns.clustering import nearest_center
-    from ikns.errors import NotEnoughData
+    from ikns.nullspace_map import MapWarning
 
     learned, chain = subject.null_space_map, subject.chain
-    try:
+    with naming(source), warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", MapWarning)
         x, _ = ikns.null_space_samples(motion, chain)
         near, _ = nearest_center(x, learned.centers_, radius=learned.radius_)
         counts = np.bincount(near[near >= 0], minlength=len(learned.centers_))
@@ -85,8 +92,6 @@ def comparison_rows(
             reference=some.directions_.sum(axis=0),
         )
         found = ikns.compare(some, analytic, motion, chain=chain)
-    except NotEnoughData as error:
-        raise NotEnoughData(f"{source}: {error}") from None
     rows: list[dict[str, Any]] = [
         {"point": k + 1, "samples": int(count)} for k, count in enumerate(counts)
     ]
@@ -100,7 +105,7 @@ def comparison_rows(
             "learned_direction": some.directions_[i].tolist(),
             "analytic_direction": analytic.directions_[i].tolist(),
         }
-    return rows
+    return rows, [f"analytic map: {warning.message}" for warning in caught]
 
 
 def comparison_table(rows: list[dict[str, Any]], title: str) -> Any:

@@ -68,7 +68,7 @@ def demo(
         motion = subject.motions[0]
         reaching = track_chain(subject.skeleton, free, subject.chain, progress=report)
         control = write_control(folder / "control.csv", subject, reaching)
-        rows = comparison_rows(subject, motion, source="points.c3d")
+        rows, warned = comparison_rows(subject, motion, source="points.c3d")
 
         # And now the truth.
         at_rest = still_samples(subject, run.points.swivel)
@@ -91,7 +91,7 @@ def demo(
             "same_sign_everywhere": bool(min(correlations) * max(correlations) > 0),
             "points": rows,
             "control_while_reaching_freely": control,
-            "warnings": subject.report["warnings"],
+            "warnings": subject.report["warnings"] + warned,
         }
         write_demo_report(
             folder / "report.html",

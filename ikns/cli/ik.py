@@ -18,6 +18,7 @@ from ikns.cli.output import (
     table,
     write_csv,
 )
+from ikns.errors import naming
 
 __all__ = ["ik"]
 
@@ -35,7 +36,7 @@ def ik(
     refuse_overwriting(out, force=force)
     skeleton = ikns.Subject.load(subject).skeleton
     frames = ikns.read(recording)
-    with progress() as report:
+    with progress() as report, naming(frames.source):
         motion = ikns.MarkerIK(skeleton).track(
             frames, progress=lambda done, total: report("joint angles", done, total)
         )
