@@ -1,0 +1,71 @@
+"""What the README shows is there and runs as it stands."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small_person
+
+from ikns.cli import main
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+
+
+def test_the_example_runs(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "ikns-demo" / "recordings").mkdir(parents=True)
+    for trial in small_person.protocol().trials:
+        small_person.write(
+            tmp_path / "ikns-demo" / "recordings", trial.name, trial.recording
+        )
+    monkeypatch.chdir(tmp_path)
+    (example,) = blocks("python")
+    assert len([line for line in example.splitlines() if line]) <= 15
+    names: dict[str, object] = {}
+    exec(compile(example, "README.md", "exec"), names)
+    assert "degrees" in capsys.readouterr().out
+    assert np.isfinite(names["c"]).all()
+
+
+def test_set_up_is_two_commands() -> None:
+    commands = "".join(blocks("bash")).splitlines()
+    assert len(commands) == 2
+    assert all(command.startswith("python3 -m venv .venv &&") for command in commands)
+
+
+def test_every_command_line_shown_is_one_that_the_program_knows(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    shown = [line.split() for line in "".join(blocks("console")).splitlines()]
+    assert {line[1] for line in shown} == {
+        "calibrate",
+        "control",
+        "compare",
+        "ik",
+        "scale",
+    }
+    for program, command, *rest in shown:
+        assert program == "ikns"
+        assert main([command, "--help"]) == 0
+        text = capsys.readouterr().out
+        for option in re.findall(r"--\S+", " ".join(rest)):
+            assert option in text
+
+
+def test_every_link_leads_to_a_file_and_the_picture_is_small() -> None:
+    links = re.findall(r"\]\((?!https?://)([^)#]+)", README)
+    assert links
+    for link in links:
+        assert (ROOT / link).is_file(), link
+    (picture,) = [link for link in links if link.endswith(".png")]
+    assert (ROOT / picture).stat().st_size < 200_000
