@@ -250,7 +250,9 @@ def target(condition: str, name: str, points: float) -> tuple[str, float] | None
             "|r| of c and swivel, worst point": 0.9,
             "points with the sign of the first": "all",
         }.get(name)
-    elif condition != "1 mm noise, 3 % occluded":
+    elif condition not in list(CONDITIONS)[:2]:
+        # Placing markers by hand is part of every real trial, so exact placement and
+        # palpation are held to the same numbers.
         value = None
     if value is None:
         return None
