@@ -59,6 +59,8 @@ POSE_SD = 1.0
 #: The fit has converged when a step promises less than this; one is what a single
 #: residual of one standard deviation costs.
 GAIN_TOLERANCE = 1e-4
+#: So many frames that show every marker are enough to average; noise is then a third.
+COMPLETE_FRAMES = 10
 #: Steps until the fit is given up; it takes about ten.
 _MAX_STEPS = 100
 
@@ -189,6 +191,11 @@ def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
             f"({', '.join(worn.labels[:4])}, ...), found "
             f"{', '.join(static.labels[:4]) or 'none'}; name the right marker set."
         )
+    # A person never stands quite still, so markers averaged over different frames do
+    # not fit together: frames that show everything count alone where there are some.
+    complete = seen[:, seen.any(axis=0)].all(axis=1)
+    if complete.sum() >= COMPLETE_FRAMES:
+        markers, seen = markers[complete], seen[complete]
     reference = markers[int(np.argmax(seen.sum(axis=1)))]
     aligned = np.full_like(markers, np.nan)
     for i, frame in enumerate(markers):
