@@ -167,22 +167,20 @@ class MarkerIK:
                 f"{', '.join(recording.labels[:4])}, ...; name the right marker set."
             )
         markers = marker_set.pick(recording.labels, recording.markers)
-        n = len(markers)
-        poses: list[Pose | None] = [None] * n
+        n, done = len(markers), 1
         # Start where most markers are seen, then go both ways.
         visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
         start = int(np.argmax(visible))
-        poses[start] = before = self.solve(markers[start])
-        order = [*range(start + 1, n), *range(start - 1, -1, -1)]
-        for done, i in enumerate(order, start=2):
-            if i == start - 1:
-                before = poses[start]  # type: ignore[assignment]
-            poses[i] = before = self.solve(markers[i], before.q)
-            if progress is not None and (done % 100 == 0 or done == n):
-                progress(done, n)
-        return motion_from_poses(
-            self.skeleton, recording.time, [p for p in poses if p is not None]
-        )
+        first = self.solve(markers[start])
+        poses = [first] * n
+        for way in (range(start + 1, n), range(start - 1, -1, -1)):
+            before = first
+            for i in way:
+                poses[i] = before = self.solve(markers[i], before.q)
+                done += 1
+                if progress is not None and (done % 100 == 0 or done == n):
+                    progress(done, n)
+        return motion_from_poses(self.skeleton, recording.time, poses)
 
     def _from_scratch(self, seen: Array) -> Pose:
         """Try several arm poses, then join each side's best."""
