@@ -30,8 +30,8 @@ def check_output_folder(
     Raises
     ------
     InvalidInput
-        When something is in the way that `force` does not cover: a file, or a folder
-        that holds anything else. So no run deletes what no run wrote.
+        When something is in the way that `force` does not cover: a file, the current
+        folder, or one that holds anything else. So no run deletes what no run wrote.
     """
     target = Path(folder)
     if not target.absolute().parent.is_dir():
@@ -40,6 +40,10 @@ def check_output_folder(
         return
     if not target.is_dir():
         raise InvalidInput(f"{target}: expected the name of a folder, found a file.")
+    if Path.cwd().is_relative_to(target.resolve()):
+        raise InvalidInput(
+            f"{target}: expected another folder than the one that you are in."
+        )
     found = [path for path in sorted(target.rglob("*")) if not path.is_dir()]
     for path in found:
         if path.relative_to(target).as_posix() not in files:
@@ -68,7 +72,7 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
     FileError
         When the folder cannot be written.
     """
-    target = Path(folder).absolute()
+    target = Path(folder).resolve()
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     old = part.with_suffix(".old")
     try:

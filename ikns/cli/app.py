@@ -70,9 +70,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ikns.IknsError as error:
         fault = str(error)
     except OSError as error:
-        if error.filename is None:
-            raise
-        fault = f"{error.filename}: {(error.strerror or 'cannot be used').lower()}."
+        where = "" if error.filename is None else f"{error.filename}: "
+        fault = f"{where}{(error.strerror or str(error)).lower()}."
     except typer.Abort:
         return 130
     else:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from typing import Annotated, Any, Literal
 
-import numpy as np
 import typer
 
 import ikns
@@ -62,6 +61,8 @@ def comparison_rows(
 
     Where the recording has no still sample near a point, its row says just that.
     """
+    import numpy as np
+
     from ikns.clustering import nearest_center
     from ikns.nullspace_map import MapWarning
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 import ikns
@@ -71,6 +70,8 @@ def write_control(
     freedom), empty while the chain is not in sight; hand_speed_m_s in the thorax frame;
     inside (1 within the volume of the PCA points); residual_m of the markers.
     """
+    import numpy as np
+
     learned, chain = subject.null_space_map, subject.chain
     place = motion.place(chain)
     raw = learned.control_signal(motion.chain_angles(chain), place)

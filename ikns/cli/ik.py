@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 import ikns
@@ -33,6 +32,8 @@ def ik(
     as_json: AsJson = False,
 ) -> None:
     """Write joint angles (deg), the pose of the thorax and residuals per frame."""
+    import numpy as np
+
     refuse_overwriting(out, force=force)
     skeleton = ikns.Subject.load(subject).skeleton
     frames = ikns.read(recording)
