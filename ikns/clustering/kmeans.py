@@ -22,6 +22,8 @@ __all__ = ["BoundingBoxKMeans", "nearest_center"]
 # recordings 3 lost up to 44 % of a point, 5 at most 4 %, with a radius of 14 to 19 mm.
 _STRAGGLER = 5.0
 _MAD_TO_DEVIATION = 1.4826  # of a normal distribution, 1 / (quantile at 3/4)
+# At ten points half a meter apart 1 % is 5 mm, less than any hand holds still.
+_LEAST = 0.01
 _ROUNDING = 1e-12  # of the coordinates, when distances are compared
 
 
@@ -42,7 +44,9 @@ def nearest_center(
         times the median absolute deviation) of all distances. While the user holds the
         hand at a point the distances are a few millimeters to centimeters; samples from
         the reaches between points are the stragglers that this cuts off, as long as
-        they are fewer than half of the samples.
+        they are fewer than half of the samples. At least a hundredth of the distance
+        across the centers, because stragglers shift the center of a perfectly still
+        hand by more than the hand moves.
 
     Returns
     -------
@@ -59,7 +63,9 @@ def nearest_center(
         deviation = _MAD_TO_DEVIATION * np.median(np.abs(nearest - median))
         # Rounding must not throw out points that all have the same distance.
         rounding = _ROUNDING * np.abs(points).max()
-        radius = float(median + _STRAGGLER * deviation + rounding)
+        across = float(np.linalg.norm(np.ptp(centers, axis=0)))
+        spread = median + _STRAGGLER * deviation + rounding
+        radius = max(float(spread), _LEAST * across)
     labels[nearest > radius] = -1
     return labels, radius
 
