@@ -117,6 +117,7 @@ BAD_STATICS = BAD_RECORDINGS | {
     "shorter than 1 s": c3d(lambda r: small_person.cut(r, 0, 20)),
 }
 BAD_EXPLORATIONS = BAD_RECORDINGS | {
+    "a single frame": text(lambda r: trc(small_person.cut(r, 0, 1))),
     "fewer samples than points": c3d(lambda r: small_person.cut(r, 30, 36)),
     "points in a plane": c3d(one_face),
 }
@@ -217,6 +218,8 @@ def test_bad_arguments_are_told_in_a_sentence(
         ["--radius", "-1"],
         ["--marker-set", "lost"],
         ["--min-static", "9"],
+        ["--min-still", "nan"],
+        ["--min-still", "-1"],
     ],
 )
 def test_settings_out_of_range_are_told_in_a_sentence(

@@ -25,6 +25,7 @@ ONLY_IN = {
     "sklearn": {"clustering", "nullspace_map"},
     "matplotlib": {"view"},
     "meshcat": {"view"},
+    "numba": {"_kernels"},
     "typer": {"cli"},
     "rich": {"cli"},
 }

@@ -91,6 +91,8 @@ def calibrate(
     """
     if not explorations:
         raise InvalidInput("expected at least one exploration recording, found none.")
+    if not 0 <= min_still < np.inf:
+        raise InvalidInput(f"expected min_still of at least 0 s, found {min_still:g}.")
     names = ", ".join(recording.source for recording in explorations)
     body = Skeleton.load() if generic is None else generic
     with naming(static.source):
@@ -112,7 +114,6 @@ def calibrate(
     x = np.concatenate([motion.place(chain)[gate] for motion, gate in pairs])
     q = np.concatenate([motion.chain_angles(chain)[gate] for motion, gate in pairs])
     posture = np.concatenate([motion.angles[gate] for motion, gate in pairs])
-    # More samples than joints, or they cannot span the joint space.
     enough = int(np.ceil(min_still * explorations[0].rate))
     learned = NullSpaceMap(
         n_points,
@@ -121,6 +122,7 @@ def calibrate(
         radius=radius,
         outside=outside,
         reference=elbow_reference(skeleton, posture.mean(axis=0), chain, n_dof=n_dof),
+        # With fewer samples than joints some joints could not show.
         min_samples=max(enough, len(chain_joints(chain)) + 1),
     )
     with warnings.catch_warnings(record=True) as caught:

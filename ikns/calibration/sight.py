@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.errors import MarkerMismatch, naming
+from ikns.errors import MarkerMismatch, NotEnoughData, naming
 from ikns.marker_ik import MarkerIK
 from ikns.motion import Motion, chain_sides
 from ikns.recording import Recording
@@ -53,7 +53,14 @@ def track_chain(
     ------
     MarkerMismatch
         When a segment of the chain, or the thorax, is never in sight.
+    NotEnoughData
+        When there are fewer than two frames.
     """
+    if len(recording.time) < 2:
+        raise NotEnoughData(
+            f"{recording.source}: expected at least 2 frames, as one shows no speed, "
+            f"found {len(recording.time)}."
+        )
     with naming(recording.source):
         shown = in_sight(skeleton, recording, chain)
     step = Path(recording.source).name
