@@ -24,6 +24,20 @@ def protocol() -> Protocol:
 
 
 @cache
+def two_handed() -> Protocol:
+    """Both hands hold a box at ten points, each elbow moves in its own rhythm."""
+    return simulate_protocol(
+        virtual_subject(2),
+        seed=2,
+        side="both",
+        static_seconds=1.2,
+        free_seconds=0.1,
+        point_seconds=2.0,
+        rate=50,
+    )
+
+
+@cache
 def subject() -> Subject:
     """The person as calibrated from the recordings."""
     return calibrate(protocol().static.recording, [protocol().points.recording])
