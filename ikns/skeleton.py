@@ -8,6 +8,7 @@ the thorax in its own frame, then the joint velocities.
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -59,8 +60,10 @@ class Skeleton:
 
     def __init__(self, urdf: str, marker_set: MarkerSet) -> None:
         try:
+            # Pinocchio's own parser prints to the terminal before it raises.
+            ET.fromstring(urdf)
             model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-        except (ValueError, RuntimeError) as error:
+        except (ET.ParseError, ValueError, RuntimeError) as error:
             raise FileError(f"the URDF cannot be read: {error}") from None
         self.urdf = urdf
         self.marker_set = marker_set
