@@ -92,32 +92,19 @@ def segment_lengths(urdf: str) -> dict[str, float]:
 
 def segment_ends(urdf: str) -> dict[str, NDArray[np.float64]]:
     """Joint that ends each limb segment, in its link's frame, (3,) m."""
-    joints = {joint.get("name"): joint for joint in ET.fromstring(urdf).iter("joint")}
-    return {
-        segment: _vector(joints[end].find("origin"), "xyz")
-        for segment, end in SEGMENTS.items()
-        if end in joints
-    }
+    origins = _joint_origins(urdf)
+    return {name: origins[end] for name, end in SEGMENTS.items() if end in origins}
 
 
 def relative_sizes(urdf: str, reference: str) -> dict[str, float]:
     """Size of each segment over the same segment of a reference URDF."""
-    sizes = []
-    for text in (urdf, reference):
-        joints = {
-            joint.get("name"): joint for joint in ET.fromstring(text).iter("joint")
-        }
-        # The trunk grows with the place of the joint that hangs on it.
-        ends = {
-            name: end or "right_clavicle_protraction" for name, end in SEGMENTS.items()
-        }
-        sizes.append(
-            {
-                name: float(np.linalg.norm(_vector(joints[end].find("origin"), "xyz")))
-                for name, end in ends.items()
-            }
-        )
-    return {name: sizes[0][name] / sizes[1][name] for name in SEGMENTS}
+    ours, theirs = _joint_origins(urdf), _joint_origins(reference)
+    # The trunk grows with the place of the joint that hangs on it.
+    ends = {name: end or "right_clavicle_protraction" for name, end in SEGMENTS.items()}
+    return {
+        name: float(np.linalg.norm(ours[end]) / np.linalg.norm(theirs[end]))
+        for name, end in ends.items()
+    }
 
 
 def link_inertials(urdf: str, parts: Mapping[str, Segment]) -> dict[str, Inertial]:
@@ -226,6 +213,14 @@ def _set_inertial(link: ET.Element, inertial: Inertial) -> None:
     xx, yy, zz = (f"{value:.9g}" for value in inertial.inertia)
     ET.SubElement(element, "inertia", ixx=xx, ixy="0", ixz="0", iyy=yy, iyz="0", izz=zz)
     link.insert(0, element)
+
+
+def _joint_origins(urdf: str) -> dict[str | None, NDArray[np.float64]]:
+    """Place of each joint in its parent link, (3,) m, by joint name."""
+    return {
+        joint.get("name"): _vector(joint.find("origin"), "xyz")
+        for joint in ET.fromstring(urdf).iter("joint")
+    }
 
 
 def _vector(element: ET.Element | None, attribute: str) -> NDArray[np.float64]:

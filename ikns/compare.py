@@ -18,7 +18,7 @@ __all__ = ["Comparison", "compare"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """What :func:`compare` found, one entry a PCA point.
 

@@ -57,7 +57,7 @@ _STARTS: tuple[dict[str, float], ...] = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pose:
     """One solved frame.
 

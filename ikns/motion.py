@@ -60,7 +60,7 @@ def chain_sides(chain: str) -> tuple[str, ...]:
     return tuple(side for side in SIDES if any(j.startswith(side) for j in joints))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """Joints and hands over time.
 
