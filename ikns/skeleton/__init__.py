@@ -1,0 +1,5 @@
+"""The skeleton: a person's URDF and markers; sole owner of Pinocchio's model and data."""
+
+from ikns.skeleton.skeleton import Skeleton
+
+__all__ = ["Skeleton"]
