@@ -50,11 +50,13 @@ class Voronoi:
     """Delaunay triangulation and Voronoi diagram of N sites.
 
     T tetrahedra, F facets of which H are on the hull, E edges, S = 3 F sides, P pairs
-    of sides of one polygon.
+    of sides of one polygon. Arrays are contiguous, of float64 and int64.
 
     Parameters
     ----------
     simplices : (T, 4) integer array
+    neighbors : (T, 4) integer array
+        The tetrahedron across the facet that leaves out each vertex; -1 on the hull.
     corner, corner_rest : (T, 3) array
         Corner seen from its tetrahedron's first site: float, and what it rounds off.
     behind, ahead : (F,) integer array
@@ -83,6 +85,7 @@ class Voronoi:
     """
 
     simplices: Indices
+    neighbors: Indices
     corner: Floats
     corner_rest: Floats
     behind: Indices
@@ -138,7 +141,7 @@ def voronoi(points: Floats) -> Voronoi:
     rings = _rings(lines, outside)
     edges = sorted(rings)
     sides = [(e, *side) for e, edge in enumerate(edges) for side in rings[edge]]
-    side_edge, side_facet, entering, leaving = np.array(sides).T
+    side_edge, side_facet, entering, leaving = map(np.array, zip(*sides, strict=True))
     corner = np.array([[_rounded(v, below) for v in above] for above, below in centers])
     ahead = np.array([line.ahead for line in lines])
     hull = np.flatnonzero(ahead == outside)
@@ -146,17 +149,18 @@ def voronoi(points: Floats) -> Voronoi:
     axes = np.array([_direction(minus(sites[j], sites[i])) for i, j in edges])
     return Voronoi(
         simplices=np.array(simplices),
+        neighbors=np.array(neighbors),
         corner=corner[..., 0] * _STEP,
         corner_rest=corner[..., 1] * _STEP,
         behind=np.array([line.behind for line in lines]),
         ahead=ahead,
         length=np.array([line.length for line in lines]) * _STEP,
-        normal=normal[..., 0],
-        normal_rest=normal[..., 1],
+        normal=normal[..., 0].copy(),
+        normal_rest=normal[..., 1].copy(),
         hull=hull,
         hull_facets=np.array([lines[k].facet for k in hull]),
         edges=np.array(edges),
-        axis=axes[..., 0],
+        axis=axes[..., 0].copy(),
         side_facet=side_facet,
         side_edge=side_edge,
         entering=entering,

@@ -1,4 +1,4 @@
-"""The skeleton: a person's URDF and markers; sole owner of Pinocchio's model and data."""
+"""The skeleton: a person's URDF and markers; sole owner of Pinocchio's model."""
 
 from ikns.skeleton.skeleton import Skeleton
 
