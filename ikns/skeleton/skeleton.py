@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from ikns._kernels.tree import Tree
 from ikns.anthropometry import Segment, segments
 from ikns.body import (
     GENERIC_STATURE,
@@ -31,6 +33,7 @@ from ikns.body import (
 from ikns.errors import FileError, InvalidInput, MarkerMismatch
 from ikns.marker_set import MarkerSet
 from ikns.motion import SIDES, chain_joints, chain_sides
+from ikns.skeleton.tree import joint_tree
 
 __all__ = ["Skeleton"]
 
@@ -218,6 +221,42 @@ class Skeleton:
         if unknown:
             raise InvalidInput(f"the skeleton has no joint {', '.join(unknown)}.")
         return np.array([_NV_ROOT + self.joint_names.index(j) for j in joints])
+
+    # --- the body as arrays, for kernels --------------------------------------------
+
+    @property
+    def tree(self) -> Tree:
+        """The joints; joint 0 is the thorax's free flyer."""
+        return self._tree[0]
+
+    @cached_property
+    def tree_markers(self) -> tuple[NDArray[np.int64], Array]:
+        """Each marker's joint in the tree, (M,), and place in its frame, (M, 3) m."""
+        joint = self._marker_joint - 1
+        turned = self._tree[1][joint]
+        return joint, np.einsum("mji,mj->mi", turned, self._marker_in_joint)
+
+    @cached_property
+    def tree_hands(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """Right and left knuckle frame in the tree.
+
+        Returns
+        -------
+        joint : (2,) integer array
+        rotation : (2, 3, 3) array
+        translation : (2, 3) array
+            The frame's placement in the joint's frame, m.
+        """
+        frames = [self._model.frames[frame] for frame in self._hands]
+        joint = np.array([frame.parentJoint - 1 for frame in frames], dtype=np.int64)
+        back = np.swapaxes(self._tree[1][joint], 1, 2)
+        rotation = np.stack([frame.placement.rotation for frame in frames])
+        translation = np.stack([frame.placement.translation for frame in frames])
+        return joint, back @ rotation, np.einsum("hij,hj->hi", back, translation)
+
+    @cached_property
+    def _tree(self) -> tuple[Tree, Array]:
+        return joint_tree(self._model)
 
     # --- markers in the world -------------------------------------------------------
 

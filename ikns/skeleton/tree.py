@@ -12,14 +12,9 @@ __all__ = ["joint_tree"]
 
 Array = NDArray[np.float64]
 
-_ONE_AXIS = {
-    f"JointModel{name}"
-    for name in "RX RY RZ RevoluteUnaligned PX PY PZ PrismaticUnaligned".split()
-}
 
-
-def joint_tree(model: pin.Model) -> tuple[Tree, Array] | None:
-    """Export a model's joints; None when one is neither of the kinds a tree knows.
+def joint_tree(model: pin.Model) -> tuple[Tree, Array]:
+    """Export a model whose joints are revolute, prismatic or free flyers.
 
     Returns
     -------
@@ -31,11 +26,9 @@ def joint_tree(model: pin.Model) -> tuple[Tree, Array] | None:
     joints = list(model.joints)[1:]
     kinds, turned = [], np.empty((len(joints), 3, 3))
     for i, joint in enumerate(joints):
-        kind = _kind(joint)
-        if kind is None:
-            return None
-        kinds.append(kind[0])
-        turned[i] = _turn_to(kind[1])
+        kind, axis = _kind_and_axis(joint)
+        kinds.append(kind)
+        turned[i] = _turn_to(axis)
     parent = np.array([model.parents[i + 1] - 1 for i in range(len(joints))])
     rotation, translation = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
     for i, above in enumerate(parent):
@@ -64,13 +57,9 @@ def joint_tree(model: pin.Model) -> tuple[Tree, Array] | None:
     return tree, turned
 
 
-def _kind(joint: pin.JointModel) -> tuple[int, Array] | None:
-    """Kind and axis of a joint, None when it is another kind."""
-    name = joint.shortname()
-    if name == "JointModelFreeFlyer":
+def _kind_and_axis(joint: pin.JointModel) -> tuple[int, Array]:
+    if joint.nq == 7:
         return FREE_FLYER, np.array([0.0, 0.0, 1.0])
-    if name not in _ONE_AXIS:
-        return None
     data = joint.createData()
     joint.calc(data, np.zeros(1))
     linear, angular = np.split(np.array(data.S).ravel(), 2)
