@@ -7,33 +7,37 @@ cell that it had to give up.
 
 from __future__ import annotations
 
-import math
-from typing import Literal, get_args
+import threading
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns._kernels.diagram import UNSURE, new_work
+from ikns._kernels.natural_neighbor import (
+    interpolate_many,
+    interpolate_one,
+    weigh_many,
+)
 from ikns.errors import InvalidInput
 from ikns.interpolation.border import checked_points, checked_values
+from ikns.interpolation.domain import domain
 from ikns.interpolation.faces import solid_angles
-from ikns.interpolation.hull import nearest_on_hull
-from ikns.interpolation.sibson import depths, stolen_volumes
-from ikns.interpolation.twofold import difference
-from ikns.interpolation.voronoi import voronoi
+from ikns.interpolation.packed import packed
+from ikns.interpolation.reference import (
+    Outside,
+    placed,
+    reference_weights,
+    scaled,
+)
 
 __all__ = ["NaturalNeighborInterpolator", "Outside"]
 
-Outside = Literal["nearest", "project", "nan"]
 Floats = NDArray[np.float64]
 
-#: Queries nearer to the hull than this part of the way to the middle are moved in to
-#: there. The hull of a box whose corners are rounded is uneven by 1e-16, and this near
-#: to it weights would tell which way.
-_SKIN = 1e-11
+_FLOAT = np.dtype(np.float64)
 #: Faces that fill less than this much of a site's view, steradian, make no neighbors.
 _GLIMPSE = 1e-9
-#: Queries farther out are brought this near: only their direction matters there.
-_FAR = 1e9
 
 
 class NaturalNeighborInterpolator:
@@ -111,23 +115,25 @@ class NaturalNeighborInterpolator:
                 f"unknown outside '{outside}', expected one of {get_args(Outside)}."
             )
         self.outside: Outside = outside
-        size = float(np.ptp(self.points, axis=0).max())
-        # A power of two scales exactly.
-        self._scale = 2.0 ** min(1000, -round(math.log2(size)))
-        self._sites = self.points * self._scale
-        self._voronoi = voronoi(self._sites)
-        self._center = self._sites.mean(axis=0)
-        self._center_depth = depths(
-            self._voronoi, self._sites, self._center[None], np.zeros((1, 3))
-        )[0]
-        self._rounding = 8 * np.finfo(float).eps * max(1.0, np.abs(self._sites).max())
-        self.simplices = self._voronoi.simplices
-        self.hull_facets = self._voronoi.hull_facets
-        self.edges = self._voronoi.edges[
-            solid_angles(self._voronoi, self._sites) >= _GLIMPSE
-        ]
+        self._space = domain(self.points)
+        diagram, n = self._space.diagram, len(self.points)
+        flat = np.empty((n, 0)) if self.values is None else self.values.reshape(n, -1)
+        self.packed = packed(self._space, flat, "sibson", outside)
+        self._width = flat.shape[1]
+        self._scratch = threading.local()
+        self.simplices = diagram.simplices
+        self.hull_facets = diagram.hull_facets
+        self.edges = diagram.edges[solid_angles(diagram, self._space.sites) >= _GLIMPSE]
         for array in (self.points, self.simplices, self.hull_facets, self.edges):
             array.flags.writeable = False
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the threads' scratch memory."""
+        return {name: v for name, v in self.__dict__.items() if name != "_scratch"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Start with no scratch memory."""
+        self.__dict__.update(state, _scratch=threading.local())
 
     def __call__(self, x: ArrayLike) -> Floats:
         """Interpolate the values.
@@ -145,7 +151,22 @@ class NaturalNeighborInterpolator:
             raise InvalidInput(
                 "these points were given no values, only their weights can be asked."
             )
-        return np.tensordot(self.weights(x), self.values, axes=1)
+        numbers, indices = self.packed
+        if type(x) is np.ndarray and x.dtype is _FLOAT and x.shape == (3,):
+            out = np.empty(self._width)
+            status = interpolate_one(numbers, indices, *x.tolist(), self._work(), out)
+            if status != UNSURE:
+                return out.reshape(self.values.shape[1:])
+        queries, shape = self._checked(x)
+        found = np.empty((len(queries), self._width))
+        state = np.empty(len(queries), dtype=np.int64)
+        order = np.arange(len(queries))
+        interpolate_many(numbers, indices, queries, order, self._work(), found, state)
+        again = np.flatnonzero(state == UNSURE)
+        if again.size:
+            weights = reference_weights(self._space, queries[again], self.outside)
+            found[again] = weights @ self.values.reshape(len(self.points), -1)
+        return found.reshape(*shape, *self.values.shape[1:])
 
     def weights(self, x: ArrayLike) -> Floats:
         """Sibson weights of the sites.
@@ -159,14 +180,15 @@ class NaturalNeighborInterpolator:
         -------
         (..., N) array
         """
-        queries, shape = self._scaled(x)
-        weights = np.full((len(queries), len(self._sites)), np.nan)
-        seen = np.flatnonzero(np.isfinite(queries).all(axis=1))
-        step = max(1, 50_000 // len(self._voronoi.side_edge))  # blocks that fit a cache
-        for start in range(0, len(seen), step):
-            rows = seen[start : start + step]
-            weights[rows] = self._block(queries[rows])
-        return weights.reshape(*shape, len(self._sites))
+        queries, shape = self._checked(x)
+        found = np.empty((len(queries), len(self.points)))
+        state = np.empty(len(queries), dtype=np.int64)
+        order = np.arange(len(queries))
+        weigh_many(*self.packed, queries, order, self._work(), found, state)
+        again = np.flatnonzero(state == UNSURE)
+        if again.size:
+            found[again] = reference_weights(self._space, queries[again], self.outside)
+        return found.reshape(*shape, len(self.points))
 
     def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
         """Whether queries are in the convex hull or, but for rounding, on it.
@@ -180,74 +202,29 @@ class NaturalNeighborInterpolator:
         -------
         (...) boolean array
         """
-        queries, shape = self._scaled(x)
+        queries, shape = self._checked(x)
+        queries = scaled(self._space, queries)
         within = np.zeros(len(queries), dtype=bool)
         seen = np.flatnonzero(np.isfinite(queries).all(axis=1))
         step = max(1, 50_000 // len(self.hull_facets))
         for start in range(0, len(seen), step):
             rows = seen[start : start + step]
-            within[rows] = self._depths(queries[rows]).min(axis=1) >= -self._rounding
+            within[rows] = placed(self._space, queries[rows], "nan")[1]
         return within.reshape(shape)
 
-    def _scaled(self, x: ArrayLike) -> tuple[Floats, tuple[int, ...]]:
-        queries = np.asarray(x, dtype=np.float64)
+    def _checked(self, x: ArrayLike) -> tuple[Floats, tuple[int, ...]]:
+        queries = np.ascontiguousarray(x, dtype=np.float64)
         if queries.ndim == 0 or queries.shape[-1] != 3:
             raise InvalidInput(
-                f"expected queries of shape (..., 3), found {queries.shape}."
+                f"expected queries of shape (..., 3), found {np.shape(x)}."
             )
-        with np.errstate(over="ignore", invalid="ignore"):
-            scaled = queries.reshape(-1, 3) * self._scale
-            away = scaled - self._center
-            reach = np.abs(away).max(axis=1, initial=0)
-            far = (reach > _FAR) & np.isfinite(reach)
-        scaled[far] = self._center + away[far] / reach[far, None] * _FAR
-        return scaled, queries.shape[:-1]
+        # A copy where needed: compiled code knows only arrays that could be written.
+        flat = np.require(queries.reshape(-1, 3), requirements=["C", "W"])
+        return flat, queries.shape[:-1]
 
-    def _depths(self, x: Floats) -> Floats:
-        return depths(self._voronoi, self._sites, x, np.zeros_like(x))
-
-    def _block(self, x: Floats) -> Floats:
-        """Weights of finite, scaled queries, (Q, N)."""
-        weights = np.full((len(x), len(self._sites)), np.nan)
-        depth = self._depths(x)
-        within = depth.min(axis=1) >= -self._rounding
-        away = np.flatnonzero(~within)
-        if self.outside == "project" and away.size:
-            x = x.copy()
-            x[away] = nearest_on_hull(self._sites, self.hull_facets, x[away])
-            depth[away] = self._depths(x[away])
-            within[:] = True
-        elif self.outside == "nearest" and away.size:
-            weights[away] = np.eye(len(self._sites))[self._nearest(x[away])[0]]
-
-        rows = np.flatnonzero(within)
-        nearest, square = self._nearest(x[rows])
-        at_site = square <= 1e-36  # nearer, nothing could be told apart
-        weights[rows[at_site]] = np.eye(len(self._sites))[nearest[at_site]]
-        rows = rows[~at_site]
-        weights[rows] = self._sibson(x[rows], depth[rows])
-        return weights
-
-    def _nearest(self, x: Floats) -> tuple[NDArray[np.intp], Floats]:
-        square = ((x[:, None] - self._sites) ** 2).sum(axis=2)
-        nearest = square.argmin(axis=1)
-        return nearest, square[np.arange(len(x)), nearest]
-
-    def _sibson(self, x: Floats, depth: Floats) -> Floats:
-        """Weights of queries in the hull that are not sites."""
-        # Part of the way from the hull to the middle: linear along every such ray.
-        part = (depth / self._center_depth).min(axis=1, initial=np.inf)
-        x, rest = x.copy(), np.zeros_like(x)  # may move by less than floats can tell
-        low = np.flatnonzero(part < _SKIN)
-        step = (_SKIN - part[low]) / (1 - part[low])
-        x[low], rest[low] = difference(x[low], step[:, None] * (x[low] - self._center))
-        depth[low] = depths(self._voronoi, self._sites, x[low], rest[low])
-        volume = stolen_volumes(self._voronoi, self._sites, x, rest, depth)
-        weights = volume / volume.sum(axis=1, keepdims=True)
-        if not (weights >= -1e-9).all():  # never seen: rounding leaves -1e-15
-            raise ArithmeticError(
-                f"a natural-neighbor weight came out as {weights.min():g} where 0 or "
-                "more is certain."
-            )
-        weights = weights.clip(0, None)
-        return weights / weights.sum(axis=1, keepdims=True)
+    def _work(self) -> Floats:
+        """Scratch memory of this thread."""
+        if not hasattr(self._scratch, "work"):
+            self._scratch.work = new_work(self.packed[1])
+        work: Floats = self._scratch.work
+        return work

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ikns.interpolation.twofold import difference, twofold_dot
 from ikns.interpolation.voronoi import Voronoi
 
-__all__ = ["depths", "stolen_volumes"]
+__all__ = ["coordinates", "depths"]
 
 Floats = NDArray[np.float64]
 
@@ -76,10 +76,16 @@ def _powers(diagram: Voronoi, sites: Floats, x: Floats, x_rest: Floats) -> Float
     return power
 
 
-def stolen_volumes(
-    diagram: Voronoi, sites: Floats, x: Floats, x_rest: Floats, depth: Floats
+def coordinates(
+    diagram: Voronoi,
+    sites: Floats,
+    x: Floats,
+    x_rest: Floats,
+    depth: Floats,
+    *,
+    laplace: bool = False,
 ) -> Floats:
-    """Volume that each query would steal from each site's Voronoi cell.
+    """Sibson's or Laplace's coordinates of queries, before they are normalized.
 
     Parameters
     ----------
@@ -90,12 +96,31 @@ def stolen_volumes(
         Queries strictly inside the hull, as floats and what these round off.
     depth : (Q, H) array
         Their :func:`depths`, all positive.
+    laplace : bool
 
     Returns
     -------
     (Q, N) array
+        Volume that each query would steal from each site's Voronoi cell; or twice the
+        area of the face that would part them, over their distance.
     """
     d = diagram
+    area = _kept_areas(d, sites, x, x_rest, depth)
+    found = np.zeros((len(sites), len(x)))
+    i, j = d.edges.T
+    for mine, other, sign in ((i, j, 1.0), (j, i, -1.0)):
+        p = sites[mine if laplace else other] - x[:, None]
+        along = np.einsum("ek,qek->qe", sign * d.axis, p)
+        np.add.at(found, mine, (area * along).T)
+    if not laplace:
+        return found.T / 12
+    return -found.T / ((sites - x[:, None]) ** 2).sum(axis=2)
+
+
+def _kept_areas(
+    d: Voronoi, sites: Floats, x: Floats, x_rest: Floats, depth: Floats
+) -> Floats:
+    """Twice the area of each polygon on the query's side, (Q, E)."""
     power = np.empty((len(x), len(d.simplices) + 1))
     power[:, :-1] = _powers(d, sites, x, x_rest)
     power[:, -1] = -np.inf
@@ -108,14 +133,7 @@ def stolen_volumes(
     start = start[:, d.side_edge[d.first]]
     swapped = (d.first < start) & (start <= d.second)
     area = kept[:, d.first] * kept[:, d.second] * np.where(swapped, -d.sine, d.sine)
-    area = np.add.reduceat(area, d.pairs, axis=1)
-
-    volume = np.zeros((len(sites), len(x)))
-    i, j = d.edges.T
-    for mine, other, sign in ((i, j, 1.0), (j, i, -1.0)):
-        along = np.einsum("ek,qek->qe", sign * d.axis, sites[other] - x[:, None])
-        np.add.at(volume, mine, (area * along).T)
-    return volume.T / 12
+    return np.add.reduceat(area, d.pairs, axis=1)
 
 
 def _kept_lengths(
