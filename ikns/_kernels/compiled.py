@@ -1,14 +1,17 @@
 """The one way in which kernels are compiled: numba, kept on disk, free of the GIL.
 
 Numba keys its cache by the file that holds a function and knows nothing of the files
-that hold what it calls. So the cache lies in a folder named after all of the kernels'
-sources, and machine code from another version of any of them is never loaded.
+that hold what it calls. So the cache lies in a folder named after the sources of a
+kernel and of all kernels that it imports, and machine code from another version of any
+of them is never loaded.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,17 +22,36 @@ from numba import config, njit
 __all__ = ["compiled"]
 
 _HERE = Path(__file__).parent
+_IMPORT = re.compile(r"^from ikns\._kernels\.(\w+) import", re.MULTILINE)
 
 
-def _cache_folder() -> Path | None:
-    """Where machine code of these very sources is kept; None where nothing can be."""
-    sources = b"".join(path.read_bytes() for path in sorted(_HERE.glob("*.py")))
-    name = "ikns-" + hashlib.sha256(sources + numba.__version__.encode()).hexdigest()
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function on its first call; division by zero gives inf or NaN."""
+    folder = _cache_folder(function.__module__.rsplit(".", 1)[-1])
     asked = config.CACHE_DIR
+    config.CACHE_DIR = str(folder or "")
+    try:
+        return njit(cache=folder is not None, error_model="numpy", nogil=True)(function)
+    finally:
+        config.CACHE_DIR = asked
+
+
+@functools.cache
+def _cache_folder(module: str) -> Path | None:
+    """Where machine code of these very sources is kept; None where nothing can be."""
+    texts: dict[str, str] = {}
+    open_ends = [module]
+    while open_ends:
+        name = open_ends.pop()
+        texts[name] = (_HERE / f"{name}.py").read_text(encoding="utf-8")
+        open_ends += set(_IMPORT.findall(texts[name])) - set(texts)
+    sources = "".join(texts[name] for name in sorted(texts)) + numba.__version__
+    name = f"{module}-{hashlib.sha256(sources.encode()).hexdigest()[:16]}"
     home = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
+    asked = config.CACHE_DIR
     places = [asked] if asked else [_HERE / "__pycache__", Path(home) / "ikns"]
     for place in places:
-        folder = Path(place) / name[:21]
+        folder = Path(place) / name
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:
@@ -37,18 +59,3 @@ def _cache_folder() -> Path | None:
         if os.access(folder, os.W_OK):
             return folder
     return None
-
-
-_FOLDER = _cache_folder()
-
-
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function on its first call; division by zero gives inf or NaN."""
-    asked = config.CACHE_DIR
-    config.CACHE_DIR = str(_FOLDER or "")
-    try:
-        return njit(cache=_FOLDER is not None, error_model="numpy", nogil=True)(
-            function
-        )
-    finally:
-        config.CACHE_DIR = asked
