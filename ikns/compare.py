@@ -110,12 +110,7 @@ def compare(
     return Comparison(
         centers=learned.centers_,
         counts=np.bincount(labels[labels >= 0], minlength=n),
-        angles=np.stack(
-            [
-                principal_angles(a, b)
-                for a, b in zip(learned.directions_, analytic.directions_, strict=True)
-            ]
-        ),
+        angles=principal_angles(learned.directions_, analytic.directions_),
         inside=inside,
         learned_leak=leaks[0],
         analytic_leak=leaks[1],

@@ -52,7 +52,7 @@ def isb_angles(
     joints = q[:, -len(skeleton.joint_names) :]
     for side in SIDES:
         links = [
-            np.stack([skeleton.link_in_thorax(row, f"{side}_{link}")[1] for row in q])
+            skeleton.link_in_thorax(q, f"{side}_{link}")[1]
             for link in ("upper_arm", "forearm")
         ]
         if side == "left":

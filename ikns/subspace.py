@@ -10,9 +10,13 @@ rounding (1e-16), so the decision is the same in meters and in millimeters.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns._kernels.null_space import write_null_spaces
+from ikns._kernels.principal_angles import write_principal_angles
 from ikns.errors import InvalidInput, NotEnoughData
 
 __all__ = [
@@ -20,9 +24,14 @@ __all__ = [
     "mean_null_direction",
     "null_projector",
     "null_space",
+    "null_spaces",
     "principal_angles",
     "principal_components",
 ]
+
+#: Rows count as dependent when their smallest singular value is this share of the
+#: largest or less: far above rounding (1e-16), on which their span then depends.
+_DEPENDENT = 1e-12
 
 
 def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
@@ -56,10 +65,56 @@ def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64
             f"expected a finite Jacobian (k, n), found an array {J.shape} "
             f"with {np.count_nonzero(~np.isfinite(J))} values that are not finite."
         )
-    # Rows of zeros change nothing and make the full right basis come for free.
-    k, n = J.shape
-    _, s, vt = np.linalg.svd(np.vstack([J, np.zeros((max(n - k, 0), n))]))
-    return vt[np.count_nonzero(_seen(s, rtol)) :]
+    basis, _ = null_spaces(J, rtol=rtol)
+    return basis
+
+
+def null_spaces(
+    jacobians: ArrayLike, *, rtol: float = 1e-9
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Orthonormal bases of many null spaces, whatever the rank of each.
+
+    Parameters
+    ----------
+    jacobians : (..., k, n) array
+        Task rates per joint rate, one Jacobian a posture.
+    rtol : float
+        Singular values up to ``rtol * largest`` (of the same posture) count as zero.
+
+    Returns
+    -------
+    basis : (..., d, n) array
+        ``n - rank`` orthonormal rows ``b`` with ``jacobian @ b == 0``, d the most that
+        any posture has, and below them rows of zeros: ``basis.T @ basis`` is the
+        projector on each. NaN for postures whose Jacobian is not finite.
+    rank : (...) integer array
+        Rank of each Jacobian; -1 where it is not finite.
+
+    Raises
+    ------
+    InvalidInput
+        When the array has fewer than two axes.
+
+    Examples
+    --------
+    >>> elbow_bent, straight = [[1.0, 0, 0], [0, 2.0, 0]], [[1.0, 0, 0], [2.0, 0, 0]]
+    >>> basis, rank = null_spaces([elbow_bent, straight])
+    >>> basis.shape, rank.tolist()
+    ((2, 2, 3), [2, 1])
+    """
+    J = np.asarray(jacobians, dtype=np.float64)
+    if J.ndim < 2:
+        raise InvalidInput(f"expected Jacobians (..., k, n), found an array {J.shape}.")
+    *batch, k, n = J.shape
+    flat = _for_kernels(J).reshape(math.prod(batch), k, n)
+    rank = np.empty(len(flat), dtype=np.int64)
+    basis = np.empty((len(flat), max(n - k, 0), n))
+    write_null_spaces(flat, rtol, basis, rank)
+    deficient = n - int(rank[rank >= 0].min(initial=n))
+    if deficient > basis.shape[1]:
+        basis = np.empty((len(flat), deficient, n))
+        write_null_spaces(flat, rtol, basis, rank)
+    return basis.reshape(*batch, *basis.shape[1:]), rank.reshape(batch)
 
 
 def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
@@ -83,14 +138,10 @@ def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.flo
     InvalidInput
         When the array has fewer than two axes.
     """
-    J = np.asarray(jacobian, dtype=np.float64)
-    if J.ndim < 2:
-        raise InvalidInput(f"expected Jacobians (..., k, n), found an array {J.shape}.")
-    finite = np.isfinite(J).all(axis=(-2, -1), keepdims=True)
-    _, s, vt = np.linalg.svd(np.where(finite, J, 0.0), full_matrices=False)
-    rows = vt * _seen(s, rtol)[..., None]
-    projector = np.eye(J.shape[-1]) - np.swapaxes(rows, -2, -1) @ rows
-    return np.where(finite, projector, np.nan)
+    basis, rank = null_spaces(jacobian, rtol=rtol)
+    projector = np.swapaxes(basis, -2, -1) @ basis
+    projector[rank < 0] = np.nan
+    return projector
 
 
 def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
@@ -122,7 +173,7 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
     >>> principal_angles([[1.0, 0.0, 0.0]], [[1.0, 1e-10, 0.0]])
     array([1.e-10])
     """
-    a, b = _orthonormal_rows(A), _orthonormal_rows(B)
+    a, b = _rows(A), _rows(B)
     if a.shape[-1] != b.shape[-1]:
         raise InvalidInput(
             f"expected subspaces of the same space, "
@@ -130,10 +181,21 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
         )
     if a.shape[-2] < b.shape[-2]:
         a, b = b, a
-    overlap = b @ np.swapaxes(a, -2, -1)
-    cosine = np.linalg.svd(overlap, compute_uv=False)
-    sine = np.linalg.svd(b - overlap @ a, compute_uv=False)[..., ::-1]
-    return np.arctan2(sine, cosine)
+    batch = np.broadcast_shapes(a.shape[:-2], b.shape[:-2])
+    count = math.prod(batch)
+    a, b = (
+        _for_kernels(np.broadcast_to(x, (*batch, *x.shape[-2:]))).reshape(
+            count, *x.shape[-2:]
+        )
+        for x in (a, b)
+    )
+    angles = np.empty((count, b.shape[1]))
+    if not write_principal_angles(a, b, _DEPENDENT, angles):
+        raise InvalidInput(
+            f"expected linearly independent rows, found dependent ones in arrays "
+            f"{np.shape(A)} and {np.shape(B)}."
+        )
+    return angles.reshape(*batch, b.shape[1])
 
 
 def mean_null_direction(
@@ -179,7 +241,8 @@ def mean_null_direction(
     J = J[np.isfinite(J).all(axis=(1, 2))]
     if not len(J):
         raise NotEnoughData("no posture has a finite Jacobian to average over.")
-    values, vectors = np.linalg.eigh(null_projector(J, rtol=rtol).mean(axis=0))
+    rows = null_spaces(J, rtol=rtol)[0].reshape(-1, J.shape[-1])
+    values, vectors = np.linalg.eigh(rows.T @ rows / len(J))
     directions = largest_entry_positive(vectors[:, ::-1].T[:d])
     return directions, np.clip(values[::-1], 0.0, 1.0)
 
@@ -218,21 +281,16 @@ def largest_entry_positive(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(largest < 0, -rows, rows)
 
 
-def _seen(s: NDArray[np.float64], rtol: float) -> NDArray[np.bool_]:
-    """Which singular values (decreasing along the last axis) are not zero."""
-    return np.greater(s, rtol * s[..., :1])
+def _for_kernels(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the array in the one layout that kernels are compiled for."""
+    return np.require(array, requirements=["C", "A", "W"])
 
 
-def _orthonormal_rows(rows: ArrayLike) -> NDArray[np.float64]:
+def _rows(rows: ArrayLike) -> NDArray[np.float64]:
+    """Rows that may span a subspace."""
     array = np.asarray(rows, dtype=np.float64)
     if array.ndim < 2 or 0 in array.shape or not np.isfinite(array).all():
         raise InvalidInput(
             f"expected a subspace as finite rows (..., p, n), found {array.shape}."
         )
-    _, s, vt = np.linalg.svd(array, full_matrices=False)
-    if array.shape[-2] > array.shape[-1] or not (s[..., -1] > 1e-12 * s[..., 0]).all():
-        raise InvalidInput(
-            f"expected linearly independent rows, found dependent ones in an array "
-            f"{array.shape}."
-        )
-    return vt
+    return array

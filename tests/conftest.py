@@ -5,6 +5,11 @@ from pathlib import Path
 
 import pytest
 import small_person
+from hypothesis import settings
+
+# A kernel compiles in its first example, which then takes seconds.
+settings.register_profile("ikns", deadline=None)
+settings.load_profile("ikns")
 
 _BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 DATA = Path(os.environ.get("IKNS_TEST_DATA", _BESIDE))

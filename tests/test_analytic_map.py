@@ -105,7 +105,7 @@ class Body:
     """The arm as part of a body with two."""
 
     def chain_jacobian(self, q, chain, *, task="pose"):
-        return ARM.chain_jacobian(q[:7], chain, task=task)
+        return np.stack([ARM.chain_jacobian(p[:7], chain, task=task) for p in q])
 
 
 def test_jacobian_of_the_arm_is_the_derivative_of_its_hand():

@@ -93,10 +93,8 @@ def analytic_map(
             raise NotEnoughData(
                 f"expected still samples at the point {at(places, k)} m, found none."
             )
-    spans = []
-    for r in rows:
-        jacobians = [skeleton.chain_jacobian(s, chain, task=task) for s in visited[r]]
-        spans.append(mean_null_direction(np.array(jacobians), settings.n_dof)[0])
+    jacobians = skeleton.chain_jacobian(visited, chain, task=task)
+    spans = [mean_null_direction(jacobians[r], settings.n_dof)[0] for r in rows]
     arrays = assemble(
         places,
         spans,

@@ -81,19 +81,7 @@ class Arm:
         Zero with the elbow straight below the line, positive where it is lifted
         outwards; NaN for a straight arm.
         """
-        sx, sy, sz = self.shoulder(angles)
-        wx, wy, wz = self.skeleton.link_in_thorax(angles, f"{self.side}_hand")[0]
-        ex, ey, ez = self.skeleton.link_in_thorax(angles, f"{self.side}_forearm")[0]
-        lx, ly, lz = wx - sx, wy - sy, wz - sz
-        ex, ey, ez = ex - sx, ey - sy, ez - sz
-        # The direction below the line is -Y less its part along the line; what stands
-        # out sideways is that direction crossed with the line. Both have length
-        # hypot(lx, lz) / |line|, which the ratio does not see.
-        length = np.sqrt(lx * lx + ly * ly + lz * lz)
-        along = (ex * lx + ey * ly + ez * lz) / length**2
-        down = along * ly - ey
-        outward = (ez * lx - ex * lz) / length * self.outward
-        return float(np.arctan2(outward, down)) if outward or down else float("nan")
+        return float(self.skeleton.swivel(angles)[SIDES.index(self.side)])
 
     def to_pose(self, angles: Array, position: Array, rotation: Array) -> Array:
         """Return the posture nearest to `angles` that puts the hand at a pose.

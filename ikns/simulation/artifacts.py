@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ikns.errors import InvalidInput
 from ikns.motion import SIDES, chain_joints
@@ -103,12 +104,11 @@ class SoftTissue:
         slow = wander(rng, n, 3 * m, sd=sd, cutoff=_RANDOM_HZ, rate=rate)
         local += slow.reshape(n, m, 3)
         in_world = np.empty_like(local)
-        for i in range(n):
-            root = _rotation(q[i, 3:7])
-            for link in np.unique(self.links):
-                rows = self.links == link
-                turned = root @ self.skeleton.link_in_thorax(q[i], str(link))[1]
-                in_world[i, rows] = local[i, rows] @ turned.T
+        root = Rotation.from_quat(q[:, 3:7]).as_matrix()
+        for link in np.unique(self.links):
+            rows = self.links == link
+            turned = root @ self.skeleton.link_in_thorax(q, str(link))[1]
+            in_world[:, rows] = local[:, rows] @ np.swapaxes(turned, 1, 2)
         return in_world
 
     def _moved(self, gains: Array, angles: Array) -> Array:
@@ -175,14 +175,3 @@ def _joints_at(link: str) -> set[str]:
         "hand": slice(7, 9),
     }
     return set(names[spans[segment]])
-
-
-def _rotation(quaternion: Array) -> Array:
-    x, y, z, w = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )

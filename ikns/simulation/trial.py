@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ikns.motion import Motion
+from ikns.motion import SIDES, Motion
 from ikns.recording import Recording
 from ikns.simulation.arm import Arm
 from ikns.simulation.artifacts import SoftTissue, occlusions
@@ -89,8 +89,7 @@ def place_in_room(
 
 def true_motion(skeleton: Skeleton, time: Array, q: Array) -> Motion:
     """Write the truth as a motion; velocities are central differences."""
-    hands = [skeleton.hands_in_thorax(row) for row in q]
-    position = np.stack([p for p, _ in hands])
+    position, rotation = skeleton.hands_in_thorax(q)
     steps = np.stack([skeleton.difference(*pair) for pair in pairwise(q)])
     path = np.vstack([np.zeros(skeleton.nv), np.cumsum(steps, axis=0)])
     n = len(q)
@@ -100,7 +99,7 @@ def true_motion(skeleton: Skeleton, time: Array, q: Array) -> Motion:
         v=np.gradient(path, time, axis=0),
         joint_names=skeleton.joint_names,
         hand_in_thorax=position,
-        hand_rotation_in_thorax=np.stack([R for _, R in hands]),
+        hand_rotation_in_thorax=rotation,
         hand_velocity_in_thorax=np.gradient(position, time, axis=0),
         residual=np.zeros(n),
         iterations=np.zeros(n, dtype=np.int64),
@@ -162,7 +161,7 @@ def film(
     labels = [skeleton.marker_set.labels[i] for i in worn]
     markers = markers[:, worn]
     markers[occlusions(of_gaps, len(q), links, share=occluded, rate=rate)] = np.nan
-    swivel = np.array([[arm.swivel(row) for arm in arms] for row in q])
+    swivel = skeleton.swivel(q)[:, [SIDES.index(arm.side) for arm in arms]]
     return Trial(
         name=name,
         recording=Recording(time, markers, labels, f"simulated {name} trial"),

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ikns._kernels.tree import Tree
 from ikns.anthropometry import Segment, segments
@@ -26,14 +26,15 @@ from ikns.body import (
     link_inertials,
     relative_sizes,
     resize_urdf,
-    segment_ends,
     segment_lengths,
     urdf_folder,
 )
-from ikns.errors import FileError, InvalidInput, MarkerMismatch
+from ikns.errors import FileError, InvalidInput
 from ikns.marker_set import MarkerSet
-from ikns.motion import SIDES, chain_joints, chain_sides
-from ikns.skeleton.tree import joint_tree
+from ikns.motion import SIDES, chain_joints
+from ikns.skeleton.frames import Frames
+from ikns.skeleton.markers import Markers, part_along
+from ikns.subspace import null_spaces
 
 __all__ = ["Skeleton"]
 
@@ -70,10 +71,12 @@ class Skeleton:
             raise FileError(f"the URDF cannot be read: {error}") from None
         self.urdf = urdf
         self.marker_set = marker_set
-        self._model, self._data = model, model.createData()
+        self._model = model
         self.joint_names: tuple[str, ...] = tuple(model.names)[2:]
-        missing = {j for side in SIDES for j in chain_joints(f"{side}_arm_clavicle")}
-        missing -= set(self.joint_names)
+        needed = {j for side in SIDES for j in chain_joints(f"{side}_arm_clavicle")}
+        needed |= {*SEGMENTS, *(f"{side}_knuckle" for side in SIDES)}
+        bodies = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
+        missing = needed - set(self.joint_names) - bodies
         if missing or model.nq != _NQ_ROOT + len(self.joint_names):
             raise FileError(
                 "the URDF is not an upper body of revolute joints: it lacks "
@@ -81,8 +84,7 @@ class Skeleton:
             )
         self.lower: Array = np.array(model.lowerPositionLimit[_NQ_ROOT:])
         self.upper: Array = np.array(model.upperPositionLimit[_NQ_ROOT:])
-        self._hands = [self._frame(f"{side}_knuckle") for side in SIDES]
-        self._attach_markers()
+        self._markers = Markers(model, marker_set)
 
     @classmethod
     def load(
@@ -166,7 +168,9 @@ class Skeleton:
         urdf = resize_urdf(self.urdf, factors, inertials=inertials)
         growth = [factors.get(m.link, 1.0) - 1 for m in self.marker_set.markers]
         positions = self.marker_positions
-        positions += np.array(growth).reshape(-1, 1) * self._along(positions)
+        positions += np.array(growth).reshape(-1, 1) * part_along(
+            self.urdf, self.marker_set, positions
+        )
         return Skeleton(urdf, self.marker_set.at(positions))
 
     def with_markers(self, marker_set: MarkerSet) -> Skeleton:
@@ -227,14 +231,14 @@ class Skeleton:
     @property
     def tree(self) -> Tree:
         """The joints; joint 0 is the thorax's free flyer."""
-        return self._tree[0]
+        return self._frames.tree
 
     @cached_property
     def tree_markers(self) -> tuple[NDArray[np.int64], Array]:
         """Each marker's joint in the tree, (M,), and place in its frame, (M, 3) m."""
-        joint = self._marker_joint - 1
-        turned = self._tree[1][joint]
-        return joint, np.einsum("mji,mj->mi", turned, self._marker_in_joint)
+        joint = self._markers.joint - 1
+        turned = self._frames.turned[joint]
+        return joint, np.einsum("mji,mj->mi", turned, self._markers.in_joint)
 
     @cached_property
     def tree_hands(self) -> tuple[NDArray[np.int64], Array, Array]:
@@ -247,23 +251,19 @@ class Skeleton:
         translation : (2, 3) array
             The frame's placement in the joint's frame, m.
         """
-        frames = [self._model.frames[frame] for frame in self._hands]
-        joint = np.array([frame.parentJoint - 1 for frame in frames], dtype=np.int64)
-        back = np.swapaxes(self._tree[1][joint], 1, 2)
-        rotation = np.stack([frame.placement.rotation for frame in frames])
-        translation = np.stack([frame.placement.translation for frame in frames])
-        return joint, back @ rotation, np.einsum("hij,hj->hi", back, translation)
+        hands = [self._frames.in_tree(f"{side}_knuckle") for side in SIDES]
+        joint, rotation, translation = zip(*hands, strict=True)
+        return np.array(joint), np.stack(rotation), np.stack(translation)
 
     @cached_property
-    def _tree(self) -> tuple[Tree, Array]:
-        return joint_tree(self._model)
+    def _frames(self) -> Frames:
+        return Frames(self._model)
 
     # --- markers in the world -------------------------------------------------------
 
     def markers_in_world(self, q: Array) -> Array:
         """Marker positions at `q`, (M, 3) m."""
-        pin.forwardKinematics(self._model, self._data, q)
-        return self._place_markers()
+        return self._markers.place(q)
 
     def marker_jacobian(self, q: Array) -> tuple[Array, Array]:
         """Marker positions and their derivative by the tangent of `q`.
@@ -276,16 +276,7 @@ class Skeleton:
             d position / d v: column j is ``linear_j + angular_j x position`` for the
             joints between the root and the marker, else zero.
         """
-        twists = np.array(pin.computeJointJacobians(self._model, self._data, q))
-        positions = self._place_markers()
-        linear, (wx, wy, wz) = twists[:3], twists[3:]
-        x, y, z = positions.T[:, :, None]
-        jacobian = np.empty((len(positions), 3, self._model.nv))
-        jacobian[:, 0] = linear[0] + wy * z - wz * y
-        jacobian[:, 1] = linear[1] + wz * x - wx * z
-        jacobian[:, 2] = linear[2] + wx * y - wy * x
-        jacobian *= self._moves[:, None, :]
-        return positions, jacobian
+        return self._markers.jacobian(q)
 
     def size_jacobian(self, q: Array) -> tuple[Array, Array]:
         """Differentiate the marker positions by the body's sizes.
@@ -298,51 +289,30 @@ class Skeleton:
         by_position : (M, 3, 3) array
             d position / d (marker position in its link): the link's orientation.
         """
-        pin.forwardKinematics(self._model, self._data, q)
-        model, data = self._model, self._data
-        by_size = np.zeros((len(self._marker_joint), 3, len(SEGMENTS)))
-        for s, segment in enumerate(SEGMENTS):
-            carrier = model.frames[self._frame(segment)].parentJoint
-            rotation = data.oMi[carrier].rotation
-            for joint in model.children[carrier]:
-                below = list(model.subtrees[joint])
-                moved = np.isin(self._marker_joint, below)
-                by_size[moved, :, s] = (
-                    rotation @ model.jointPlacements[joint].translation
-                )
-            own = self._marker_joint == carrier
-            by_size[own, :, s] = self._along(self._marker_in_joint)[own] @ rotation.T
-        by_position = np.stack([data.oMi[int(j)].rotation for j in self._marker_joint])
-        return by_size, by_position
+        along = part_along(self.urdf, self.marker_set, self._markers.in_joint)
+        return self._markers.by_size(q, along)
 
     # --- the body seen from the thorax ----------------------------------------------
+    #
+    # `q` is one configuration or many, (..., 25), or joint angles alone, (..., 18). NaN
+    # in a configuration comes out as NaN.
 
-    def link_in_thorax(self, q: Array, link: str) -> tuple[Array, Array]:
-        """Origin (3,) m and orientation (3, 3) of a link in the thorax frame."""
-        frame = self._frame(link)
-        self._update_in_thorax(q)
-        pose = pin.updateFramePlacement(self._model, self._data, frame)
-        return np.array(pose.translation), np.array(pose.rotation)
+    def link_in_thorax(self, q: ArrayLike, link: str) -> tuple[Array, Array]:
+        """Origin of a link, (..., 3) m, and orientation, (..., 3, 3)."""
+        position, rotation = self._frames.place(q, (link,))
+        return position[..., 0, :], rotation[..., 0, :, :]
 
-    def hands_in_thorax(self, q: Array) -> tuple[Array, Array]:
-        """Right and left knuckle, (2, 3) m, and hand orientation, (2, 3, 3)."""
-        self._update_in_thorax(q)
-        poses = [
-            pin.updateFramePlacement(self._model, self._data, frame)
-            for frame in self._hands
-        ]
-        return (
-            np.stack([pose.translation for pose in poses]),
-            np.stack([pose.rotation for pose in poses]),
-        )
+    def hands_in_thorax(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Right and left knuckle, (..., 2, 3) m, and orientation, (..., 2, 3, 3)."""
+        return self._frames.place(q, [f"{side}_knuckle" for side in SIDES])
 
-    def chain_jacobian(self, q: Array, chain: str, *, task: str = "pose") -> Array:
+    def chain_jacobian(self, q: ArrayLike, chain: str, *, task: str = "pose") -> Array:
         """Jacobian of a chain's hands in the thorax frame.
 
         Parameters
         ----------
-        q : (25,) or (18,) array
-            Configuration, or joint angles alone.
+        q : (..., 25) or (..., 18) array
+            Configurations, or joint angles alone.
         chain : str
             See :data:`ikns.motion.CHAINS`.
         task : {"pose", "position"}
@@ -350,107 +320,44 @@ class Skeleton:
 
         Returns
         -------
-        (k, n) array
+        (..., k, n) array
             Per hand 3 rows of linear velocity (m/rad), then for ``"pose"`` 3 rows of
             angular velocity (rad/rad); columns in chain order.
         """
-        if task not in ("pose", "position"):
-            raise InvalidInput(f"task must be 'pose' or 'position', not '{task}'.")
-        columns = self.columns(chain_joints(chain))
-        self._update_in_thorax(q, jacobians=True)
-        rows = 6 if task == "pose" else 3
-        blocks = []
-        for side in chain_sides(chain):
-            frame = self._hands[SIDES.index(side)]
-            pin.updateFramePlacement(self._model, self._data, frame)
-            full = pin.getFrameJacobian(
-                self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED
-            )
-            blocks.append(full[:rows, columns])
-        return np.vstack(blocks)
+        return self._frames.jacobian(q, chain, task)
 
-    def swivel(self, q: Array) -> Array:
-        """Elbow angle about the line from shoulder to wrist, (2,) rad.
+    def null_spaces(
+        self, q: ArrayLike, chain: str, *, task: str = "pose", rtol: float = 1e-9
+    ) -> tuple[Array, NDArray[np.int64]]:
+        """Joint motions of a chain that leave its hands where they are.
+
+        Parameters
+        ----------
+        q, chain, task
+            As :meth:`chain_jacobian` takes them.
+        rtol : float
+            See :func:`ikns.subspace.null_spaces`, which this returns.
+
+        Returns
+        -------
+        basis : (..., d, n) array
+            Orthonormal rows, below them zeros where others have more.
+        rank : (...) integer array
+            Of the Jacobian; -1 where it is not finite.
+
+        Examples
+        --------
+        >>> skeleton = Skeleton.load()
+        >>> basis, rank = skeleton.null_spaces(np.full((10, 18), 0.3), "right_arm")
+        >>> basis.shape
+        (10, 1, 7)
+        """
+        return null_spaces(self.chain_jacobian(q, chain, task=task), rtol=rtol)
+
+    def swivel(self, q: ArrayLike) -> Array:
+        """Elbow angle about the line from shoulder to wrist, (..., 2) rad.
 
         Zero with the elbow straight below the line, positive where the elbow is lifted
-        outwards (the right one to the right).
+        outwards (the right one to the right); NaN for a straight arm.
         """
-        angles = np.empty(2)
-        for i, side in enumerate(SIDES):
-            shoulder, elbow, wrist = (
-                self.link_in_thorax(q, f"{side}_{link}")[0]
-                for link in ("upper_arm", "forearm", "hand")
-            )
-            line = (wrist - shoulder) / np.linalg.norm(wrist - shoulder)
-            radial = elbow - shoulder - line * np.dot(elbow - shoulder, line)
-            down = -np.eye(3)[1] + line * line[1]
-            outward = np.cross(down, line) * (1 if side == "right" else -1)
-            angles[i] = np.arctan2(radial @ outward, radial @ down)
-        return angles
-
-    # --- inside -----------------------------------------------------------------------
-
-    def _along(self, positions: Array) -> Array:
-        """Part of the markers' places (M, 3) that grows with their segment.
-
-        Along a limb; girth is not a matter of length. On the thorax, all of it.
-        """
-        ends = segment_ends(self.urdf)
-        axes = np.zeros((len(positions), 3, 3))
-        for axis, marker in zip(axes, self.marker_set.markers, strict=True):
-            if marker.link in ends:
-                unit = ends[marker.link] / np.linalg.norm(ends[marker.link])
-                axis[:] = np.outer(unit, unit)
-            elif marker.link in SEGMENTS:
-                axis[:] = np.eye(3)
-        return np.einsum("mij,mj->mi", axes, positions)
-
-    def _frame(self, link: str) -> int:
-        # Pinocchio answers an unknown name with the number of frames.
-        index = self._model.getFrameId(link, pin.FrameType.BODY)
-        if index >= self._model.nframes:
-            raise FileError(f"the URDF has no link '{link}'.")
-        return int(index)
-
-    def _attach_markers(self) -> None:
-        model = self._model
-        links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
-        unknown = [m for m in self.marker_set.markers if m.link not in links]
-        if unknown:
-            raise MarkerMismatch(
-                f"marker {unknown[0].label} sits on link '{unknown[0].link}', "
-                "which the URDF does not have."
-            )
-        frames = [model.frames[self._frame(m.link)] for m in self.marker_set.markers]
-        self._marker_joint = np.array([f.parentJoint for f in frames], dtype=np.int64)
-        self._marker_in_joint = np.array(
-            [
-                f.placement.act(np.array(m.position))
-                for f, m in zip(frames, self.marker_set.markers, strict=True)
-            ]
-        ).reshape(-1, 3)
-        self._carried = []
-        for joint in np.unique(self._marker_joint):
-            rows = np.flatnonzero(self._marker_joint == joint)
-            self._carried.append((int(joint), rows, self._marker_in_joint[rows]))
-        self._moves = np.zeros((len(frames), model.nv))
-        for row, joint in zip(self._moves, self._marker_joint, strict=True):
-            for ancestor in model.supports[int(joint)][1:]:
-                start = model.idx_vs[ancestor]
-                row[start : start + model.nvs[ancestor]] = 1.0
-
-    def _place_markers(self) -> Array:
-        positions = np.empty_like(self._marker_in_joint)
-        for joint, rows, in_joint in self._carried:
-            pose = self._data.oMi[joint]
-            positions[rows] = in_joint @ pose.rotation.T + pose.translation
-        return positions
-
-    def _update_in_thorax(self, q: Array, *, jacobians: bool = False) -> None:
-        # With the thorax at the origin, the world frame is the thorax frame.
-        at_origin = self.neutral()
-        at_origin[_NQ_ROOT:] = q[-len(self.joint_names) :]
-        if jacobians:
-            pin.computeJointJacobians(self._model, self._data, at_origin)
-        else:
-            pin.forwardKinematics(self._model, self._data, at_origin)
+        return self._frames.swivel(q)

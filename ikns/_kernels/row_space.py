@@ -1,0 +1,192 @@
+"""Row space of a matrix and its rank, by Householder reflections.
+
+The reflections H_0 H_1 ... bring the rows, longest remaining one first, to triangular
+form (QR of the transpose with column pivoting; Businger and Golub 1965, Numer Math
+7:269). Axes 0 to rank - 1, reflected back, span the row space; the other axes span the
+null space. The smallest of m singular values is at least ``|r_mm| / 2^(m - 1)``, r_mm
+being the last length on the triangle's diagonal (Faddeev, Kublanovskaya and Faddeeva
+1968; Lawson and Hanson 1974, Solving Least Squares Problems, ch. 6). Where this cannot
+tell it from zero, plane rotations make the rows orthogonal, so that their lengths are
+the singular values (one-sided Jacobi; Hestenes 1958, J SIAM 6:51), and rows that count
+as zero are left out.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns._kernels.compiled import compiled
+
+__all__ = ["orthogonalize", "reflected_axis", "row_rank"]
+
+Floats = NDArray[np.float64]
+
+#: Rounding of a double.
+_EPS = 2.0**-52
+#: Squares stay far from overflow and underflow while their sum is in this range.
+_SMALL, _LARGE = 1e-200, 1e200
+#: Jacobi rotations converge quadratically, within ten sweeps for any size in use.
+_SWEEPS = 30
+
+
+@compiled
+def row_rank(rows: Floats, rtol: float, work: Floats, squares: Floats) -> int:
+    """Write the reflections of a (k, n) matrix to `work`; return its rank.
+
+    Singular values up to ``rtol * largest`` count as zero. -1 when an entry is not
+    finite. `work` is (k, n), `squares` (k,).
+    """
+    k, n = rows.shape
+    steps = min(k, n)
+    total = _copy(rows, 1.0, work, squares)
+    if _SMALL < total < _LARGE:
+        least = _reflect(work, steps, squares)
+        # The root of the sum of squares is at least the largest singular value.
+        if least > (rtol + k * n * _EPS) * math.sqrt(total):
+            return steps
+    return _careful_rank(rows, rtol, work, squares)
+
+
+@compiled
+def reflected_axis(work: Floats, rank: int, axis: int, row: Floats) -> None:
+    """Write axis number `axis` after the first `rank` reflections, (n,)."""
+    n = work.shape[1]
+    for j in range(n):
+        row[j] = 0.0
+    row[axis] = 1.0
+    for s in range(rank - 1, -1, -1):
+        dot = 0.0
+        for j in range(s, n):
+            dot += work[s, j] * row[j]
+        for j in range(s, n):
+            row[j] -= dot * work[s, j]
+
+
+@compiled
+def orthogonalize(rows: Floats, rtol: float, squares: Floats) -> int:
+    """Rotate the rows (k, n) of a matrix until orthogonal; return its rank.
+
+    `squares` (k,) gets the squares of the singular values, in no order; those up to
+    ``rtol * largest`` count as zero.
+    """
+    k, n = rows.shape
+    for _ in range(_SWEEPS):
+        rotated = False
+        for i in range(k - 1):
+            for j in range(i + 1, k):
+                ii, jj, ij = 0.0, 0.0, 0.0
+                for m in range(n):
+                    ii += rows[i, m] * rows[i, m]
+                    jj += rows[j, m] * rows[j, m]
+                    ij += rows[i, m] * rows[j, m]
+                if abs(ij) <= n * _EPS * math.sqrt(ii) * math.sqrt(jj):
+                    continue
+                rotated = True
+                zeta = (jj - ii) / (2.0 * ij)
+                t = 1.0 / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                if zeta < 0.0:
+                    t = -t
+                c = 1.0 / math.sqrt(1.0 + t * t)
+                for m in range(n):
+                    x, y = rows[i, m], rows[j, m]
+                    rows[i, m] = c * (x - t * y)
+                    rows[j, m] = c * (y + t * x)
+        if not rotated:
+            break
+    largest = 0.0
+    for i in range(k):
+        squares[i] = 0.0
+        for m in range(n):
+            squares[i] += rows[i, m] * rows[i, m]
+        if squares[i] > largest:
+            largest = squares[i]
+    rank = 0
+    for i in range(k):
+        if math.sqrt(squares[i]) > rtol * math.sqrt(largest):
+            rank += 1
+    return rank
+
+
+@compiled
+def _careful_rank(rows: Floats, rtol: float, work: Floats, squares: Floats) -> int:
+    """Do as :func:`row_rank` by way of the singular values, at any scale."""
+    scale = _scale(rows)
+    if not scale > 0.0:
+        return -1 if math.isnan(scale) else 0
+    _copy(rows, scale, work, squares)
+    rank = orthogonalize(work, rtol, squares)
+    _reflect(work, rank, squares)
+    return rank
+
+
+@compiled
+def _scale(rows: Floats) -> float:
+    """Power of two that brings the largest entry near 1; 0 of zeros, else NaN."""
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            if not math.isfinite(rows[i, j]):
+                return math.nan
+            if abs(rows[i, j]) > largest:
+                largest = abs(rows[i, j])
+    if largest == 0.0:
+        return 0.0
+    # An entry that is not a normal number asks for more than a double can hold.
+    return math.ldexp(1.0, min(-math.frexp(largest)[1], 1000))
+
+
+@compiled
+def _copy(rows: Floats, scale: float, work: Floats, squares: Floats) -> float:
+    """Copy a matrix, write the squares of its rows and return their sum."""
+    total = 0.0
+    for i in range(rows.shape[0]):
+        square = 0.0
+        for j in range(rows.shape[1]):
+            x = rows[i, j] * scale
+            work[i, j] = x
+            square += x * x
+        squares[i] = square
+        total += square
+    return total
+
+
+@compiled
+def _reflect(work: Floats, steps: int, squares: Floats) -> float:
+    """Reflect, longest row first; return a bound below the last singular value.
+
+    Row s becomes the vector v of ``H_s = 1 - v v'``. `squares` holds the squared
+    lengths of the rows, then of what is left of them.
+    """
+    k, n = work.shape
+    length, share = 0.0, 2.0
+    for s in range(steps):
+        longest = s
+        for i in range(s + 1, k):
+            if squares[i] > squares[longest]:
+                longest = i
+        length = math.sqrt(squares[longest])
+        share *= 0.5
+        if length == 0.0:
+            break
+        if longest != s:
+            squares[longest] = squares[s]
+            for j in range(n):
+                work[s, j], work[longest, j] = work[longest, j], work[s, j]
+        head = work[s, s] + math.copysign(length, work[s, s])
+        factor = 1.0 / math.sqrt(length * abs(head))
+        work[s, s] = head
+        for j in range(s, n):
+            work[s, j] *= factor
+        for i in range(s + 1, k):
+            dot = 0.0
+            for j in range(s, n):
+                dot += work[s, j] * work[i, j]
+            work[i, s] -= dot * work[s, s]
+            squares[i] = 0.0
+            for j in range(s + 1, n):
+                work[i, j] -= dot * work[s, j]
+                squares[i] += work[i, j] * work[i, j]
+    return length * share
