@@ -82,16 +82,18 @@ def test_minimum_is_the_one_that_an_independent_solver_finds(skeleton):
         beyond = np.maximum(q[7:] - skeleton.upper, 0) + np.minimum(
             q[7:] - skeleton.lower, 0
         )
-        moved = skeleton.difference(before, q)
+        turn = Rotation.from_quat(before[3:7]).inv() * Rotation.from_quat(q[3:7])
+        moved = [*(q[:3] - before[:3]), *turn.as_rotvec(), *(q - before)[7:]]
         error = (skeleton.markers_in_world(q) - seen).ravel()
-        return np.concatenate([error, PRIOR * moved, LIMIT * beyond])
+        return np.concatenate([error, PRIOR * np.array(moved), LIMIT * beyond])
 
     reference = least_squares(residuals, np.zeros(24), xtol=1e-14, ftol=1e-14)
     ours = residuals(skeleton.difference(before, pose.q))
     assert ours @ ours <= 2 * reference.cost * (1 + 1e-9)
-    # Ours stops at steps of 1e-5; convergence is linear with a ratio well below 1/2.
+    # Ours stops where the next step would be 5 % of 1e-5; theirs has finite differences
+    # of 1e-8 for a Jacobian.
     distance = skeleton.difference(skeleton.integrate(before, reference.x), pose.q)
-    assert np.abs(distance).max() < 2e-5
+    assert np.abs(distance).max() < 1e-6
 
 
 def test_unseen_markers_weigh_nothing(skeleton):
@@ -116,8 +118,8 @@ def test_moving_the_whole_laboratory_moves_only_the_thorax(skeleton):
     turn, shift = Rotation.random(random_state=5).as_matrix(), rng.normal(0, 3, 3)
     here = MarkerIK(skeleton).solve(seen)
     there = MarkerIK(skeleton).solve(seen @ turn.T + shift)
-    # Both within one step (1e-5) of the same minimum.
-    np.testing.assert_allclose(here.q[7:], there.q[7:], atol=1e-4)
+    # Both within 5 % of a step of 1e-5 of the same minimum.
+    np.testing.assert_allclose(here.q[7:], there.q[7:], atol=1e-6)
 
 
 def test_several_markers_vanishing_together_do_not_derail_the_track(skeleton):

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba import config, njit
 
 __all__ = ["compiled"]
 
+config: Any = numba.config
 _HERE = Path(__file__).parent
 _IMPORT = re.compile(r"^from ikns\._kernels\.(\w+) import", re.MULTILINE)
 
@@ -31,7 +31,8 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     asked = config.CACHE_DIR
     config.CACHE_DIR = str(folder or "")
     try:
-        return njit(cache=folder is not None, error_model="numpy", nogil=True)(function)
+        keep = folder is not None
+        return numba.njit(cache=keep, error_model="numpy", nogil=True)(function)
     finally:
         config.CACHE_DIR = asked
 

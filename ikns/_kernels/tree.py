@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 
-__all__ = ["FREE_FLYER", "PRISMATIC", "REVOLUTE", "Tree", "joint_axes", "place_joints"]
+__all__ = [
+    "FREE_FLYER",
+    "PRISMATIC",
+    "REVOLUTE",
+    "Tree",
+    "joint_axes",
+    "place_joint",
+    "place_joints",
+]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -54,58 +62,60 @@ class Tree(NamedTuple):
 def place_joints(tree: Tree, q: Floats, rotation: Floats, translation: Floats) -> None:
     """Write the joints' poses in the world, (J, 3, 3) and (J, 3) m."""
     for j in range(len(tree.kind)):
-        parent = tree.parent[j]
-        at = tree.first_q[j]
-        R, p = rotation[j], translation[j]
-        # The joint's placement in the world.
+        place_joint(tree, j, q, rotation, translation)
+
+
+@compiled
+def place_joint(
+    tree: Tree, j: int, q: Floats, rotation: Floats, translation: Floats
+) -> None:
+    """Write the pose of joint `j`, that of its parent being known."""
+    parent, at, kind = tree.parent[j], tree.first_q[j], tree.kind[j]
+    c, s, shift = 1.0, 0.0, 0.0
+    if kind == REVOLUTE:
+        c, s = np.cos(q[at]), np.sin(q[at])
+    elif kind == PRISMATIC:
+        shift = q[at]
+    # Entries and not slices: a slice counts references, which takes longer than this.
+    for a in range(3):
         if parent < 0:
-            R[:] = tree.rotation[j]
-            p[:] = tree.translation[j]
+            r0, r1 = tree.rotation[j, a, 0], tree.rotation[j, a, 1]
+            r2 = tree.rotation[j, a, 2]
+            p = tree.translation[j, a]
         else:
-            up, own, shift = rotation[parent], tree.rotation[j], tree.translation[j]
-            for a in range(3):
-                for b in range(3):
-                    R[a, b] = (
-                        up[a, 0] * own[0, b]
-                        + up[a, 1] * own[1, b]
-                        + up[a, 2] * own[2, b]
-                    )
-                p[a] = (
-                    translation[parent, a]
-                    + up[a, 0] * shift[0]
-                    + up[a, 1] * shift[1]
-                    + up[a, 2] * shift[2]
-                )
-        # Its own motion.
-        if tree.kind[j] == REVOLUTE:
-            c, s = np.cos(q[at]), np.sin(q[at])
-            for a in range(3):
-                x, y = R[a, 0], R[a, 1]
-                R[a, 0] = c * x + s * y
-                R[a, 1] = c * y - s * x
-        elif tree.kind[j] == PRISMATIC:
-            for a in range(3):
-                p[a] += q[at] * R[a, 2]
-        else:
-            x, y, z, w = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
-            for a in range(3):
-                r0, r1, r2 = R[a, 0], R[a, 1], R[a, 2]
-                p[a] += r0 * q[at] + r1 * q[at + 1] + r2 * q[at + 2]
-                R[a, 0] = (
-                    r0 * (1 - 2 * (y * y + z * z))
-                    + r1 * 2 * (x * y + w * z)
-                    + r2 * 2 * (x * z - w * y)
-                )
-                R[a, 1] = (
-                    r0 * 2 * (x * y - w * z)
-                    + r1 * (1 - 2 * (x * x + z * z))
-                    + r2 * 2 * (y * z + w * x)
-                )
-                R[a, 2] = (
-                    r0 * 2 * (x * z + w * y)
-                    + r1 * 2 * (y * z - w * x)
-                    + r2 * (1 - 2 * (x * x + y * y))
-                )
+            u0, u1 = rotation[parent, a, 0], rotation[parent, a, 1]
+            u2 = rotation[parent, a, 2]
+            r0 = u0 * tree.rotation[j, 0, 0] + u1 * tree.rotation[j, 1, 0]
+            r1 = u0 * tree.rotation[j, 0, 1] + u1 * tree.rotation[j, 1, 1]
+            r2 = u0 * tree.rotation[j, 0, 2] + u1 * tree.rotation[j, 1, 2]
+            r0 += u2 * tree.rotation[j, 2, 0]
+            r1 += u2 * tree.rotation[j, 2, 1]
+            r2 += u2 * tree.rotation[j, 2, 2]
+            p = u0 * tree.translation[j, 0] + u1 * tree.translation[j, 1]
+            p += u2 * tree.translation[j, 2] + translation[parent, a]
+        rotation[j, a, 0], rotation[j, a, 1] = c * r0 + s * r1, c * r1 - s * r0
+        rotation[j, a, 2] = r2
+        translation[j, a] = p + shift * r2
+    if kind == FREE_FLYER:
+        x, y, z, w = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
+        for a in range(3):
+            r0, r1, r2 = rotation[j, a, 0], rotation[j, a, 1], rotation[j, a, 2]
+            translation[j, a] += r0 * q[at] + r1 * q[at + 1] + r2 * q[at + 2]
+            rotation[j, a, 0] = (
+                r0 * (1 - 2 * (y * y + z * z))
+                + r1 * 2 * (x * y + w * z)
+                + r2 * 2 * (x * z - w * y)
+            )
+            rotation[j, a, 1] = (
+                r0 * 2 * (x * y - w * z)
+                + r1 * (1 - 2 * (x * x + z * z))
+                + r2 * 2 * (y * z + w * x)
+            )
+            rotation[j, a, 2] = (
+                r0 * 2 * (x * z + w * y)
+                + r1 * 2 * (y * z - w * x)
+                + r2 * (1 - 2 * (x * x + y * y))
+            )
 
 
 @compiled
@@ -117,29 +127,35 @@ def joint_axes(tree: Tree, rotation: Floats, translation: Floats, axes: Floats) 
     are linear and angular velocity in its own frame.
     """
     for j in range(len(tree.kind)):
-        at = tree.first_v[j]
-        R, p = rotation[j], translation[j]
-        if tree.kind[j] == REVOLUTE:
-            _turning(R, p, 2, axes[at])
-        elif tree.kind[j] == PRISMATIC:
-            _sliding(R, 2, axes[at])
+        kind, at = tree.kind[j], tree.first_v[j]
+        if kind == FREE_FLYER:
+            for k in range(6):
+                turning = REVOLUTE if k >= 3 else PRISMATIC
+                _axis(rotation, translation, j, k % 3, turning, axes, at + k)
         else:
-            for k in range(3):
-                _sliding(R, k, axes[at + k])
-                _turning(R, p, k, axes[at + 3 + k])
+            _axis(rotation, translation, j, 2, kind, axes, at)
 
 
 @compiled
-def _sliding(R: Floats, k: int, twist: Floats) -> None:
-    for a in range(3):
-        twist[a] = R[a, k]
-        twist[3 + a] = 0.0
-
-
-@compiled
-def _turning(R: Floats, p: Floats, k: int, twist: Floats) -> None:
-    x, y, z = R[0, k], R[1, k], R[2, k]
-    twist[0] = p[1] * z - p[2] * y
-    twist[1] = p[2] * x - p[0] * z
-    twist[2] = p[0] * y - p[1] * x
-    twist[3], twist[4], twist[5] = x, y, z
+def _axis(
+    rotation: Floats,
+    translation: Floats,
+    j: int,
+    k: int,
+    kind: int,
+    axes: Floats,
+    d: int,
+) -> None:
+    """Write the twist along (prismatic) or about axis k of joint j in row d."""
+    x, y, z = rotation[j, 0, k], rotation[j, 1, k], rotation[j, 2, k]
+    if kind == PRISMATIC:
+        axes[d, 0], axes[d, 1], axes[d, 2] = x, y, z
+        axes[d, 3], axes[d, 4], axes[d, 5] = 0.0, 0.0, 0.0
+    else:
+        p0, p1, p2 = translation[j, 0], translation[j, 1], translation[j, 2]
+        axes[d, 0], axes[d, 1], axes[d, 2] = (
+            p1 * z - p2 * y,
+            p2 * x - p0 * z,
+            p0 * y - p1 * x,
+        )
+        axes[d, 3], axes[d, 4], axes[d, 5] = x, y, z

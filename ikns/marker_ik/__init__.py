@@ -1,5 +1,9 @@
-"""Marker inverse kinematics: the joint angles that put markers where they were seen."""
+"""Marker inverse kinematics: the joint angles that put markers where they were seen.
 
-from ikns.marker_ik.reference import LIMIT, PRIOR, MarkerIK, Pose, motion_from_poses
+The formula is in `solver`; `reference` solves it plainly, `kernel` compiled.
+"""
 
-__all__ = ["LIMIT", "PRIOR", "MarkerIK", "Pose", "motion_from_poses"]
+from ikns.marker_ik.pose import LIMIT, PRIOR, Pose
+from ikns.marker_ik.solver import MarkerIK
+
+__all__ = ["LIMIT", "PRIOR", "MarkerIK", "Pose"]

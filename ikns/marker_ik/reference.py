@@ -1,134 +1,54 @@
-"""Marker inverse kinematics: the joint angles that put markers where they were seen.
+"""The plain solver: Levenberg-Marquardt (More 1978) with Pinocchio's Jacobians.
 
-Each frame minimizes, over the configuration q,
-
-    sum over seen markers weight_m |p_m(q) - seen_m|^2         marker distances, m^2
-    + (PRIOR |q - q_before|)^2                        weak pull to the pose before
-    + (LIMIT max(0, lower - q, q - upper))^2          soft joint limits
-
-by Levenberg-Marquardt (More 1978) with Pinocchio's Jacobians. A marker that was not
-seen weighs nothing; what no marker shows stays where it was.
+What the compiled one is checked against, and what solves bodies with joints that the
+compiled one does not know.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.spatial.transform import Rotation
 
-from ikns.derivative import slope
-from ikns.errors import InvalidInput, MarkerMismatch
-from ikns.motion import SIDES, Motion
-from ikns.recording import Recording
+from ikns.marker_ik.pose import (
+    LIMIT,
+    LOST,
+    PRIOR,
+    PRIOR_FROM_SCRATCH,
+    Pose,
+    starting_poses,
+)
+from ikns.motion import SIDES
 from ikns.rigid import rigid_transform
 from ikns.skeleton import Skeleton
 
-__all__ = ["MarkerIK", "Pose", "motion_from_poses"]
+__all__ = ["ReferenceSolver"]
 
 Array = NDArray[np.float64]
 
-#: Pull towards the pose before, m/rad and m/m: the ratio of marker noise (1 mm) to
-#: what a joint typically turns within a frame (5 rad/s at 100 Hz is 0.05 rad). A joint
-#: with markers 50 mm from its axis lags by (0.02 / 0.05)^2 = 16 % of a frame, one with
-#: 200 mm by 1 %; what markers barely show no longer jitters.
-PRIOR = 2e-2
-#: The same from scratch, where the start is a guess: it only settles unseen joints.
-PRIOR_FROM_SCRATCH = 5e-4
-#: Stiffness of the joint limits, m/rad: 10 deg beyond a limit costs as much as 9 mm.
-LIMIT = 0.05
-#: A frame has converged when no joint moves more than this in a step, rad and m.
-STEP_TOLERANCE = 1e-5
-#: Root mean square residual above which a frame is also tried from scratch, m. Soft
-#: tissue and modeling leave 10 to 20 mm (stoop lifts, see benchmarks/real_people.py).
-LOST = 0.06
-#: Arm poses to start from when nothing is known: hanging, forearm forward, reaching
-#: forward, reaching sideways, hand at the mouth, hand overhead; rad.
-_STARTS: tuple[dict[str, float], ...] = (
-    {},
-    {"elbow_flexion": 1.4},
-    {"shoulder_flexion": 1.2, "elbow_flexion": 0.4},
-    {"shoulder_abduction": 1.4, "elbow_flexion": 0.3},
-    {"shoulder_flexion": 0.9, "shoulder_rotation": 0.5, "elbow_flexion": 2.2},
-    {"shoulder_abduction": 2.2, "elbow_flexion": 0.8},
-)
 
+class ReferenceSolver:
+    """Solve frames for one skeleton; the arguments are those of `MarkerIK`."""
 
-@dataclass(frozen=True, eq=False)
-class Pose:
-    """One solved frame.
-
-    Parameters
-    ----------
-    q : (nq,) array
-        Configuration.
-    residual : float
-        Root mean square marker distance over the seen markers, m; NaN without any.
-    iterations : int
-        Steps tried.
-    converged : bool
-        Whether the last step met the tolerance.
-    """
-
-    q: Array
-    residual: float
-    iterations: int
-    converged: bool
-
-
-class MarkerIK:
-    """Solve for joint angles, frame by frame, each starting from the one before.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Body and markers; static-only markers weigh nothing.
-    max_iterations : int
-        Levenberg-Marquardt steps per frame.
-    """
-
-    def __init__(self, skeleton: Skeleton, *, max_iterations: int = 50) -> None:
+    def __init__(
+        self, skeleton: Skeleton, *, max_iterations: int, tolerance: float
+    ) -> None:
         self.skeleton = skeleton
         self.max_iterations = max_iterations
-        self.held = skeleton.marker_set.held
-        fixed = skeleton.columns(self.held)
+        self.tolerance = tolerance
+        fixed = skeleton.columns(skeleton.marker_set.held)
         self._free = np.setdiff1d(np.arange(skeleton.nv), fixed)
         worn = skeleton.marker_set.markers
         self._tracked = np.array([not marker.static_only for marker in worn])
         self._weight = np.sqrt([marker.weight for marker in worn])
 
-    def solve(self, markers: ArrayLike, q: Array | None = None) -> Pose:
-        """Solve one frame.
-
-        Parameters
-        ----------
-        markers : (M, 3) array
-            Positions in the world (m) in the order of the skeleton's marker set; NaN
-            where not seen.
-        q : (nq,) array, optional
-            The pose before; without it the solver starts from scratch.
-
-        Returns
-        -------
-        Pose
-            With every marker gone it is the pose before, residual NaN, not converged.
-        """
-        seen = np.array(markers, dtype=np.float64)
-        expected = (len(self._tracked), 3)
-        if seen.shape != expected:
-            raise InvalidInput(f"expected markers {expected}, found {seen.shape}.")
-        if np.isinf(seen).any():
-            raise InvalidInput(
-                "marker positions must be finite or NaN, found infinity."
-            )
-        if q is not None and not np.isfinite(q).all():
-            raise InvalidInput("the pose before must be finite, found NaN or infinity.")
+    def solve(self, markers: Array, q: Array | None) -> Pose:
+        """Solve one frame of markers (M, 3); NaN where not seen."""
+        seen = markers.copy()
         seen[~self._tracked] = np.nan
         if not np.isfinite(seen).all(axis=1).any():
-            start = self.skeleton.neutral() if q is None else q
+            start = self.skeleton.neutral() if q is None else np.array(q)
             return Pose(start, float("nan"), 0, False)
         if q is None:
             return self._from_scratch(seen)
@@ -138,60 +58,33 @@ class MarkerIK:
             pose = again if again.residual < pose.residual else pose
         return pose
 
-    def track(
+    def solve_many(
         self,
-        recording: Recording,
-        *,
-        progress: Callable[[int, int], None] | None = None,
-    ) -> Motion:
-        """Solve a whole recording.
+        markers: Array,
+        first: int,
+        last: int,
+        way: int,
+        q: Array,
+        residual: Array,
+        iterations: NDArray[np.int64],
+        converged: NDArray[np.bool_],
+    ) -> None:
+        """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
 
-        Parameters
-        ----------
-        recording : Recording
-            Any recording that holds at least three of the skeleton's markers.
-        progress : callable, optional
-            Called with (frames done, frames in all).
-
-        Raises
-        ------
-        MarkerMismatch
-            When fewer than three of the skeleton's markers are in the recording.
+        Markers are (T, M, 3); the others (T, ...) are written, each frame starting from
+        the one beside it.
         """
-        marker_set = self.skeleton.marker_set
-        known = (marker_set.columns(recording.labels) >= 0) & self._tracked
-        if known.sum() < 3:
-            raise MarkerMismatch(
-                f"{recording.source}: expected markers of {marker_set.name} "
-                f"({', '.join(marker_set.labels[:4])}, ...), found "
-                f"{', '.join(recording.labels[:4])}, ...; name the right marker set."
-            )
-        markers = marker_set.pick(recording.labels, recording.markers)
-        n, done = len(markers), 1
-        # Start where most markers are seen, then go both ways.
-        visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
-        start = int(np.argmax(visible))
-        first = self.solve(markers[start])
-        poses = [first] * n
-        for way in (range(start + 1, n), range(start - 1, -1, -1)):
-            before = first
-            for i in way:
-                poses[i] = before = self.solve(markers[i], before.q)
-                done += 1
-                if progress is not None and (done % 100 == 0 or done == n):
-                    progress(done, n)
-        return motion_from_poses(self.skeleton, recording.time, poses)
+        for i in range(first, last, way):
+            pose = self.solve(markers[i], q[i - way])
+            q[i], residual[i] = pose.q, pose.residual
+            iterations[i], converged[i] = pose.iterations, pose.converged
 
     def _from_scratch(self, seen: Array) -> Pose:
         """Try several arm poses, then join each side's best."""
         skeleton = self.skeleton
         finite = np.isfinite(seen).all(axis=1)
         solved = []
-        for start in _STARTS:
-            q = skeleton.neutral()
-            for joint, angle in start.items():
-                for side in SIDES:
-                    q[7 + skeleton.joint_names.index(f"{side}_{joint}")] = angle
+        for q in starting_poses(skeleton):
             model = skeleton.markers_in_world(q)
             if finite.sum() >= 3:
                 rotation, shift = rigid_transform(model[finite], seen[finite])
@@ -229,7 +122,7 @@ class MarkerIK:
             error = (weight * (positions[rows] - target)).ravel()
             J = weight[:, None] * jacobian[rows][:, :, free]
             J = J.reshape(len(error), len(free))
-            moved = skeleton.difference(before, q)[free]
+            moved = _displacement(before, q)[free]
             beyond, outside = self._beyond(q)
             diagonal = pull**2 + LIMIT**2 * outside[free]
             hessian = J.T @ J
@@ -259,7 +152,7 @@ class MarkerIK:
                 trial_positions, trial_jacobian = skeleton.marker_jacobian(trial)
                 error = weight * (trial_positions[rows] - target)
                 trial_cost = self._cost(error, before, trial, pull)
-                small = np.abs(full).max() < STEP_TOLERANCE
+                small = np.abs(full).max() < self.tolerance
                 if trial_cost <= cost:
                     q, cost = trial, trial_cost
                     positions, jacobian = trial_positions, trial_jacobian
@@ -276,7 +169,7 @@ class MarkerIK:
         return Pose(q, float(np.sqrt(np.mean(distance**2))), iterations, converged)
 
     def _cost(self, error: Array, before: Array, q: Array, pull: float) -> float:
-        moved = self.skeleton.difference(before, q)
+        moved = _displacement(before, q)
         beyond, _ = self._beyond(q)
         return float(
             np.sum(error**2) + pull**2 * (moved @ moved) + LIMIT**2 * (beyond @ beyond)
@@ -293,24 +186,12 @@ class MarkerIK:
         return beyond, (beyond != 0).astype(np.float64)
 
 
-def motion_from_poses(skeleton: Skeleton, time: Array, poses: Sequence[Pose]) -> Motion:
-    """Add hands, and velocities by :func:`ikns.derivative.slope`, to solved frames."""
-    q = np.stack([pose.q for pose in poses])
-    hands = [skeleton.hands_in_thorax(row) for row in q]
-    hand_in_thorax = np.stack([position for position, _ in hands])
-    steps = np.zeros((len(q), skeleton.nv))
-    for i in range(1, len(q)):
-        steps[i] = skeleton.difference(q[i - 1], q[i])
-    return Motion(
-        time=np.array(time),
-        q=q,
-        v=slope(np.cumsum(steps, axis=0), time),
-        joint_names=skeleton.joint_names,
-        hand_in_thorax=hand_in_thorax,
-        hand_rotation_in_thorax=np.stack([rotation for _, rotation in hands]),
-        hand_velocity_in_thorax=slope(hand_in_thorax, time),
-        residual=np.array([pose.residual for pose in poses]),
-        iterations=np.array([pose.iterations for pose in poses]),
-        converged=np.array([pose.converged for pose in poses]),
-        held=skeleton.marker_set.held,
-    )
+def _displacement(before: Array, q: Array) -> Array:
+    """How far `q` is from `before`: the thorax's shift and turn, the joints' angles.
+
+    The shift is seen from the thorax at `q`, so that this is half the gradient of its
+    own square.
+    """
+    now, then = Rotation.from_quat(q[3:7]), Rotation.from_quat(before[3:7])
+    turn = (then.inv() * now).as_rotvec()
+    return np.concatenate([now.inv().apply(q[:3] - before[:3]), turn, (q - before)[7:]])

@@ -1,0 +1,190 @@
+"""Marker inverse kinematics: the joint angles that put markers where they were seen.
+
+Each frame minimizes, over the configuration q,
+
+    sum over seen markers weight_m |p_m(q) - seen_m|^2         marker distances, m^2
+    + (PRIOR |q - q_before|)^2                        weak pull to the pose before
+    + (LIMIT max(0, lower - q, q - upper))^2          soft joint limits
+
+A marker that was not seen weighs nothing; what no marker shows stays where it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.derivative import slope
+from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.marker_ik.kernel import KernelSolver
+from ikns.marker_ik.pose import STEP_TOLERANCE, Pose
+from ikns.marker_ik.reference import ReferenceSolver
+from ikns.motion import Motion
+from ikns.recording import Recording
+from ikns.skeleton import Skeleton
+
+__all__ = ["MarkerIK"]
+
+Array = NDArray[np.float64]
+
+#: Frames between two reports of progress: milliseconds when compiled.
+_CHUNK = 500
+
+
+class MarkerIK:
+    """Solve for joint angles, frame by frame, each starting from the one before.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Body and markers; static-only markers weigh nothing.
+    max_iterations : int
+        Steps per frame.
+    tolerance : float
+        A frame has converged when no joint moves more than this in a step, rad and m.
+    compiled : bool
+        The plain solver finds the same minimum a hundred times as slowly; it is what
+        the compiled one is checked against.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        *,
+        max_iterations: int = 50,
+        tolerance: float = STEP_TOLERANCE,
+        compiled: bool = True,
+    ) -> None:
+        if max_iterations < 1 or not tolerance > 0:
+            raise InvalidInput(
+                "expected at least one iteration and a tolerance above 0, found "
+                f"{max_iterations} and {tolerance:g}."
+            )
+        self.skeleton = skeleton
+        self.max_iterations = max_iterations
+        self.tolerance = tolerance
+        self.held = skeleton.marker_set.held
+        worn = skeleton.marker_set.markers
+        self._tracked = np.array([not marker.static_only for marker in worn])
+        self.solver = (KernelSolver if compiled else ReferenceSolver)(
+            skeleton, max_iterations=max_iterations, tolerance=tolerance
+        )
+
+    def solve(self, markers: ArrayLike, q: Array | None = None) -> Pose:
+        """Solve one frame.
+
+        Parameters
+        ----------
+        markers : (M, 3) array
+            Positions in the world (m) in the order of the skeleton's marker set; NaN
+            where not seen.
+        q : (nq,) array, optional
+            The pose before; without it the solver starts from scratch.
+
+        Returns
+        -------
+        Pose
+            With every marker gone it is the pose before, residual NaN, not converged.
+        """
+        seen = np.ascontiguousarray(markers, dtype=np.float64)
+        expected = (len(self._tracked), 3)
+        if seen.shape != expected:
+            raise InvalidInput(f"expected markers {expected}, found {seen.shape}.")
+        if np.isinf(seen).any():
+            raise InvalidInput(
+                "marker positions must be finite or NaN, found infinity."
+            )
+        if q is not None:
+            q = np.ascontiguousarray(q, dtype=np.float64)
+            if q.shape != (7 + len(self.skeleton.joint_names),):
+                raise InvalidInput(
+                    f"expected a pose ({7 + len(self.skeleton.joint_names)},), found "
+                    f"{q.shape}."
+                )
+            if not np.isfinite(q).all():
+                raise InvalidInput(
+                    "the pose before must be finite, found NaN or infinity."
+                )
+        return self.solver.solve(seen, q)
+
+    def track(
+        self,
+        recording: Recording,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Motion:
+        """Solve a whole recording.
+
+        Parameters
+        ----------
+        recording : Recording
+            Any recording that holds at least three of the skeleton's markers.
+        progress : callable, optional
+            Called with (frames done, frames in all).
+
+        Raises
+        ------
+        MarkerMismatch
+            When fewer than three of the skeleton's markers are in the recording.
+        """
+        marker_set = self.skeleton.marker_set
+        known = (marker_set.columns(recording.labels) >= 0) & self._tracked
+        if known.sum() < 3:
+            raise MarkerMismatch(
+                f"{recording.source}: expected markers of {marker_set.name} "
+                f"({', '.join(marker_set.labels[:4])}, ...), found "
+                f"{', '.join(recording.labels[:4])}, ...; name the right marker set."
+            )
+        markers = np.ascontiguousarray(
+            marker_set.pick(recording.labels, recording.markers), dtype=np.float64
+        )
+        n = len(markers)
+        # Start where most markers are seen, then go both ways.
+        visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
+        start = int(np.argmax(visible))
+        first = self.solve(markers[start])
+        q = np.empty((n, len(first.q)))
+        residual, iterations = np.empty(n), np.empty(n, dtype=np.int64)
+        converged = np.empty(n, dtype=np.bool_)
+        q[start], residual[start] = first.q, first.residual
+        iterations[start], converged[start] = first.iterations, first.converged
+        frames = (q, residual, iterations, converged)
+        done = 1
+        for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
+            for at in range(begin, end, way * _CHUNK):
+                stop = min(at + _CHUNK, n) if way == 1 else max(at - _CHUNK, -1)
+                self.solver.solve_many(markers, at, stop, way, *frames)
+                done += abs(stop - at)
+                if progress is not None:
+                    progress(done, n)
+        return self._motion(recording.time, *frames)
+
+    def _motion(
+        self,
+        time: Array,
+        q: Array,
+        residual: Array,
+        iterations: NDArray[np.int64],
+        converged: NDArray[np.bool_],
+    ) -> Motion:
+        """Add hands, and velocities by :func:`ikns.derivative.slope`."""
+        skeleton = self.skeleton
+        position, rotation = skeleton.hands_in_thorax(q)
+        steps = np.zeros((len(q), skeleton.nv))
+        for i in range(1, len(q)):
+            steps[i] = skeleton.difference(q[i - 1], q[i])
+        return Motion(
+            time=np.array(time),
+            q=q,
+            v=slope(np.cumsum(steps, axis=0), time),
+            joint_names=skeleton.joint_names,
+            hand_in_thorax=position,
+            hand_rotation_in_thorax=rotation,
+            hand_velocity_in_thorax=slope(position, time),
+            residual=residual,
+            iterations=iterations,
+            converged=converged,
+            held=self.held,
+        )
