@@ -289,7 +289,7 @@ def _for_kernels(array: NDArray[np.float64]) -> NDArray[np.float64]:
 def _rows(rows: ArrayLike) -> NDArray[np.float64]:
     """Rows that may span a subspace."""
     array = np.asarray(rows, dtype=np.float64)
-    if array.ndim < 2 or 0 in array.shape or not np.isfinite(array).all():
+    if array.ndim < 2 or 0 in array.shape[-2:] or not np.isfinite(array).all():
         raise InvalidInput(
             f"expected a subspace as finite rows (..., p, n), found {array.shape}."
         )
