@@ -1,5 +1,6 @@
 from .calibration import calibrate as calibrate
 from .compare import compare as compare
+from .control import FrameSolver as FrameSolver
 from .errors import IknsError as IknsError
 from .files import read as read
 from .files import write_c3d as write_c3d

@@ -20,7 +20,7 @@ from ikns.motion import Motion, chain_sides
 from ikns.recording import Recording
 from ikns.skeleton import Skeleton
 
-__all__ = ["in_sight", "track_chain"]
+__all__ = ["in_sight", "sight_needs", "track_chain"]
 
 #: Markers that fix the thorax, to which all else is relative. A limb needs fewer: its
 #: joints tie it to the thorax.
@@ -75,6 +75,18 @@ def track_chain(
     )
 
 
+def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], int]]:
+    """By link of a chain, and the thorax: its markers, and how many must be seen."""
+    columns: dict[str, list[int]] = {}
+    for column, marker in enumerate(skeleton.marker_set.markers):
+        if marker.link.startswith(("thorax", *chain_sides(chain))):
+            columns.setdefault(marker.link, []).append(column)
+    return {
+        link: (own, min(_FIX, len(own)) if link == "thorax" else 1)
+        for link, own in columns.items()
+    }
+
+
 def in_sight(
     skeleton: Skeleton, recording: Recording, chain: str
 ) -> dict[str, NDArray[np.bool_]]:
@@ -95,13 +107,8 @@ def in_sight(
     worn = skeleton.marker_set
     markers = worn.pick(recording.labels, recording.markers)
     seen = np.all(np.isfinite(markers), axis=2)
-    columns: dict[str, list[int]] = {}
-    for column, marker in enumerate(worn.markers):
-        if marker.link.startswith(("thorax", *chain_sides(chain))):
-            columns.setdefault(marker.link, []).append(column)
     shown = {}
-    for link, own in columns.items():
-        need = min(_FIX, len(own)) if link == "thorax" else 1
+    for link, (own, need) in sight_needs(skeleton, chain).items():
         shown[link] = np.count_nonzero(seen[:, own], axis=1) >= need
         if not shown[link].any():
             raise MarkerMismatch(

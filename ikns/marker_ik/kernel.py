@@ -14,15 +14,17 @@ from ikns._kernels.tree import Tree
 from ikns.marker_ik.pose import (
     LIMIT,
     LOST,
+    MAX_ITERATIONS,
     PRIOR,
     PRIOR_FROM_SCRATCH,
+    STEP_TOLERANCE,
     Pose,
     starting_poses,
 )
 from ikns.motion import SIDES
 from ikns.skeleton import Skeleton
 
-__all__ = ["KernelSolver", "marker_problem"]
+__all__ = ["KernelSolver", "marker_problem", "tree_paths"]
 
 Array = NDArray[np.float64]
 
@@ -37,7 +39,7 @@ def marker_problem(
     held = skeleton.columns(skeleton.marker_set.held)
     free = np.ones(skeleton.nv)
     free[np.isin(np.arange(skeleton.nv), held)] = 0.0
-    path, depth = _paths(skeleton.tree)
+    path, depth = tree_paths(skeleton.tree)
     n_joints = len(skeleton.joint_names)
     angle = np.full(skeleton.nv, -1, dtype=np.int64)
     starts = starting_poses(skeleton)
@@ -74,7 +76,11 @@ class KernelSolver:
     """Solve frames for one skeleton; the arguments are those of `MarkerIK`."""
 
     def __init__(
-        self, skeleton: Skeleton, *, max_iterations: int, tolerance: float
+        self,
+        skeleton: Skeleton,
+        *,
+        max_iterations: int = MAX_ITERATIONS,
+        tolerance: float = STEP_TOLERANCE,
     ) -> None:
         self.problem = marker_problem(
             skeleton, max_iterations=max_iterations, tolerance=tolerance
@@ -139,7 +145,7 @@ class KernelSolver:
         solve_frames(*self.packed, markers, *span, start, scratch, self.work, *frames)
 
 
-def _paths(tree: Tree) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def tree_paths(tree: Tree) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Each degree of freedom's way from the root; see the kernels' `tree_cholesky`."""
     ways: list[list[int]] = []
     for d, parent in enumerate(tree.dof_parent.tolist()):

@@ -13,6 +13,7 @@ from ikns.skeleton import Skeleton
 __all__ = [
     "LIMIT",
     "LOST",
+    "MAX_ITERATIONS",
     "PRIOR",
     "PRIOR_FROM_SCRATCH",
     "STEP_TOLERANCE",
@@ -33,6 +34,8 @@ PRIOR_FROM_SCRATCH = 5e-4
 LIMIT = 0.05
 #: A frame has converged when no joint moves more than this in a step, rad and m.
 STEP_TOLERANCE = 1e-5
+#: Steps after which a frame is given up; from scratch it takes about twenty.
+MAX_ITERATIONS = 50
 #: Root mean square residual above which a frame is also tried from scratch, m. Soft
 #: tissue and modeling leave 10 to 20 mm (stoop lifts, see benchmarks/real_people.py).
 LOST = 0.06

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.derivative import slope
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.marker_ik.kernel import KernelSolver
-from ikns.marker_ik.pose import STEP_TOLERANCE, Pose
+from ikns.marker_ik.pose import MAX_ITERATIONS, STEP_TOLERANCE, Pose
 from ikns.marker_ik.reference import ReferenceSolver
 from ikns.motion import Motion
 from ikns.recording import Recording
@@ -53,7 +53,7 @@ class MarkerIK:
         self,
         skeleton: Skeleton,
         *,
-        max_iterations: int = 50,
+        max_iterations: int = MAX_ITERATIONS,
         tolerance: float = STEP_TOLERANCE,
         compiled: bool = True,
     ) -> None:

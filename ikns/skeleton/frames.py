@@ -56,7 +56,7 @@ class Frames:
         angles, batch = self._angles(q)
         position = np.empty((len(angles), len(links), 3))
         rotation = np.empty((*position.shape, 3))
-        place_frames(self._paths(tuple(links), ()), angles, rotation, position)
+        place_frames(self.paths(tuple(links)), angles, rotation, position)
         shape = (*batch, *position.shape[1:])
         return position.reshape(shape), rotation.reshape(*shape, 3)
 
@@ -69,7 +69,7 @@ class Frames:
         rows = 6 if task == "pose" else 3
         angles, batch = self._angles(q)
         jacobian = np.zeros((len(angles), rows * len(hands), len(joints)))
-        write_jacobians(self._paths(hands, joints), angles, rows, jacobian)
+        write_jacobians(self.paths(hands, joints), angles, rows, jacobian)
         return jacobian.reshape(*batch, *jacobian.shape[1:])
 
     def swivel(self, q: ArrayLike) -> Array:
@@ -103,7 +103,9 @@ class Frames:
         # A copy, as the kernels are compiled for arrays that can be written.
         return np.array(array[..., -n:], order="C").reshape(-1, n), array.shape[:-1]
 
-    def _paths(self, links: tuple[str, ...], columns: tuple[str, ...]) -> Paths:
+    def paths(
+        self, links: tuple[str, ...], columns: tuple[str, ...] = ()
+    ) -> Paths:
         """Ways from the thorax to the links, made once."""
         if (links, columns) not in self._known:
             self._known[links, columns] = self._paths_to(links, columns)

@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from ikns._kernels.paths import Paths
 from ikns._kernels.tree import Tree
 from ikns.anthropometry import Segment, segments
 from ikns.body import (
@@ -254,6 +255,11 @@ class Skeleton:
         hands = [self._frames.in_tree(f"{side}_knuckle") for side in SIDES]
         joint, rotation, translation = zip(*hands, strict=True)
         return np.array(joint), np.stack(rotation), np.stack(translation)
+
+    @cached_property
+    def hand_paths(self) -> Paths:
+        """From the thorax to the right and the left knuckle frame."""
+        return self._frames.paths(tuple(f"{side}_knuckle" for side in SIDES))
 
     @cached_property
     def _frames(self) -> Frames:

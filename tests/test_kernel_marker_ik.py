@@ -1,0 +1,382 @@
+"""The compiled marker inverse kinematics: each part by itself, then against the plain
+solver, on simulated and on real recordings."""
+
+import threading
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from ikns._kernels.normal_equations import MOMENTS, linearize
+from ikns._kernels.rigid import rigid_pose
+from ikns._kernels.step import displacement, integrate
+from ikns._kernels.tree import joint_axes, place_joints
+from ikns._kernels.tree_cholesky import factor, solve
+from ikns.files import read
+from ikns.marker_ik import LIMIT, PRIOR, MarkerIK
+from ikns.marker_ik.kernel import tree_paths
+from ikns.rigid import rigid_transform
+from ikns.scaling import scale
+from ikns.skeleton import Skeleton
+from ikns.skeleton.tree import joint_tree
+
+# The compiled solver leaves less than 5 % of its tolerance of 1e-5 rad, the plain one,
+# asked for steps below 1e-10, at most a few hundred of those steps (it converges
+# linearly, by 1 % a step where markers disagree with the body by centimeters).
+AGREEMENT = 1e-6
+
+
+def branched_model(seed):
+    """A free root, two limbs with turning and sliding joints, axes anywhere."""
+    rng = np.random.default_rng(seed)
+    model = pin.Model()
+    root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    for limb in range(2):
+        joint = root
+        for k in range(4):
+            axis = rng.normal(size=3)
+            axis /= np.linalg.norm(axis)
+            kinds = (pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned)
+            kind = kinds[k == 2 - limb]
+            place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0, 0.3, 3))
+            joint = model.addJoint(joint, kind(axis), place, f"{limb}{k}")
+    return model
+
+
+def linearized(model, q, joint, position, weight, target):
+    """Gradient, Gauss-Newton Hessian and curvature as full matrices."""
+    tree, turned = joint_tree(model)
+    path, depth = tree_paths(tree)
+    J, n = len(tree.kind), model.nv
+    rotation, translation = np.empty((J, 3, 3)), np.empty((J, 3))
+    axes = np.empty((n, 6))
+    place_joints(tree, q, rotation, translation)
+    joint_axes(tree, rotation, translation, axes)
+    local = np.einsum("mji,mj->mi", turned[joint], position)
+    x = np.einsum("mij,mj->mi", rotation[joint], local) + translation[joint]
+    gradient, hessian, curvature = (
+        np.empty(n),
+        np.zeros(path.shape),
+        np.zeros(path.shape),
+    )
+    linearize(
+        tree, path, depth, axes, joint, weight, x, x - target,
+        np.empty((J, MOMENTS)), np.empty((n, 9)), gradient, hessian, curvature,
+    )  # fmt: skip
+    full = np.zeros((2, n, n))
+    for d in range(n):
+        for a in range(depth[d] + 1):
+            i = path[d, a]
+            full[:, d, i] = full[:, i, d] = hessian[d, a], curvature[d, a]
+    return gradient, *full
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_slopes_are_those_of_finite_differences(seed):
+    model, rng = branched_model(seed), np.random.default_rng(seed)
+    data = model.createData()
+    joint = rng.integers(0, model.njoints - 1, 12)
+    position, weight = rng.normal(0, 0.2, (12, 3)), rng.uniform(0, 2, 12)
+    weight[3] = 0.0
+    target = rng.normal(0, 0.5, (12, 3))
+    q = pin.integrate(model, pin.neutral(model), rng.normal(0, 0.7, model.nv))
+
+    def half_cost(step):
+        pin.forwardKinematics(model, data, pin.integrate(model, q, step))
+        x = [
+            data.oMi[j + 1].act(p)
+            for j, p in zip(joint.tolist(), position, strict=True)
+        ]
+        return 0.5 * weight @ ((np.array(x) - target) ** 2).sum(axis=1)
+
+    gradient, gauss_newton, curvature = linearized(
+        model, q, joint, position, weight, target
+    )
+    h, e = 1e-4, np.eye(model.nv)
+    slope = [(half_cost(h * d) - half_cost(-h * d)) / (2 * h) for d in e]
+    # Central differences: h^2 = 1e-8 times third derivatives of the order of the cost's
+    # scale (10), rounding 1e-15 / h.
+    np.testing.assert_allclose(gradient, slope, atol=1e-6)
+    second = np.empty((model.nv, model.nv))
+    for i, a in enumerate(e):
+        for j, b in enumerate(e):
+            second[i, j] = (
+                half_cost(h * (a + b))
+                - half_cost(h * (a - b))
+                - half_cost(h * (b - a))
+                + half_cost(-h * (a + b))
+            ) / (4 * h * h)
+    # As above, rounding 1e-15 / h^2 = 1e-7 times the cost.
+    np.testing.assert_allclose(gauss_newton + curvature, second, atol=1e-5)
+
+
+def test_gauss_newton_is_the_square_of_the_jacobian():
+    skeleton = Skeleton.load()
+    rng = np.random.default_rng(0)
+    q = skeleton.integrate(skeleton.neutral(), rng.normal(0, 0.5, skeleton.nv))
+    positions, jacobian = skeleton.marker_jacobian(q)
+    weight = rng.uniform(0.5, 2, len(positions))
+    error = rng.normal(0, 0.01, positions.shape)
+    tree, (joint, local) = skeleton.tree, skeleton.tree_markers
+    path, depth = tree_paths(tree)
+    J, n = len(tree.kind), skeleton.nv
+    rotation, translation = np.empty((J, 3, 3)), np.empty((J, 3))
+    axes, gradient = np.empty((n, 6)), np.empty(n)
+    hessian, curvature = np.zeros(path.shape), np.zeros(path.shape)
+    place_joints(tree, q, rotation, translation)
+    joint_axes(tree, rotation, translation, axes)
+    x = np.einsum("mij,mj->mi", rotation[joint], local) + translation[joint]
+    # Sums of a few dozen products of order one.
+    np.testing.assert_allclose(x, positions, atol=1e-14)
+    linearize(
+        tree, path, depth, axes, joint, weight, x, error,
+        np.empty((J, MOMENTS)), np.empty((n, 9)), gradient, hessian, curvature,
+    )  # fmt: skip
+    J_weighted = (np.sqrt(weight)[:, None, None] * jacobian).reshape(-1, n)
+    expected = J_weighted.T @ J_weighted
+    for d in range(n):
+        row = path[d, : depth[d] + 1]
+        np.testing.assert_allclose(hessian[d, : len(row)], expected[d, row], atol=1e-13)
+    flat = (weight[:, None] * error).ravel()
+    np.testing.assert_allclose(gradient, jacobian.reshape(-1, n).T @ flat, atol=1e-13)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_tree_cholesky_solves_what_numpy_solves(seed):
+    tree, _ = joint_tree(branched_model(seed))
+    path, depth = tree_paths(tree)
+    rng, n = np.random.default_rng(seed), len(depth)
+    carries = np.zeros((n, n), dtype=bool)
+    for d in range(n):
+        carries[d, path[d, : depth[d] + 1]] = True
+    # L' L with the tree's zeros has them too.
+    L = np.where(carries, rng.normal(size=(n, n)), 0) + 2 * np.eye(n)
+    H = L.T @ L
+    assert not H[~(carries | carries.T)].any()
+    rows = np.zeros(path.shape)
+    for d in range(n):
+        rows[d, : depth[d] + 1] = H[d, path[d, : depth[d] + 1]]
+    b = rng.normal(size=n)
+    x = b.copy()
+    assert factor(rows, path, depth)
+    solve(rows, path, depth, x)
+    # Rounding times the condition number.
+    np.testing.assert_allclose(
+        x, np.linalg.solve(H, b), atol=1e-15 * np.linalg.cond(H) * np.abs(x).max()
+    )
+
+
+@pytest.mark.parametrize("bad", [-1.0, 0.0, np.nan])
+def test_what_is_not_positive_definite_is_refused(bad):
+    tree, _ = joint_tree(branched_model(0))
+    path, depth = tree_paths(tree)
+    rows = np.zeros(path.shape)
+    rows[np.arange(len(depth)), depth] = 1.0
+    rows[5, depth[5]] = bad
+    assert not factor(rows, path, depth)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 9.9e-3, 1.01e-2, 1.0, 3.1])
+def test_steps_are_pinocchios(size):
+    model = branched_model(1)
+    tree, _ = joint_tree(model)
+    rng = np.random.default_rng(2)
+    q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+    step = rng.normal(size=model.nv)
+    step[3:6] *= size / np.linalg.norm(step[3:6])
+    moved = np.empty(model.nq)
+    integrate(tree, q, step, moved)
+    expected = pin.integrate(model, q, step)
+    expected[3:7] *= np.sign(expected[3:7] @ moved[3:7])
+    # Rounding of numbers up to 3; series cut off at 1e-2^6 / 40000.
+    np.testing.assert_allclose(moved, expected, atol=2e-15)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 1.0, 3.1])
+def test_displacement_is_half_the_slope_of_its_square(size):
+    model = branched_model(1)
+    tree, _ = joint_tree(model)
+    rng = np.random.default_rng(3)
+    q0 = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+    step = rng.normal(size=model.nv)
+    step[3:6] *= size / np.linalg.norm(step[3:6])
+    q = pin.integrate(model, q0, step)
+    moved, beside = np.empty(model.nv), np.empty(model.nv)
+    displacement(tree, q0, q, moved)
+    turn = Rotation.from_quat(q0[3:7]).inv() * Rotation.from_quat(q[3:7])
+    assert np.linalg.norm(moved[3:6]) == pytest.approx(turn.magnitude(), abs=1e-14)
+    assert np.linalg.norm(moved[:3]) == pytest.approx(
+        np.linalg.norm(q[:3] - q0[:3]), abs=1e-14
+    )
+    h = 1e-5
+    for d in range(model.nv):
+        squares = []
+        for sign in (1, -1):
+            there = pin.integrate(model, q, sign * h * np.eye(model.nv)[d])
+            displacement(tree, q0, there, beside)
+            squares.append(beside @ beside)
+        # h^2 times third derivatives, at most 1 / (pi - 3.1)^2; rounding 1e-15 / h.
+        slope = (squares[0] - squares[1]) / (4 * h)
+        assert slope == pytest.approx(moved[d], abs=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_rigid_pose_is_kabschs(seed):
+    rng = np.random.default_rng(seed)
+    source = rng.normal(size=(6, 3))
+    turn, shift = Rotation.random(random_state=seed), rng.normal(size=3)
+    target = turn.apply(source) + shift + rng.normal(0, 0.05, (6, 3))
+    weight = np.array([1.0, 2, 0.5, 1, 0, 1])
+    target[4] = np.nan
+    pose = np.empty(7)
+    rigid_pose(source, target, weight, np.empty((4, 4)), np.empty((4, 4)), pose)
+    rotation, place = rigid_transform(source[weight > 0], target[weight > 0])
+    # Rounding of a 4 x 4 eigenvector whose eigenvalue stands apart by about 1.
+    np.testing.assert_allclose(
+        Rotation.from_quat(pose[3:]).as_matrix(), rotation, atol=1e-13
+    )
+    np.testing.assert_allclose(pose[:3], place, atol=1e-13)
+
+
+@pytest.fixture(scope="module")
+def skeleton():
+    body = Skeleton.load()
+    return body.with_markers(body.marker_set.without_static())
+
+
+def cost(skeleton, q, before, seen):
+    """What is minimized, put down once more."""
+    worn = skeleton.marker_set.markers
+    weight = np.array([0.0 if m.static_only else m.weight for m in worn])
+    distance = ((skeleton.markers_in_world(q) - seen) ** 2).sum(axis=1)
+    turn = Rotation.from_quat(before[3:7]).inv() * Rotation.from_quat(q[3:7])
+    moved = (
+        ((q - before)[:3] ** 2).sum()
+        + turn.magnitude() ** 2
+        + ((q - before)[7:] ** 2).sum()
+    )
+    beyond = np.maximum(q[7:] - skeleton.upper, 0) + np.minimum(
+        q[7:] - skeleton.lower, 0
+    )
+    total = np.nansum(weight * distance)
+    return total + PRIOR**2 * moved + LIMIT**2 * beyond @ beyond
+
+
+def agree(skeleton, seen, before):
+    ours = MarkerIK(skeleton).solve(seen, before)
+    exact = MarkerIK(
+        skeleton, compiled=False, tolerance=1e-10, max_iterations=5000
+    ).solve(seen, before)
+    assert ours.converged == exact.converged
+    if not np.isfinite(exact.residual):
+        np.testing.assert_array_equal(ours.q, exact.q)
+        return
+    away = np.abs(skeleton.difference(ours.q, exact.q)).max()
+    lower = cost(skeleton, exact.q, before, seen)
+    assert away < AGREEMENT
+    # Near a minimum the cost grows with the square of AGREEMENT times a Hessian below
+    # 100 m^2 (24 markers within 2 m).
+    assert cost(skeleton, ours.q, before, seen) <= lower + 100 * AGREEMENT**2
+    assert ours.residual == pytest.approx(exact.residual, abs=10 * AGREEMENT)
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    st.integers(0, 10**6),
+    st.floats(0, 0.02),
+    st.floats(0, 0.5),
+    st.floats(0, 3),
+    st.sampled_from([0.0, 0.02, 0.3]),
+)
+def test_any_frame_has_the_plain_solvers_answer(seed, noise, hidden, spread, off):
+    # Straight elbows (spread 0), angles far outside limits (spread 3), lost markers.
+    body = Skeleton.load()
+    skeleton = body.with_markers(body.marker_set.without_static())
+    rng = np.random.default_rng(seed)
+    q = skeleton.neutral()
+    q[7:] += spread * rng.uniform(-1, 1, 18)
+    q = skeleton.integrate(q, np.r_[rng.normal(0, 1, 6), np.zeros(18)])
+    seen = skeleton.markers_in_world(q) + rng.normal(0, noise, (22, 3))
+    seen[rng.random(22) < hidden] = np.nan
+    before = skeleton.integrate(q, rng.normal(0, off, 24))
+    ours = MarkerIK(skeleton).solve(seen, before)
+    assert np.isfinite(ours.q).all()
+    plain = MarkerIK(skeleton, compiled=False, tolerance=1e-10, max_iterations=5000)
+    exact = plain.solve(seen, before)
+    if not np.isfinite(exact.residual):
+        np.testing.assert_array_equal(ours.q, exact.q)
+        return
+    # A cost with several minima may lead different ways down; never to a worse frame
+    # by the cost when the start was near.
+    away = np.abs(skeleton.difference(ours.q, exact.q)).max()
+    if exact.converged and ours.converged and off < 0.1 and spread < 1:
+        assert away < AGREEMENT
+
+
+@pytest.mark.parametrize(
+    ("folder", "static", "marker_set", "trials"),
+    [
+        ("ue_adl/ADL005", "ADL005_static.csv", "ue_adl", "ADL005?R1.csv"),
+        ("ue_adl/ADL001", "ADL001_static.csv", "ue_adl", "ADL001?L1.csv"),
+        ("stoop", "neu_t169_f250f350.c3d", "plug_in_gait", "stoop*.c3d"),
+    ],
+)
+def test_real_frames_have_the_plain_solvers_answer(
+    data, folder, static, marker_set, trials
+):
+    calm = read(data / folder / static)
+    skeleton, _ = scale(Skeleton.load(), calm, marker_set=marker_set, min_duration=0.3)
+    tried = 0
+    for path in sorted((data / folder).glob(trials)):
+        recording = read(path)
+        worn = skeleton.marker_set
+        markers = worn.pick(recording.labels, recording.markers)
+        motion = MarkerIK(skeleton).track(recording)
+        assert motion.converged.all()
+        for i in range(1, len(markers), 97):
+            agree(skeleton, markers[i], motion.q[i - 1])
+            tried += 1
+    assert tried > 5
+
+
+def test_a_recording_is_its_frames_one_by_one(skeleton):
+    rng = np.random.default_rng(0)
+    q, frames = skeleton.neutral(), []
+    for _ in range(30):
+        q[7:] += rng.uniform(0, 0.02, 18)
+        frames.append(skeleton.markers_in_world(q) + rng.normal(0, 1e-3, (22, 3)))
+    frames[10][:] = np.nan
+    solver, before, poses = MarkerIK(skeleton), None, []
+    for seen in frames:
+        pose = solver.solve(seen, before)
+        poses.append(pose)
+        before = pose.q
+    batch = [np.empty((30, 25)), np.empty(30), np.empty(30, int), np.empty(30, bool)]
+    batch[0][0] = poses[0].q
+    solver.solver.solve_many(np.array(frames), 1, 30, 1, *batch)
+    np.testing.assert_array_equal(batch[0], [pose.q for pose in poses])
+    np.testing.assert_array_equal(batch[1][1:], [pose.residual for pose in poses[1:]])
+
+
+def test_threads_do_not_meet(skeleton):
+    rng = np.random.default_rng(1)
+    solver, truth, found = MarkerIK(skeleton), [], {}
+    for _ in range(2):
+        q = skeleton.neutral()
+        q[7:] += rng.uniform(0.1, 0.8, 18)
+        seen = skeleton.markers_in_world(q) + rng.normal(0, 1e-3, (22, 3))
+        truth.append((seen, solver.solve(seen).q))
+
+    def work(k):
+        found[k] = [solver.solve(truth[k][0]).q for _ in range(200)]
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for k in range(2):
+        np.testing.assert_array_equal(found[k], [truth[k][1]] * 200)
