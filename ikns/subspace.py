@@ -79,7 +79,8 @@ def null_spaces(
     jacobians : (..., k, n) array
         Task rates per joint rate, one Jacobian a posture.
     rtol : float
-        Singular values up to ``rtol * largest`` (of the same posture) count as zero.
+        Singular values up to ``rtol * largest`` (of the same posture) count as zero;
+        what is below rounding, 2e-16, always does.
 
     Returns
     -------
@@ -107,13 +108,14 @@ def null_spaces(
         raise InvalidInput(f"expected Jacobians (..., k, n), found an array {J.shape}.")
     *batch, k, n = J.shape
     flat = _for_kernels(J).reshape(math.prod(batch), k, n)
+    tolerance = max(rtol, np.finfo(float).eps)
     rank = np.empty(len(flat), dtype=np.int64)
     basis = np.empty((len(flat), max(n - k, 0), n))
-    write_null_spaces(flat, rtol, basis, rank)
+    write_null_spaces(flat, tolerance, basis, rank)
     deficient = n - int(rank[rank >= 0].min(initial=n))
     if deficient > basis.shape[1]:
         basis = np.empty((len(flat), deficient, n))
-        write_null_spaces(flat, rtol, basis, rank)
+        write_null_spaces(flat, tolerance, basis, rank)
     return basis.reshape(*batch, *basis.shape[1:]), rank.reshape(batch)
 
 

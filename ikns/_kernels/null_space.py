@@ -22,14 +22,14 @@ def write_null_spaces(
 ) -> None:
     """Write the bases of (N, k, n) Jacobians to rows (N, d, n), and ranks (N,)."""
     count, k, n = jacobians.shape
-    work, squares = np.empty((k, n)), np.empty(k)
+    work, factors = np.empty((k, n)), np.empty(k)
     for i in range(count):
-        rank[i] = row_rank(jacobians[i], rtol, work, squares)
-        _write_basis(work, rank[i], basis[i])
+        rank[i] = row_rank(jacobians[i], rtol, work, factors)
+        _write_basis(work, factors, rank[i], basis[i])
 
 
 @compiled
-def _write_basis(work: Floats, rank: int, basis: Floats) -> None:
+def _write_basis(work: Floats, factors: Floats, rank: int, basis: Floats) -> None:
     """Fill rows (d, n) with as much of the basis as fits, then with zeros.
 
     NaN when the rank is -1.
@@ -37,7 +37,7 @@ def _write_basis(work: Floats, rank: int, basis: Floats) -> None:
     d, n = basis.shape
     for row in range(d):
         if rank >= 0 and rank + row < n:
-            reflected_axis(work, rank, rank + row, basis[row])
+            reflected_axis(work, factors, rank, rank + row, basis[row])
         else:
             for j in range(n):
                 basis[row, j] = np.nan if rank < 0 else 0.0

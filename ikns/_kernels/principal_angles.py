@@ -57,13 +57,13 @@ def write_principal_angles(A: Floats, B: Floats, rtol: float, angles: Floats) ->
 
 @compiled
 def _orthonormal(
-    rows: Floats, rtol: float, work: Floats, squares: Floats, basis: Floats
+    rows: Floats, rtol: float, work: Floats, factors: Floats, basis: Floats
 ) -> bool:
     """Write an orthonormal basis of independent rows (p, n); tell if they are that."""
     p = rows.shape[0]
-    rank = row_rank(rows, rtol, work, squares)
+    rank = row_rank(rows, rtol, work, factors)
     for i in range(rank):
-        reflected_axis(work, rank, i, basis[i])
+        reflected_axis(work, factors, rank, i, basis[i])
     return rank == p
 
 
