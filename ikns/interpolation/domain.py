@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.interpolation.diagram import diagram as voronoi
 from ikns.interpolation.sibson import depths
-from ikns.interpolation.voronoi import Voronoi, voronoi
+from ikns.interpolation.voronoi import Voronoi
 
 __all__ = ["Domain", "domain"]
 
