@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -10,6 +12,7 @@ from ikns.errors import InvalidInput, NotEnoughData
 __all__ = ["checked_points", "checked_values"]
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 # In sizes of the set: closer sites are taken for one, thinner sets for flat.
 _COINCIDENT = 1e-10
@@ -31,12 +34,12 @@ def checked_points(points: ArrayLike) -> Floats:
             f"interpolation in space needs at least 4 points, found {len(found)}."
         )
     size = float(np.ptp(found, axis=0).max())
-    for i in range(len(found) - 1):
-        distance = np.abs(found[i + 1 :] - found[i]).max(axis=1)
+    for i, others in _candidates(found, _COINCIDENT * size):
+        distance = np.abs(found[others] - found[i]).max(axis=1)
         j = int(distance.argmin())
         if distance[j] <= _COINCIDENT * size:
             raise NotEnoughData(
-                f"all points must differ, but points {i} and {i + 1 + j} are "
+                f"all points must differ, but points {i} and {others[j]} are "
                 f"{distance[j]:.1g} m apart in a set {size:.1g} m wide."
             )
     centered = found / size - (found / size).mean(axis=0)
@@ -49,6 +52,23 @@ def checked_points(points: ArrayLike) -> Floats:
             f"within {max(width if where == 'on one line' else 0, thickness):.1g} m."
         )
     return found
+
+
+def _candidates(points: Floats, near: float) -> Iterator[tuple[int, Indices]]:
+    """Points, each with later ones that may be near: in no coordinate is a gap between.
+
+    Points are told apart along x, then y, then z.
+    """
+    group = np.zeros(len(points), dtype=np.intp)
+    for x in points.T:
+        order = np.lexsort([x, group])
+        apart = (np.diff(x[order]) > near) | (np.diff(group[order]) > 0)
+        group[order[1:]] = apart.cumsum()
+        group[order[0]] = 0
+    for i in np.flatnonzero(np.bincount(group)[group] > 1):
+        others = np.flatnonzero(group == group[i])
+        if others[-1] > i:
+            yield int(i), others[others > i]
 
 
 def checked_values(values: ArrayLike, points: Floats) -> Floats:

@@ -1,0 +1,89 @@
+"""How large the polygons between Voronoi cells look from their sites.
+
+A polygon is a fan of triangles from the axis through both sites; seen from a site, a
+triangle with the unit vectors a, b, c to its corners fills the solid angle
+
+    2 atan2(a . (b x c), 1 + a . b + b . c + c . a)
+
+(A. Van Oosterom and J. Strackee, IEEE Transactions on Biomedical Engineering, 1983).
+"""
+
+from __future__ import annotations
+
+from math import atan2, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns._kernels.compiled import compiled
+
+__all__ = ["solid_angles"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Vector = tuple[float, float, float]
+
+
+@compiled
+def solid_angles(
+    points: Floats,
+    place: Floats,
+    normal: Floats,
+    edges: Integers,
+    axis: Floats,
+    side_facet: Integers,
+    side_edge: Integers,
+    entering: Integers,
+    leaving: Integers,
+) -> Floats:
+    """Solid angles of polygons from the first sites of their edges, (E,) steradian.
+
+    Parameters
+    ----------
+    points : (N, 3) array
+    place : (T, 3) array
+        Of the corners.
+    normal, edges, axis, side_facet, side_edge, entering, leaving
+        As in a Voronoi diagram.
+    """
+    angle = np.zeros(len(edges))
+    first = (0.0, 0.0, 0.0)
+    for s in range(len(side_edge)):
+        e, f = side_edge[s], side_facet[s]
+        site = edges[e, 0]
+        a = (axis[e, 0], axis[e, 1], axis[e, 2])
+        start = _toward(points, place, normal, site, entering[s], f)
+        end = _toward(points, place, normal, site, leaving[s], f)
+        angle[e] += _solid_angle(a, start, end)
+        if entering[s] == len(place):
+            first = start
+        if leaving[s] == len(place):  # back along the horizon to the first ray
+            angle[e] += _solid_angle(a, end, first)
+    return angle
+
+
+@compiled
+def _toward(
+    points: Floats, place: Floats, normal: Floats, site: int, corner: int, f: int
+) -> Vector:
+    """Return the unit vector from a site to a corner, or along the ray of facet f."""
+    if corner == len(place):
+        return normal[f, 0], normal[f, 1], normal[f, 2]
+    x = place[corner, 0] - points[site, 0]
+    y = place[corner, 1] - points[site, 1]
+    z = place[corner, 2] - points[site, 2]
+    r = sqrt(x * x + y * y + z * z)
+    return x / r, y / r, z / r
+
+
+@compiled
+def _solid_angle(a: Vector, b: Vector, c: Vector) -> float:
+    volume = (
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+    )
+    ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    bc = b[0] * c[0] + b[1] * c[1] + b[2] * c[2]
+    ca = c[0] * a[0] + c[1] * a[1] + c[2] * a[2]
+    return 2 * atan2(volume, 1 + ab + bc + ca)
