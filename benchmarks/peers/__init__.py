@@ -1,0 +1,1 @@
+"""Solvers of others, each given the same body, the same frames and the same start."""

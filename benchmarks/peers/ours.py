@@ -1,0 +1,79 @@
+"""The package's own solvers through its public door."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+import ikns
+from ikns import MarkerIK
+from ikns._kernels.marker_problem import pack
+from ikns.marker_ik.pose import PRIOR_FROM_SCRATCH
+from peers.problem import Problem
+from peers.timing import FrameByFrame
+
+
+class Live(FrameByFrame):
+    """One frame a call.
+
+    Parameters
+    ----------
+    problem : Problem
+    **options
+        Those of `MarkerIK`: `compiled` for the kernel, else the plain reference.
+    """
+
+    version = ikns.__version__
+
+    def __init__(self, problem: Problem, **options: object) -> None:
+        self.solver = MarkerIK(problem.skeleton, **options)
+        self.skeleton = problem.skeleton
+        solve = self.solver.solve
+        super().__init__(
+            lambda seen, before: solve(seen, before).q, problem.markers, problem.start
+        )
+
+    def markers_at(self, q):
+        """Return the markers at a configuration, (M, 3) m."""
+        return self.skeleton.markers_in_world(q)
+
+    def call_seconds(self) -> float:
+        """Seconds of a call that has nothing to solve."""
+        nothing, q = np.full_like(self.markers[0], np.nan), self.start
+        solve, clock, spent = self.solve, time.perf_counter_ns, []
+        for _ in range(1000):
+            begun = clock()
+            solve(nothing, q)
+            spent.append(clock() - begun)
+        return 1e-9 * float(np.median(spent))
+
+
+class WithoutPull(Live):
+    """The kernel with the cost that OpenSim has: marker distances and nothing else.
+
+    What is left of the pull to the pose before settles what no marker shows. Joints
+    that markers barely show then need many steps.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem, compiled=True, max_iterations=1000)
+        kernel = self.solver.solver
+        kernel.problem = kernel.problem._replace(pull=PRIOR_FROM_SCRATCH, limit=0.0)
+        kernel.packed = pack(kernel.problem)
+
+
+class Batch:
+    """A whole recording a call, hands and velocities included."""
+
+    version = ikns.__version__
+
+    def __init__(self, problem: Problem) -> None:
+        self.solver, self.recording = MarkerIK(problem.skeleton), problem.recording
+
+    def run(self):
+        """Solve the recording; configurations, and seconds of the average frame."""
+        begun = time.perf_counter_ns()
+        motion = self.solver.track(self.recording)
+        spent = time.perf_counter_ns() - begun
+        return motion.q, 1e-9 * spent / len(motion.q)
