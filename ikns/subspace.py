@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns._kernels.null_space import write_null_spaces
+from ikns._kernels.null_space import write_bases
 from ikns._kernels.principal_angles import write_principal_angles
 from ikns.errors import InvalidInput, NotEnoughData
 
@@ -107,15 +107,15 @@ def null_spaces(
     if J.ndim < 2:
         raise InvalidInput(f"expected Jacobians (..., k, n), found an array {J.shape}.")
     *batch, k, n = J.shape
-    flat = _for_kernels(J).reshape(math.prod(batch), k, n)
+    flat = _flat(J, tuple(batch))
     tolerance = max(rtol, np.finfo(float).eps)
     rank = np.empty(len(flat), dtype=np.int64)
     basis = np.empty((len(flat), max(n - k, 0), n))
-    write_null_spaces(flat, tolerance, basis, rank)
+    write_bases(flat, tolerance, False, basis, rank)
     deficient = n - int(rank[rank >= 0].min(initial=n))
     if deficient > basis.shape[1]:
         basis = np.empty((len(flat), deficient, n))
-        write_null_spaces(flat, tolerance, basis, rank)
+        write_bases(flat, tolerance, False, basis, rank)
     return basis.reshape(*batch, *basis.shape[1:]), rank.reshape(batch)
 
 
@@ -175,7 +175,7 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
     >>> principal_angles([[1.0, 0.0, 0.0]], [[1.0, 1e-10, 0.0]])
     array([1.e-10])
     """
-    a, b = _rows(A), _rows(B)
+    a, b = _orthonormal_rows(A), _orthonormal_rows(B)
     if a.shape[-1] != b.shape[-1]:
         raise InvalidInput(
             f"expected subspaces of the same space, "
@@ -184,20 +184,9 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
     if a.shape[-2] < b.shape[-2]:
         a, b = b, a
     batch = np.broadcast_shapes(a.shape[:-2], b.shape[:-2])
-    count = math.prod(batch)
-    a, b = (
-        _for_kernels(np.broadcast_to(x, (*batch, *x.shape[-2:]))).reshape(
-            count, *x.shape[-2:]
-        )
-        for x in (a, b)
-    )
-    angles = np.empty((count, b.shape[1]))
-    if not write_principal_angles(a, b, _DEPENDENT, angles):
-        raise InvalidInput(
-            f"expected linearly independent rows, found dependent ones in arrays "
-            f"{np.shape(A)} and {np.shape(B)}."
-        )
-    return angles.reshape(*batch, b.shape[1])
+    angles = np.empty((math.prod(batch), b.shape[-2]))
+    write_principal_angles(_flat(a, batch), _flat(b, batch), angles)
+    return angles.reshape(*batch, b.shape[-2])
 
 
 def mean_null_direction(
@@ -283,16 +272,25 @@ def largest_entry_positive(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(largest < 0, -rows, rows)
 
 
-def _for_kernels(array: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the array in the one layout that kernels are compiled for."""
-    return np.require(array, requirements=["C", "A", "W"])
+def _flat(matrices: NDArray[np.float64], batch: tuple[int, ...]) -> NDArray[np.float64]:
+    """Matrices as (N, k, n), in the one layout that kernels are compiled for."""
+    k, n = matrices.shape[-2:]
+    every = np.broadcast_to(matrices, (*batch, k, n))
+    return np.require(every, requirements=["C", "A", "W"]).reshape(math.prod(batch), k, n)
 
 
-def _rows(rows: ArrayLike) -> NDArray[np.float64]:
-    """Rows that may span a subspace."""
+def _orthonormal_rows(rows: ArrayLike) -> NDArray[np.float64]:
     array = np.asarray(rows, dtype=np.float64)
     if array.ndim < 2 or 0 in array.shape[-2:] or not np.isfinite(array).all():
         raise InvalidInput(
             f"expected a subspace as finite rows (..., p, n), found {array.shape}."
         )
-    return array
+    flat = _flat(array, array.shape[:-2])
+    basis, rank = np.empty_like(flat), np.empty(len(flat), dtype=np.int64)
+    write_bases(flat, _DEPENDENT, True, basis, rank)
+    if (rank < array.shape[-2]).any():
+        raise InvalidInput(
+            f"expected linearly independent rows, found dependent ones in an array "
+            f"{array.shape}."
+        )
+    return basis.reshape(array.shape)

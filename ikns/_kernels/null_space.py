@@ -1,6 +1,7 @@
-"""Orthonormal bases of null spaces, one a Jacobian: the axes that rows never reach.
+"""Orthonormal bases of null spaces, or of row spaces, one a matrix.
 
-Method and source: :mod:`ikns._kernels.row_space`.
+The axes that the reflections of a matrix's rows reach, or those that they never reach;
+method and source: :mod:`ikns._kernels.row_space`.
 """
 
 from __future__ import annotations
@@ -9,35 +10,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.row_space import reflected_axis, row_rank
+from ikns._kernels.row_space import careful_rank, certain_rank, reflected_axis
 
-__all__ = ["write_null_spaces"]
+__all__ = ["write_bases"]
 
 Floats = NDArray[np.float64]
 
 
 @compiled
-def write_null_spaces(
-    jacobians: Floats, rtol: float, basis: Floats, rank: NDArray[np.int64]
+def write_bases(
+    matrices: Floats,
+    rtol: float,
+    of_rows: bool,
+    basis: Floats,
+    rank: NDArray[np.int64],
 ) -> None:
-    """Write the bases of (N, k, n) Jacobians to rows (N, d, n), and ranks (N,)."""
-    count, k, n = jacobians.shape
+    """Write bases of (N, k, n) matrices to rows (N, d, n), and their ranks (N,).
+
+    Of the row spaces or else of the null spaces: as much of each as fits, then zeros.
+    NaN and -1 where a matrix is not finite.
+    """
+    count, k, n = matrices.shape
     work, factors = np.empty((k, n)), np.empty(k)
     for i in range(count):
-        rank[i] = row_rank(jacobians[i], rtol, work, factors)
-        _write_basis(work, factors, rank[i], basis[i])
-
-
-@compiled
-def _write_basis(work: Floats, factors: Floats, rank: int, basis: Floats) -> None:
-    """Fill rows (d, n) with as much of the basis as fits, then with zeros.
-
-    NaN when the rank is -1.
-    """
-    d, n = basis.shape
-    for row in range(d):
-        if rank >= 0 and rank + row < n:
-            reflected_axis(work, factors, rank, rank + row, basis[row])
-        else:
-            for j in range(n):
-                basis[row, j] = np.nan if rank < 0 else 0.0
+        r = certain_rank(matrices[i], rtol, work, factors)
+        if r < 0:
+            r = careful_rank(matrices[i], rtol, work, factors)
+        rank[i] = r
+        first, last = (0, r) if of_rows else (r, n)
+        for row in range(basis.shape[1]):
+            if r >= 0 and first + row < last:
+                reflected_axis(work, factors, r, first + row, basis[i, row])
+            else:
+                for j in range(n):
+                    basis[i, row, j] = np.nan if r < 0 else 0.0

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.row_space import orthogonalize, reflected_axis, row_rank
+from ikns._kernels.row_space import orthogonalize
 
 __all__ = ["write_principal_angles"]
 
@@ -22,55 +22,38 @@ Floats = NDArray[np.float64]
 
 
 @compiled
-def write_principal_angles(A: Floats, B: Floats, rtol: float, angles: Floats) -> bool:
+def write_principal_angles(A: Floats, B: Floats, angles: Floats) -> None:
     """Write the angles (N, r) between rows A (N, p, n) and B (N, r, n), r <= p.
 
-    Increasing, rad. False when rows of a pair are dependent to `rtol` or not finite.
+    The rows are orthonormal; angles increase, rad.
     """
     count, r = angles.shape
     p, n = A.shape[1:]
-    a, b, overlap = np.empty((p, n)), np.empty((r, n)), np.empty((r, p))
-    work_a, work_b = np.empty((p, n)), np.empty((r, n))
-    squares, cosines = np.empty(p), np.empty(r)
+    overlap, rest = np.empty((r, p)), np.empty((r, n))
+    cosines, sines = np.empty(r), np.empty(r)
     for pair in range(count):
-        if not _orthonormal(A[pair], rtol, work_a, squares, a):
-            return False
-        if not _orthonormal(B[pair], rtol, work_b, squares, b):
-            return False
         for i in range(r):
+            for m in range(n):
+                rest[i, m] = B[pair, i, m]
             for j in range(p):
                 overlap[i, j] = 0.0
                 for m in range(n):
-                    overlap[i, j] += b[i, m] * a[j, m]
-            for j in range(p):
+                    overlap[i, j] += B[pair, i, m] * A[pair, j, m]
                 for m in range(n):
-                    b[i, m] -= overlap[i, j] * a[j, m]
+                    rest[i, m] -= overlap[i, j] * A[pair, j, m]
         orthogonalize(overlap, 0.0, cosines)
-        orthogonalize(b, 0.0, squares)
-        _sort(cosines, r)
-        _sort(squares, r)
+        orthogonalize(rest, 0.0, sines)
+        _sort(cosines)
+        _sort(sines)
         for i in range(r):
             cosine = math.sqrt(cosines[r - 1 - i])
-            angles[pair, i] = math.atan2(math.sqrt(squares[i]), cosine)
-    return True
+            angles[pair, i] = math.atan2(math.sqrt(sines[i]), cosine)
 
 
 @compiled
-def _orthonormal(
-    rows: Floats, rtol: float, work: Floats, factors: Floats, basis: Floats
-) -> bool:
-    """Write an orthonormal basis of independent rows (p, n); tell if they are that."""
-    p = rows.shape[0]
-    rank = row_rank(rows, rtol, work, factors)
-    for i in range(rank):
-        reflected_axis(work, factors, rank, i, basis[i])
-    return rank == p
-
-
-@compiled
-def _sort(values: Floats, count: int) -> None:
-    """Sort the first values, few of them, upwards."""
-    for i in range(1, count):
+def _sort(values: Floats) -> None:
+    """Sort a few values upwards."""
+    for i in range(1, len(values)):
         j = i
         while j > 0 and values[j - 1] > values[j]:
             values[j - 1], values[j] = values[j], values[j - 1]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 
-__all__ = ["orthogonalize", "reflected_axis", "row_rank"]
+__all__ = ["careful_rank", "certain_rank", "orthogonalize", "reflected_axis"]
 
 Floats = NDArray[np.float64]
 
@@ -33,22 +33,40 @@ _SWEEPS = 30
 
 
 @compiled
-def row_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> int:
-    """Write the reflections of a (k, n) matrix; return its rank.
+def certain_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> int:
+    """Write the reflections of a (k, n) matrix and return its rank; -1 when unsure.
 
-    Singular values up to ``rtol * largest`` count as zero; `rtol` is 1e-16 or more. The
-    rank is -1 when an entry is not finite. `work` (k, n) and `factors` (k,) get
-    ``H_s = 1 - f_s w_s' w_s`` in their first rows, as many as the rank.
+    Singular values up to ``rtol * largest`` count as zero; `rtol` is 1e-16 or more.
+    `work` (k, n) and `factors` (k,) get ``H_s = 1 - f_s w_s' w_s`` in their first rows,
+    as many as the rank.
     """
     k, n = rows.shape
-    steps = min(k, n)
     total = _copy(rows, 1.0, work, factors)
-    if _SMALL < total < _LARGE:
-        least = _reflect(work, steps, factors)
-        # The Frobenius norm is at least the largest singular value.
-        if least > (rtol + k * n * _EPS) * math.sqrt(total):
-            return steps
-    return _careful_rank(rows, rtol, work, factors)
+    if not _SMALL < total < _LARGE:
+        return -1
+    steps = min(k, n)
+    least = _reflect(work, steps, factors)
+    # The Frobenius norm is at least the largest singular value.
+    return steps if least > (rtol + k * n * _EPS) * math.sqrt(total) else -1
+
+
+@compiled
+def careful_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> int:
+    """Do as :func:`certain_rank` by the singular values; -1 when not finite."""
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            if not math.isfinite(rows[i, j]):
+                return -1
+            if abs(rows[i, j]) > largest:
+                largest = abs(rows[i, j])
+    # A power of two rounds nothing. For an entry that is not a normal number it would
+    # be more than a double can hold.
+    scale = math.ldexp(1.0, min(-math.frexp(largest)[1], 1000))
+    _copy(rows, scale, work, factors)
+    rank = orthogonalize(work, rtol, factors)
+    _reflect(work, rank, factors)
+    return rank
 
 
 @compiled
@@ -77,7 +95,7 @@ def orthogonalize(rows: Floats, rtol: float, squares: Floats) -> int:
     ``rtol * largest`` count as zero.
     """
     k, n = rows.shape
-    noise = 0.0
+    noise, orthogonal = 0.0, (n * _EPS) ** 2
     for i in range(k):
         for m in range(n):
             noise += (_EPS * rows[i, m]) ** 2
@@ -91,11 +109,7 @@ def orthogonalize(rows: Floats, rtol: float, squares: Floats) -> int:
                     jj += rows[j, m] * rows[j, m]
                     ij += rows[i, m] * rows[j, m]
                 # Rows of mere rounding would be rotated without end.
-                if (
-                    ii <= noise
-                    or jj <= noise
-                    or abs(ij) <= n * _EPS * math.sqrt(ii) * math.sqrt(jj)
-                ):
+                if ii <= noise or jj <= noise or ij * ij <= orthogonal * ii * jj:
                     continue
                 rotated = True
                 zeta = (jj - ii) / (2.0 * ij)
@@ -124,34 +138,6 @@ def orthogonalize(rows: Floats, rtol: float, squares: Floats) -> int:
 
 
 @compiled
-def _careful_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> int:
-    """Do as :func:`row_rank` by way of the singular values, at any scale."""
-    scale = _scale(rows)
-    if not scale > 0.0:
-        return -1 if math.isnan(scale) else 0
-    _copy(rows, scale, work, factors)
-    rank = orthogonalize(work, rtol, factors)
-    _reflect(work, rank, factors)
-    return rank
-
-
-@compiled
-def _scale(rows: Floats) -> float:
-    """Power of two that brings the largest entry near 1; 0 of zeros, else NaN."""
-    largest = 0.0
-    for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            if not math.isfinite(rows[i, j]):
-                return math.nan
-            if abs(rows[i, j]) > largest:
-                largest = abs(rows[i, j])
-    if largest == 0.0:
-        return 0.0
-    # An entry that is not a normal number asks for more than a double can hold.
-    return math.ldexp(1.0, min(-math.frexp(largest)[1], 1000))
-
-
-@compiled
 def _copy(rows: Floats, scale: float, work: Floats, squares: Floats) -> float:
     """Copy a matrix, write the squares of its rows and return their sum."""
     total = 0.0
@@ -171,7 +157,7 @@ def _reflect(work: Floats, steps: int, squares: Floats) -> float:
     """Reflect, longest row first; return a bound below the last singular value.
 
     `squares` holds the squared lengths of the rows, then of what is left of them; those
-    of rows that are done give way to the factors of :func:`row_rank`.
+    of rows that are done give way to the factors of :func:`certain_rank`.
     """
     k, n = work.shape
     length, share = 0.0, 2.0
