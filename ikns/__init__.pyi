@@ -18,5 +18,6 @@ from .simulation import virtual_subject as virtual_subject
 from .simulation import write_protocol as write_protocol
 from .skeleton import Skeleton as Skeleton
 from .subject import Subject as Subject
+from .warm_up import warm_up as warm_up
 
 __version__: str

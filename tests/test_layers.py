@@ -13,7 +13,7 @@ ROWS = (
     "clustering interpolation output_folder",
     "skeleton isb finger stream session",
     "marker_ik scaling nullspace_map symbolic",
-    "subject calibration control compare ucm",
+    "subject calibration control compare ucm warm_up",
     "runtime simulation",
     "experiments",
     "view",

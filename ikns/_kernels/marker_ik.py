@@ -112,10 +112,27 @@ def solve_frame(
     n_starts = len(problem.starts)
     for k in range(0 if from_scratch else -1, n_starts + 1):
         pull = problem.pull if k < 0 else problem.pull_from_scratch
+        aligned = problem.tree.kind[0] == FREE_FLYER and n_seen >= 3
         if 0 <= k < n_starts:
-            _start(problem, s, k, n_seen)
+            _copy(problem.starts[k], s.start)
         elif k == n_starts:
             _join_limbs(problem.q_branch, s.solved, s.residuals, s.start)
+        if 0 <= k < n_starts and aligned:
+            # Starts have their root at the origin; lay them over the markers.
+            marker_errors(
+                problem.tree,
+                problem.marker_joint,
+                problem.marker_position,
+                s.weight,
+                s.target,
+                s.start,
+                s.origin,
+                s.rotation,
+                s.translation,
+                s.x,
+                s.error,
+            )
+            rigid_pose(s.x, s.target, s.weight, s.N, s.V, s.start)
         _copy(s.start, s.q)
         residual, iterations, converged = _descend(problem, n_seen, pull, s)
         if residual < best_residual:
@@ -126,20 +143,22 @@ def solve_frame(
             break
         if 0 <= k < n_starts:
             _copy(s.q, s.solved[k])
-            _evaluate(problem, s.q, s)
+            marker_errors(
+                problem.tree,
+                problem.marker_joint,
+                problem.marker_position,
+                s.weight,
+                s.target,
+                s.q,
+                s.origin,
+                s.rotation,
+                s.translation,
+                s.x,
+                s.error,
+            )
             s.residuals[k, 0] = residual
             _sum_by_limb(problem.marker_branch, s.weight, s.error, s.residuals[k])
     return best_residual, best_iterations, best_converged
-
-
-@compiled
-def _start(problem: MarkerProblem, s: Scratch, k: int, n_seen: int) -> None:
-    """Write start k, a free body laid over the markers, into `s.start`."""
-    _copy(problem.starts[k], s.start)
-    if problem.tree.kind[0] == FREE_FLYER and n_seen >= 3:
-        _evaluate(problem, s.start, s)
-        # Starts have their root at the origin.
-        rigid_pose(s.x, s.target, s.weight, s.N, s.V, s.start)
 
 
 @compiled
@@ -171,56 +190,6 @@ def _join_limbs(
                 if residuals[k, 1 + branch[i]] < residuals[own, 1 + branch[i]]:
                     own = k
         start[i] = solved[own, i]
-
-
-@compiled
-def _evaluate(problem: MarkerProblem, q: Floats, s: Scratch) -> tuple[float, float]:
-    return marker_errors(
-        problem.tree,
-        problem.marker_joint,
-        problem.marker_position,
-        s.weight,
-        s.target,
-        q,
-        s.origin,
-        s.rotation,
-        s.translation,
-        s.x,
-        s.error,
-    )
-
-
-@compiled
-def _linearize(problem: MarkerProblem, pull: float, s: Scratch) -> None:
-    """Gradient and Hessian where the cost was taken last."""
-    joint_axes(problem.tree, s.rotation, s.translation, s.axes)
-    linearize(
-        problem.tree,
-        problem.path,
-        problem.depth,
-        s.axes,
-        problem.marker_joint,
-        s.weight,
-        s.x,
-        s.error,
-        s.moments,
-        s.forces,
-        s.gradient,
-        s.hessian,
-        s.curvature,
-    )
-    add_penalties(
-        problem.path,
-        problem.depth,
-        problem.free,
-        pull,
-        problem.limit,
-        s.moved,
-        s.beyond,
-        s.gradient,
-        s.hessian,
-        s.curvature,
-    )
 
 
 @compiled
@@ -277,7 +246,19 @@ def _descend(
     definite = true_hessian = converged = False
     _copy(s.q, s.trial)
     while True:
-        trial_cost, trial_distance = _evaluate(problem, s.trial, s)
+        trial_cost, trial_distance = marker_errors(
+            problem.tree,
+            problem.marker_joint,
+            problem.marker_position,
+            s.weight,
+            s.target,
+            s.trial,
+            s.origin,
+            s.rotation,
+            s.translation,
+            s.x,
+            s.error,
+        )
         trial_cost += penalties(
             problem.tree,
             problem.angle,
@@ -297,7 +278,34 @@ def _descend(
             if iterations > 0:
                 damping = max(damping / 10, 1e-12)
             if not converged and iterations < problem.max_iterations:
-                _linearize(problem, pull, s)
+                joint_axes(problem.tree, s.rotation, s.translation, s.axes)
+                linearize(
+                    problem.tree,
+                    problem.path,
+                    problem.depth,
+                    s.axes,
+                    problem.marker_joint,
+                    s.weight,
+                    s.x,
+                    s.error,
+                    s.moments,
+                    s.forces,
+                    s.gradient,
+                    s.hessian,
+                    s.curvature,
+                )
+                add_penalties(
+                    problem.path,
+                    problem.depth,
+                    problem.free,
+                    pull,
+                    problem.limit,
+                    s.moved,
+                    s.beyond,
+                    s.gradient,
+                    s.hessian,
+                    s.curvature,
+                )
             definite = true_hessian = True
         elif true_hessian:
             true_hessian = False
