@@ -274,9 +274,10 @@ def largest_entry_positive(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _flat(matrices: NDArray[np.float64], batch: tuple[int, ...]) -> NDArray[np.float64]:
     """Matrices as (N, k, n), in the one layout that kernels are compiled for."""
-    k, n = matrices.shape[-2:]
-    every = np.broadcast_to(matrices, (*batch, k, n))
-    return np.require(every, requirements=["C", "A", "W"]).reshape(math.prod(batch), k, n)
+    shape = matrices.shape[-2:]
+    every = np.broadcast_to(matrices, (*batch, *shape))
+    every = np.require(every, requirements=["C", "A", "W"])
+    return every.reshape(math.prod(batch), *shape)
 
 
 def _orthonormal_rows(rows: ArrayLike) -> NDArray[np.float64]:
