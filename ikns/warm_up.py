@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ikns._kernels.compiled import on_disk
 from ikns.control import FrameSolver
 from ikns.interpolation import NaturalNeighborInterpolator
 from ikns.marker_ik import MarkerIK
@@ -14,7 +15,12 @@ from ikns.nullspace_map import NullSpaceMap
 from ikns.skeleton import Skeleton
 from ikns.subspace import principal_angles
 
-__all__ = ["warm_up"]
+__all__ = ["compiled_before", "warm_up"]
+
+
+def compiled_before() -> bool:
+    """Whether the kernels only have to be loaded."""
+    return on_disk("control_frame")
 
 
 def warm_up(progress: Callable[[str, int, int], None] | None = None) -> float:

@@ -1,4 +1,4 @@
-from ikns.warm_up import warm_up
+from ikns.warm_up import compiled_before, warm_up
 
 
 def test_everything_is_compiled_with_progress_and_then_at_hand():
@@ -10,3 +10,4 @@ def test_everything_is_compiled_with_progress_and_then_at_hand():
     assert first > 0
     # Compiled code stays in memory; nothing is loaded again.
     assert again < first
+    assert compiled_before()

@@ -18,7 +18,7 @@ from typing import Any
 
 import numba
 
-__all__ = ["compiled"]
+__all__ = ["compiled", "on_disk"]
 
 config: Any = numba.config
 _HERE = Path(__file__).parent
@@ -35,6 +35,12 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         return numba.njit(cache=keep, error_model="numpy", nogil=True)(function)
     finally:
         config.CACHE_DIR = asked
+
+
+def on_disk(module: str) -> bool:
+    """Whether machine code of a kernel file is kept from an earlier time."""
+    folder = _cache_folder(module)
+    return folder is not None and any(folder.rglob("*.nbc"))
 
 
 @functools.cache

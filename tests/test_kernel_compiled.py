@@ -1,0 +1,70 @@
+"""Machine code is kept for exactly the sources that it was made from."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ikns._kernels import compiled as module
+
+KERNELS = Path(module.__file__).parent
+
+
+@pytest.fixture
+def copy(tmp_path, monkeypatch):
+    """A copy of the kernels' sources that the cache looks at."""
+    for path in KERNELS.glob("*.py"):
+        shutil.copy(path, tmp_path)
+    monkeypatch.setattr(module, "_HERE", tmp_path)
+    monkeypatch.setattr(module.config, "CACHE_DIR", "")
+    module._cache_folder.cache_clear()
+    yield tmp_path
+    module._cache_folder.cache_clear()
+
+
+def folder_of(name: str) -> Path:
+    module._cache_folder.cache_clear()
+    folder = module._cache_folder(name)
+    assert folder is not None
+    return folder
+
+
+def test_a_change_in_what_is_called_gives_a_new_folder(copy):
+    before = {name: folder_of(name) for name in ("marker_ik", "step", "hull")}
+    source = copy / "step.py"
+    source.write_text(source.read_text() + "\n# changed\n")
+    after = {name: folder_of(name) for name in before}
+    assert after["step"] != before["step"]
+    assert after["marker_ik"] != before["marker_ik"]  # it imports step
+    assert after["hull"] == before["hull"]
+
+
+def test_code_is_kept_elsewhere_where_the_package_is_read_only(copy, monkeypatch):
+    home = copy / "home"
+    (copy / "__pycache__").write_text("in the way, as a read-only folder would be")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home))
+    assert folder_of("step").is_relative_to(home / "ikns")
+
+
+def test_without_any_place_code_is_compiled_and_not_kept(copy, monkeypatch):
+    (copy / "__pycache__").write_text("in the way")
+    (copy / "home").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(copy / "home"))
+    module._cache_folder.cache_clear()
+    assert module._cache_folder("step") is None
+    assert not module.on_disk("step")
+
+
+def test_numba_is_asked_to_keep_code_where_the_user_wants_it(copy, monkeypatch):
+    monkeypatch.setattr(module.config, "CACHE_DIR", str(copy / "wanted"))
+    assert folder_of("step").is_relative_to(copy / "wanted")
+
+
+def test_importing_the_package_does_not_load_numba():
+    script = "import sys, ikns; print('numba' in sys.modules)"
+    said = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert said.stdout.strip() == "False"
