@@ -17,7 +17,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
 
 
-def test_the_example_runs(
+def test_the_examples_run(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -28,12 +28,14 @@ def test_the_example_runs(
             tmp_path / "ikns-demo" / "recordings", trial.name, trial.recording
         )
     monkeypatch.chdir(tmp_path)
-    (example,) = blocks("python")
-    assert len([line for line in example.splitlines() if line]) <= 15
+    offline, live = blocks("python")
+    assert len([line for line in offline.splitlines() if line]) <= 15
     names: dict[str, object] = {}
-    exec(compile(example, "README.md", "exec"), names)
+    exec(compile(offline, "README.md", "exec"), names)
     assert "degrees" in capsys.readouterr().out
     assert np.isfinite(names["c"]).all()
+    exec(compile(live, "README.md", "exec"), names)
+    assert "the last frame's signal:" in capsys.readouterr().out
 
 
 def test_set_up_is_two_commands() -> None:
