@@ -17,17 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.exact import (
-    SCRATCH,
-    VOLUME,
-    VW,
-    Sites,
-    compute,
-    lattice,
-    load,
-    reach,
-    sign_of,
-)
+from ikns._kernels.exact import SCRATCH, Sites
 from ikns._kernels.predicates import in_sphere, orientation
 
 __all__ = ["insertion_order", "triangulate"]
@@ -47,17 +37,29 @@ _SEEN, _CAVITY, _SPARE = 0, 1, 2
 def insertion_order(points: Floats) -> Integers:
     """Order of sites in which most are near the one before.
 
-    In random rounds, each of half of what is left, so that no layout makes large
-    cavities (N. Amenta, S. Choi and G. Rote, Incremental constructions con BRIO, 2003);
-    within a round along a space-filling curve (G. M. Morton, 1966).
+    First four far apart. Then random rounds, each of half of what is left, so that no
+    layout makes large cavities (N. Amenta, S. Choi and G. Rote, Incremental
+    constructions con BRIO, 2003); within a round along a space-filling curve
+    (G. M. Morton, 1966).
     """
+    rounds = np.floor(np.log2(1 - np.random.default_rng(0).random(len(points))))
+    for rank, site in enumerate(_far_apart(points)):
+        rounds[site] = rank - 100.0  # 2**-53 is the least random number
     fine = 1023 / np.ptp(points, axis=0).max()
     place = ((points - points.min(axis=0)) * fine).astype(np.int64)
     for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3)):
         place = (place | place << shift) & mask
     curve = ((place | place << 2) & 0x09249249) @ [4, 2, 1]  # bits of x, y, z in turn
-    rounds = np.floor(np.log2(1 - np.random.default_rng(0).random(len(points))))
     return np.lexsort([curve, rounds])
+
+
+def _far_apart(points: Floats) -> list[int]:
+    """Four sites that span space, as far as rounding can tell."""
+    u = points - points[0]
+    found = [0, int((u * u).sum(axis=1).argmax())]
+    across = np.cross(u[found[1]], u)
+    found.append(int((across * across).sum(axis=1).argmax()))
+    return [*found, int(np.abs(u @ across[found[2]]).argmax())]
 
 
 @compiled
@@ -68,7 +70,7 @@ def triangulate(sites: Sites, order: Integers) -> tuple[Integers, Integers]:
     ----------
     sites : Sites
     order : (N,) integer array
-        In which to insert them.
+        In which to insert them, the first three not on one line.
 
     Returns
     -------
@@ -122,25 +124,15 @@ def _place(cells: Integers, cell: int, vertex: int) -> int:
 @compiled
 def _first_cells(sites: Sites, R: Integers, order: Integers, cells: Integers) -> int:
     """One tetrahedron and the four infinite ones around it; the number of cells."""
-    a, b, c = order[0], order[1], order[1]
+    a, b, c, d = order[0], order[1], order[2], order[3]
     volume = 0
-    for d in order[2:]:
-        if c == b:
-            grain = min(sites.grain[a], min(sites.grain[b], sites.grain[d]))
-            far = max(reach(sites, a, b), reach(sites, a, d))
-            step, n = lattice(grain, far)
-            for k in range(3):
-                load(sites, R, 3 * k, a, (b, b, d)[k], step, n)
-            compute(R, VOLUME, VOLUME, n)
-            for k in range(3):
-                if sign_of(R, VW + k, n) != 0:
-                    c = d
-        elif volume == 0:
+    for i in range(3, len(order)):
+        if volume == 0:
+            d = order[i]
             volume = orientation(sites, R, a, b, c, d)
-            last = d
     if volume == 0:
         return 0
-    cells[0, 0], cells[0, 3] = a, last
+    cells[0, 0], cells[0, 3] = a, d
     cells[0, 1], cells[0, 2] = (b, c) if volume > 0 else (c, b)
     for k in range(4):
         i, j, m = _OUTWARD[k]

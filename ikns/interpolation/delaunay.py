@@ -9,7 +9,8 @@ one triangulation, without flat tetrahedra in exactly flat places.
 
 The triangulation grows by gift wrapping: behind each open facet stands the one site
 whose sphere through the facet holds no other. That is O(sites) a facet: milliseconds
-for ten sites, seconds for a thousand.
+for ten sites, seconds for a thousand. It is the reference for ikns._kernels.delaunay,
+which triangulates ten thousand in a tenth of a second.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ __all__ = [
     "cross",
     "delaunay",
     "dot",
+    "lift_order",
     "minus",
     "on_lattice",
 ]
@@ -148,6 +150,16 @@ def _first_facet(sites: list[Vector]) -> Facet:
     return 0, nearest, min(spanning, key=squared_radius)
 
 
+def lift_order(points: NDArray[np.float64]) -> list[int]:
+    """Sites from the most to the least lifted.
+
+    The first facet is certain only if no lift pulls another site under it, so its sites
+    are lifted least: they come last.
+    """
+    seed = _first_facet(on_lattice(points))
+    return [i for i in range(len(points)) if i not in seed] + list(seed)
+
+
 def _apex(x: NDArray[np.float64], sites: list[Vector], facet: Facet) -> int | None:
     """Site that completes a facet on its positive side; None on the hull."""
     a, b, c = facet
@@ -219,10 +231,7 @@ def delaunay(points: NDArray[np.float64]) -> tuple[list[Simplex], list[list[int]
     >>> float(volumes.sum().round(12)), sum(n == -1 for row in neighbors for n in row)
     (1.0, 12)
     """
-    # The first facet is certain only if no lift pulls another site under it, so its
-    # sites are lifted least: they come last.
-    seed = _first_facet(on_lattice(points))
-    order = [i for i in range(len(points)) if i not in seed] + list(seed)
+    order = lift_order(points)
     x = points[order]
     sites = on_lattice(x)
 

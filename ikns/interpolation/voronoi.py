@@ -36,7 +36,7 @@ from ikns.interpolation.delaunay import (
     on_lattice,
 )
 
-__all__ = ["Voronoi", "voronoi"]
+__all__ = ["Voronoi", "measured", "voronoi"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -133,7 +133,21 @@ def voronoi(points: Floats) -> Voronoi:
     points : (N, 3) array
         Sites, scaled so that the set is about 1 wide.
     """
-    simplices, neighbors = delaunay(points)
+    return measured(points, *delaunay(points))
+
+
+def measured(
+    points: Floats, simplices: list[Simplex], neighbors: list[list[int]]
+) -> Voronoi:
+    """Build the diagram of sites from their triangulation.
+
+    Parameters
+    ----------
+    points : (N, 3) array
+        Sites, scaled so that the set is about 1 wide.
+    simplices, neighbors
+        As :func:`~ikns.interpolation.delaunay.delaunay` returns them.
+    """
     sites = on_lattice(points)
     outside = len(simplices)
     centers = [circumcenter(sites, simplex) for simplex in simplices]

@@ -1,0 +1,149 @@
+"""Integers in rows of digits, and the predicates on them, against fractions."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from interpolation_layouts import LAYOUTS, turned
+from predicate_oracle import above_sphere, between, determinant, exactly, sign, volume
+
+from ikns._kernels import exact
+from ikns._kernels.predicates import in_sphere, orientation
+
+VECTORS = {"U": exact.U, "V": exact.V, "W": exact.W, "T": exact.T}
+
+
+@st.composite
+def near_degenerate(draw):
+    """Five sites full of common planes and spheres, hit or missed by up to 1e-30."""
+    steps = draw(st.sampled_from([1, 2, 3, 20]))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    points = rng.integers(steps + 1, size=(5, 3)) / steps
+    if draw(st.booleans()):
+        points = turned(points, draw(st.integers(0, 9)))
+    points = points * draw(st.sampled_from([1.0, 1e-8])) + draw(
+        st.sampled_from([0.0, 0.1, 60.0])
+    )
+    jitter = draw(st.sampled_from([0, 1e-30, 1e-17, 1e-16, 1e-13, 1e-9]))
+    return points + jitter * rng.normal(size=points.shape)
+
+
+def cross(a, b):
+    return [a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)]
+
+
+def dot(a, b):
+    return sum(p * q for p, q in zip(a, b, strict=True))
+
+
+def row_value(R, row, degree, step, n):
+    digits = (int(R[row, i]) << (30 * i) for i in range(degree * n))
+    return sum(digits) * Fraction(step) ** degree
+
+
+@given(near_degenerate(), st.booleans())
+@settings(max_examples=100, deadline=None)
+def test_every_row_is_the_determinant_it_stands_for(points, wide):
+    sites, true = exact.on_lattice(points), exactly(points)
+    assert [[Fraction(v) for v in x] for x in sites.x] == true
+    far = max(exact.reach(sites, 0, i) for i in range(5))
+    step, n = exact.lattice(float(sites.grain.min()), far)
+    if wide:  # four digits hold what two do
+        step, n = exact.lattice(2.0**-100, far)
+        assert n == 4 or far < 2.0**-42
+    n = np.int64(n)
+    R = np.full(exact.SCRATCH, 7)  # what was there before does not matter
+    for k, row in enumerate(VECTORS.values()):
+        exact.load(sites, R, row, 0, k + 1, step, n)
+    u, v, w, t = (between(true[0], true[k]) for k in range(1, 5))
+    exact.compute(R, exact.VOLUME, exact.TO_SPHERE, n)
+    d = determinant([u, v, w])
+    products = [cross(v, w), cross(w, u), cross(u, v)]
+    center = [
+        sum(dot(e, e) * p[k] for e, p in zip((u, v, w), products, strict=True))
+        for k in range(3)
+    ]
+    expected = {
+        (exact.VW, 2): products[0],
+        (exact.WU, 2): products[1],
+        (exact.UV, 2): products[2],
+        (exact.DETERMINANT, 3): [d],
+        (exact.CENTER, 4): center,
+        (exact.POWER, 5): [dot(t, t) * d - dot(t, center)],
+    }
+    for (row, degree), values in expected.items():
+        for k, value in enumerate(values):
+            assert row_value(R, row + k, degree, step, n) == value
+            assert exact.sign_of(R, row + k, n) == sign(value)
+            high, rest = exact.value_of(R, row + k, step, n)
+            # Five digits of 30 bits, the highest at least 1, hold 2**-120 of the value;
+            # two floats hold 2**-106 of it, added up in five steps.
+            error = abs(Fraction(high) + Fraction(rest) - value)
+            assert error <= abs(value) / 2**100
+            assert abs(rest) <= abs(high) * 2**-53
+    exact.compute(R, exact.NORMAL, exact.NORMAL, n)
+    exact.turn(R, exact.T, n)
+    assert row_value(R, exact.DETERMINANT, 3, step, n) == determinant([u, v, t])
+
+
+@given(near_degenerate())
+@settings(max_examples=200, deadline=None)
+def test_predicates_are_right_however_close_the_call(points):
+    sites, true = exact.on_lattice(points), exactly(points)
+    assume(len({tuple(x) for x in sites.x}) == 5)
+    R = np.empty(exact.SCRATCH, dtype=np.int64)
+    for order in ((0, 1, 2, 3, 4), (4, 2, 0, 1, 3), (3, 4, 1, 2, 0)):
+        a, b, c, d, e = order
+        side = sign(volume(true, a, b, c, d))
+        assert orientation(sites, R, a, b, c, d) == side
+        assert orientation(sites, R, b, a, c, d) == -side
+        if side < 0:
+            a, b = b, a
+        if side:
+            above = above_sphere(true, a, b, c, d, e)
+            assert in_sphere(sites, R, a, b, c, d, e) == (above < 0)
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_predicates_are_right_on_the_layouts(name):
+    points = LAYOUTS[name]
+    sites, true = exact.on_lattice(points), exactly(points)
+    R = np.empty(exact.SCRATCH, dtype=np.int64)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        a, b, c, d, e = map(int, rng.permutation(len(points))[:5])
+        side = sign(volume(true, a, b, c, d))
+        assert orientation(sites, R, a, b, c, d) == side
+        if side:
+            a, b = (a, b) if side > 0 else (b, a)
+            above = above_sphere(true, a, b, c, d, e)
+            assert in_sphere(sites, R, a, b, c, d, e) == (above < 0)
+
+
+def test_on_a_sphere_the_first_lift_that_counts_decides():
+    sites = exact.on_lattice(LAYOUTS["cube"])
+    R = np.empty(exact.SCRATCH, dtype=np.int64)
+
+    def inside(simplex, others):
+        assert orientation(sites, R, *simplex) == 1
+        return [in_sphere(sites, R, *simplex, e) for e in others]
+
+    # 3 = 1 + 2 - 0: over 0, 4, 2, 1 it stands by l_3 + l_0 - l_1 - l_2, l_0 first; so
+    # do 5 and 6; and 7 by l_7 + 2 l_0 - l_4 - l_2 - l_1.
+    assert inside((0, 4, 2, 1), (3, 5, 6, 7)) == [False] * 4
+    # 2 * 0 = 1 + 2 + 4 - 7: l_0 comes first. For 3, 5 and 6, l_1 does:
+    # 2 * 3 = 1 + 2 - 4 + 7, 2 * 5 = 1 - 2 + 4 + 7, 2 * 6 = -1 + 2 + 4 + 7.
+    assert inside((1, 4, 2, 7), (0, 3, 5, 6)) == [False, True, True, False]
+
+
+def test_coordinates_are_multiples_of_the_grain():
+    rng = np.random.default_rng(0)
+    points = np.vstack([rng.normal(size=(50, 3)), LAYOUTS["grid 3"], np.zeros((1, 3))])
+    sites = exact.on_lattice(points)
+    assert (sites.x == np.trunc(points * 2.0**100) / 2.0**100).all()
+    assert (np.log2(sites.grain) % 1 == 0).all()
+    assert (sites.x % sites.grain[:, None] == 0).all()
+    odd = (sites.x / sites.grain[:, None]) % 2 == 1
+    assert odd.any(axis=1)[:50].all()  # no coarser grain would do
