@@ -110,9 +110,7 @@ def by_point(
     rows = [np.flatnonzero(run.points.point == k) for k in range(len(run.places))]
     null = np.stack(
         [
-            mean_null_direction(
-                np.stack([body.chain_jacobian(truth.q[i], chain) for i in at[::5]])
-            )[0][0]
+            mean_null_direction(body.chain_jacobian(truth.q[at[::5]], chain))[0][0]
             for at in rows
         ]
     )
