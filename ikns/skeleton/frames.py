@@ -103,9 +103,7 @@ class Frames:
         # A copy, as the kernels are compiled for arrays that can be written.
         return np.array(array[..., -n:], order="C").reshape(-1, n), array.shape[:-1]
 
-    def paths(
-        self, links: tuple[str, ...], columns: tuple[str, ...] = ()
-    ) -> Paths:
+    def paths(self, links: tuple[str, ...], columns: tuple[str, ...] = ()) -> Paths:
         """Ways from the thorax to the links, made once."""
         if (links, columns) not in self._known:
             self._known[links, columns] = self._paths_to(links, columns)
