@@ -12,8 +12,6 @@ from predicate_oracle import above_sphere, between, determinant, exactly, sign, 
 from ikns._kernels import exact
 from ikns._kernels.predicates import in_sphere, orientation
 
-VECTORS = {"U": exact.U, "V": exact.V, "W": exact.W, "T": exact.T}
-
 
 @st.composite
 def near_degenerate(draw):
@@ -43,35 +41,25 @@ def row_value(R, row, degree, step, n):
     return sum(digits) * Fraction(step) ** degree
 
 
-@given(near_degenerate(), st.booleans())
-@settings(max_examples=100, deadline=None)
-def test_every_row_is_the_determinant_it_stands_for(points, wide):
+def hold_rows(points, digits=(2, 4)):
+    """Check every row of the scratch array that means something."""
     sites, true = exact.on_lattice(points), exactly(points)
     assert [[Fraction(v) for v in x] for x in sites.x] == true
-    far = max(exact.reach(sites, 0, i) for i in range(5))
-    step, n = exact.lattice(float(sites.grain.min()), far)
-    if wide:  # four digits hold what two do
-        step, n = exact.lattice(2.0**-100, far)
-        assert n == 4 or far < 2.0**-42
-    n = np.int64(n)
     R = np.full(exact.SCRATCH, 7)  # what was there before does not matter
-    for k, row in enumerate(VECTORS.values()):
-        exact.load(sites, R, row, 0, k + 1, step, n)
+    step, n = exact.determinants(sites, R, 0, 1, 2, 3, 4, exact.TO_SPHERE)
+    assert n in digits
     u, v, w, t = (between(true[0], true[k]) for k in range(1, 5))
-    exact.compute(R, exact.VOLUME, exact.TO_SPHERE, n)
-    d = determinant([u, v, w])
     products = [cross(v, w), cross(w, u), cross(u, v)]
+    volume = determinant([u, v, w])
     center = [
         sum(dot(e, e) * p[k] for e, p in zip((u, v, w), products, strict=True))
         for k in range(3)
     ]
     expected = {
         (exact.VW, 2): products[0],
-        (exact.WU, 2): products[1],
-        (exact.UV, 2): products[2],
-        (exact.DETERMINANT, 3): [d],
+        (exact.DETERMINANT, 3): [volume],
         (exact.CENTER, 4): center,
-        (exact.POWER, 5): [dot(t, t) * d - dot(t, center)],
+        (exact.POWER, 5): [dot(t, t) * volume - dot(t, center)],
     }
     for (row, degree), values in expected.items():
         for k, value in enumerate(values):
@@ -83,9 +71,35 @@ def test_every_row_is_the_determinant_it_stands_for(points, wide):
             error = abs(Fraction(high) + Fraction(rest) - value)
             assert error <= abs(value) / 2**100
             assert abs(rest) <= abs(high) * 2**-53
-    exact.compute(R, exact.NORMAL, exact.NORMAL, n)
-    exact.turn(R, exact.T, n)
-    assert row_value(R, exact.DETERMINANT, 3, step, n) == determinant([u, v, t])
+    return R
+
+
+@given(near_degenerate())
+@settings(max_examples=100, deadline=None)
+def test_every_row_is_the_determinant_it_stands_for(points):
+    hold_rows(points)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([2.0**-30, 1.0, 2.0**9]))
+@settings(max_examples=30, deadline=None)
+def test_two_digits_are_as_good_as_four(seed, size):
+    rng = np.random.default_rng(seed)
+    points = size * rng.integers(-(2**30), 2**30, size=(5, 3)) / 2.0**30
+    hold_rows(points, digits=[2])
+    points[rng.integers(5), rng.integers(3)] = 3 * 2.0**-100
+    hold_rows(points, digits=[4])
+
+
+def test_the_first_stages_do_not_need_the_last_ones():
+    points = LAYOUTS["random"]
+    sites = exact.on_lattice(points)
+    whole = hold_rows(points[:5])
+    R = np.full(exact.SCRATCH, 7)
+    _, n = exact.determinants(sites, R, 0, 1, 2, 3, 4, exact.NORMAL)
+    assert (R[exact.VW : exact.VW + 3] == whole[exact.VW : exact.VW + 3])[
+        :, : 2 * n
+    ].all()
+    assert (R[exact.DETERMINANT] == 7).all()
 
 
 @given(near_degenerate())

@@ -20,46 +20,17 @@ from ikns._kernels.compiled import compiled
 from ikns._kernels.exact import SCRATCH, Sites
 from ikns._kernels.predicates import in_sphere, orientation
 
-__all__ = ["insertion_order", "triangulate"]
+__all__ = ["OUTWARD", "triangulate"]
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _INFINITY = -1
 _FREE = -2  # in place 0 of a row that holds no cell
 #: Vertices of a facet in turn, seen from outside.
-_OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 # Columns of notes: when a cell was last seen (in the cavity: 2 step, beside it: one
 # more); list of the cavity's cells; list of free rows.
 _SEEN, _CAVITY, _SPARE = 0, 1, 2
-
-
-def insertion_order(points: Floats) -> Integers:
-    """Order of sites in which most are near the one before.
-
-    First four far apart. Then random rounds, each of half of what is left, so that no
-    layout makes large cavities (N. Amenta, S. Choi and G. Rote, Incremental
-    constructions con BRIO, 2003); within a round along a space-filling curve
-    (G. M. Morton, 1966).
-    """
-    rounds = np.floor(np.log2(1 - np.random.default_rng(0).random(len(points))))
-    for rank, site in enumerate(_far_apart(points)):
-        rounds[site] = rank - 100.0  # 2**-53 is the least random number
-    fine = 1023 / np.ptp(points, axis=0).max()
-    place = ((points - points.min(axis=0)) * fine).astype(np.int64)
-    for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3)):
-        place = (place | place << shift) & mask
-    curve = ((place | place << 2) & 0x09249249) @ [4, 2, 1]  # bits of x, y, z in turn
-    return np.lexsort([curve, rounds])
-
-
-def _far_apart(points: Floats) -> list[int]:
-    """Four sites that span space, as far as rounding can tell."""
-    u = points - points[0]
-    found = [0, int((u * u).sum(axis=1).argmax())]
-    across = np.cross(u[found[1]], u)
-    found.append(int((across * across).sum(axis=1).argmax()))
-    return [*found, int(np.abs(u @ across[found[2]]).argmax())]
 
 
 @compiled
@@ -135,7 +106,7 @@ def _first_cells(sites: Sites, R: Integers, order: Integers, cells: Integers) ->
     cells[0, 0], cells[0, 3] = a, d
     cells[0, 1], cells[0, 2] = (b, c) if volume > 0 else (c, b)
     for k in range(4):
-        i, j, m = _OUTWARD[k]
+        i, j, m = OUTWARD[k]
         cells[k + 1, 0] = _INFINITY
         cells[k + 1, 1] = cells[0, i]
         cells[k + 1, 2] = cells[0, m]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
+from ikns._kernels.twofold import difference
 
 __all__ = [
     "CENTER",
@@ -27,22 +28,12 @@ __all__ = [
     "SCRATCH",
     "SPHERE",
     "TO_SPHERE",
-    "UV",
     "VOLUME",
     "VW",
-    "WU",
     "Sites",
-    "T",
-    "U",
-    "V",
-    "W",
-    "compute",
-    "lattice",
-    "load",
+    "determinants",
     "on_lattice",
-    "reach",
     "sign_of",
-    "turn",
     "value_of",
 ]
 
@@ -59,8 +50,8 @@ _SHARES = 1 / _COUNTS
 
 # Rows of the scratch array; a vector takes three. Numba would compile anew for each
 # plain int that a function takes, but not for each int64.
-U, V, W, T = np.arange(0, 12, 3)  # from a tetrahedron's first site to others
-VW, WU, UV = np.arange(12, 21, 3)  # vector products
+_U, _V, _W, _T = np.arange(0, 12, 3)  # from a first site to others
+VW, _WU, _UV = np.arange(12, 21, 3)  # vector products
 _UU, _VV, _WW, _TT = np.arange(21, 25)  # squares
 DETERMINANT, CENTER, POWER = np.array([25, 26, 29])
 #: Of how many coordinates a row is a product.
@@ -88,21 +79,23 @@ def _weighted(row: Row, pairs: list[tuple[Row, Row]]) -> Sums:
     return [(row + k, [(1, a, b + k) for a, b in pairs]) for k in range(3)]
 
 
-# What is computed in one go.
-VOLUME, SPHERE, TO_SPHERE, NORMAL = np.arange(4)
+# What is computed, stage by stage, from sites a, b, c, d, e: a normal of the facet
+# a, c, d; six times the volume of a, b, c, d; their circumcenter seen from a, times
+# twice that; the power of e to their sphere, times that.
+NORMAL, VOLUME, SPHERE, TO_SPHERE = np.arange(4)
 _STAGES: list[Sums] = [
-    [*_cross(VW, V, W), (DETERMINANT, _dot(U, VW))],
+    _cross(VW, _V, _W),
+    [(DETERMINANT, _dot(_U, VW))],
     [
-        *_cross(WU, W, U),
-        *_cross(UV, U, V),
-        *[(_UU, _dot(U, U)), (_VV, _dot(V, V)), (_WW, _dot(W, W))],
-        *_weighted(CENTER, [(_UU, VW), (_VV, WU), (_WW, UV)]),
+        *_cross(_WU, _W, _U),
+        *_cross(_UV, _U, _V),
+        *[(_UU, _dot(_U, _U)), (_VV, _dot(_V, _V)), (_WW, _dot(_W, _W))],
+        *_weighted(CENTER, [(_UU, VW), (_VV, _WU), (_WW, _UV)]),
     ],
     [
-        (_TT, _dot(T, T)),
-        (POWER, [(1, _TT, DETERMINANT), *_dot(T, CENTER, -1)]),
+        (_TT, _dot(_T, _T)),
+        (POWER, [(1, _TT, DETERMINANT), *_dot(_T, CENTER, -1)]),
     ],
-    _cross(UV, U, V),
 ]
 _STAGE_BEGIN = np.cumsum([0, *map(len, _STAGES)])
 _ROW = np.array([row for stage in _STAGES for row, _ in stage])
@@ -141,41 +134,47 @@ def on_lattice(points: Floats) -> Sites:
 
 
 @compiled
-def reach(sites: Sites, a: int, b: int) -> float:
-    """How far two sites are apart, the largest difference of their coordinates."""
-    x = sites.x
-    return max(
-        abs(x[a, 0] - x[b, 0]), max(abs(x[a, 1] - x[b, 1]), abs(x[a, 2] - x[b, 2]))
-    )
+def determinants(
+    sites: Sites, R: Integers, a: int, b: int, c: int, d: int, e: int, last: int
+) -> tuple[float, int]:
+    """Compute the rows of all stages up to the last one, for five sites.
 
+    Sites that those stages do not see may be any.
 
-@compiled
-def lattice(grain: float, reach: float) -> tuple[float, int]:
-    """Return steps and a number of digits for vectors of that grain and length.
-
-    Two digits if they hold the vectors with a bit to spare. Four hold all.
+    Returns
+    -------
+    step : float
+        What the lowest digits of vectors count.
+    n : int
+        Their number of digits: two if two hold them, four hold all.
     """
-    if reach <= grain * 2.0**58:
-        return grain, 2
-    return _FINEST, 4
+    x, others = sites.x, (b, c, d, e)
+    step, far = sites.grain[a], 0.0
+    for i in others:
+        step = min(step, sites.grain[i])
+        for k in range(3):
+            far = max(far, abs(x[i, k] - x[a, k]))
+    n = 2
+    if far > step * 2.0**58:
+        step, n = _FINEST, 4
+    for i in range(last == NORMAL, 4 if last == TO_SPHERE else 3):
+        for k in range(3):
+            _load(R, 3 * i + k, x[a, k], x[others[i], k], step, n)
+    _compute(R, last, n)
+    return step, n
 
 
 @compiled
-def load(
-    sites: Sites, R: Integers, row: int, a: int, b: int, step: float, n: int
-) -> None:
-    """Write the vector from site a to site b in n digits."""
-    for k in range(3):
-        high = sites.x[b, k] - sites.x[a, k]
-        back = high - sites.x[b, k]
-        rest = (sites.x[b, k] - (high - back)) - (sites.x[a, k] + back)
-        high, rest = high / step, rest / step
-        for i in range(n - 1, 0, -1):
-            digit = np.floor(high * _SHARES[i] + 0.5)
-            high -= digit * _COUNTS[i]
-            R[row + k, i] = np.int64(digit)
-        R[row + k, 0] = np.int64(high) + np.int64(rest)  # below 2**49
-        _carry(R, row + k, n)
+def _load(R: Integers, row: int, a: float, b: float, step: float, n: int) -> None:
+    """Write b - a in n digits."""
+    high, rest = difference(b, a)
+    high, rest = high / step, rest / step
+    for i in range(n - 1, 0, -1):
+        digit = np.floor(high * _SHARES[i] + 0.5)
+        high -= digit * _COUNTS[i]
+        R[row, i] = np.int64(digit)
+    R[row, 0] = np.int64(high) + np.int64(rest)  # below 2**50
+    _carry(R, row, n)
 
 
 @compiled
@@ -190,39 +189,21 @@ def _carry(R: Integers, row: int, n: int) -> None:
 
 
 @compiled
-def _add_product(
-    R: Integers, row: int, sign: int, a: int, n: int, b: int, m: int
-) -> None:
-    """Add plus or minus a product of n by m digits, both even."""
-    for i in range(0, n, 2):
-        low, high = sign * R[a, i], sign * R[a, i + 1]
-        for j in range(0, m, 2):
-            R[row, i + j] += low * R[b, j]
-            R[row, i + j + 1] += low * R[b, j + 1] + high * R[b, j]
-            R[row, i + j + 2] += high * R[b, j + 1]
-
-
-@compiled
-def compute(R: Integers, first: int, last: int, n: int) -> None:
-    """Compute the rows of some stages from vectors of n digits."""
-    for r in range(_STAGE_BEGIN[first], _STAGE_BEGIN[last + 1]):
+def _compute(R: Integers, last: int, n: int) -> None:
+    """Compute the rows of all stages up to the last from vectors of n digits."""
+    for r in range(_STAGE_BEGIN[last + 1]):
         row = _ROW[r]
         for i in range(_DEGREE[row] * n):
             R[row, i] = 0
         for t in range(_ROW_BEGIN[r], _ROW_BEGIN[r + 1]):
             sign, a, b = _TERM[t, 0], _TERM[t, 1], _TERM[t, 2]
-            _add_product(R, row, sign, a, _DEGREE[a] * n, b, _DEGREE[b] * n)
+            for i in range(0, _DEGREE[a] * n, 2):  # by twos, as n is even
+                low, high = sign * R[a, i], sign * R[a, i + 1]
+                for j in range(0, _DEGREE[b] * n, 2):
+                    R[row, i + j] += low * R[b, j]
+                    R[row, i + j + 1] += low * R[b, j + 1] + high * R[b, j]
+                    R[row, i + j + 2] += high * R[b, j + 1]
         _carry(R, row, _DEGREE[row] * n)
-
-
-@compiled
-def turn(R: Integers, vector: int, n: int) -> None:
-    """Compute DETERMINANT as the product of UV with a vector in any rows."""
-    for i in range(3 * n):
-        R[DETERMINANT, i] = 0
-    for k in range(3):
-        _add_product(R, DETERMINANT, np.int64(1), vector + k, n, UV + k, 2 * n)
-    _carry(R, DETERMINANT, 3 * n)
 
 
 @compiled

@@ -24,10 +24,7 @@ from ikns._kernels.exact import (
     TO_SPHERE,
     VOLUME,
     Sites,
-    compute,
-    lattice,
-    load,
-    reach,
+    determinants,
     sign_of,
 )
 
@@ -56,13 +53,7 @@ def orientation(sites: Sites, R: Integers, a: int, b: int, c: int, d: int) -> in
     cc = cx * cx + cy * cy + cz * cz
     if abs(volume) > _PLANE_BOUND * (sqrt(aa) * sqrt(bb) * sqrt(cc)):
         return 1 if volume > 0 else -1
-    grain, far = sites.grain[a], 0.0
-    for i in (b, c, d):
-        grain, far = min(grain, sites.grain[i]), max(far, reach(sites, a, i))
-    step, n = lattice(grain, far)
-    for k in range(3):
-        load(sites, R, 3 * k, a, (b, c, d)[k], step, n)
-    compute(R, VOLUME, VOLUME, n)
+    _, n = determinants(sites, R, a, b, c, d, d, VOLUME)
     return sign_of(R, DETERMINANT, n)
 
 
@@ -94,13 +85,7 @@ def in_sphere(
     ra, rb, rc, rd = sqrt(aa), sqrt(bb), sqrt(cc), sqrt(dd)
     if abs(outside) > _SPHERE_BOUND * (ra * rb * rc * rd * (ra + rb + rc + rd)):
         return outside < 0
-    grain, far = sites.grain[a], 0.0
-    for i in (b, c, d, e):
-        grain, far = min(grain, sites.grain[i]), max(far, reach(sites, a, i))
-    step, n = lattice(grain, far)
-    for k in range(4):
-        load(sites, R, 3 * k, a, (b, c, d, e)[k], step, n)
-    compute(R, VOLUME, TO_SPHERE, n)
+    _, n = determinants(sites, R, a, b, c, d, e, TO_SPHERE)
     sign = sign_of(R, POWER, n)
     if sign != 0:
         return sign < 0

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns._kernels.delaunay import insertion_order, triangulate
+from ikns._kernels.delaunay import triangulate
 from ikns._kernels.exact import on_lattice
-from ikns._kernels.voronoi import lines, rings, sines, spheres
+from ikns._kernels.insertion_order import insertion_order
+from ikns._kernels.rings import lines, rings
+from ikns._kernels.voronoi import corners, lengths, normals, sines
 from ikns.interpolation.voronoi import Voronoi, voronoi
 
 __all__ = ["diagram"]
@@ -31,14 +33,20 @@ def diagram(points: Floats) -> Voronoi:
     if not len(simplices):
         return voronoi(points)
     outside = len(simplices)
-    facets, behind, ahead, place = lines(simplices, neighbors)
-    corner, corner_rest, normal, normal_rest, area, length = spheres(
-        sites, simplices, neighbors, behind, ahead, place
-    )
+    facets, behind, ahead = lines(simplices, neighbors)
     edges, begin, side_facet, side_edge, entering, leaving = rings(
         facets, behind, ahead, outside, len(points)
     )
-    first, second, sine, pairs = sines(sites, facets, area, edges, begin, side_facet)
+    corner, corner_rest, volume = corners(sites, simplices)
+    normal, normal_rest, area = normals(sites, facets)
+    length = lengths(
+        *(sites, simplices, neighbors, behind, ahead),
+        *(corner, corner_rest, volume, area),
+    )
+    first, second, sine, pairs = sines(
+        *(sites, facets, behind, normal, normal_rest, area),
+        *(edges, begin, side_facet, entering),
+    )
     hull = np.flatnonzero(ahead == outside)
     along = sites.x[edges[:, 1]] - sites.x[edges[:, 0]]
     return Voronoi(
