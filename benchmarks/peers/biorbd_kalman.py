@@ -11,16 +11,21 @@ import numpy as np
 
 from peers.problem import RATE, Problem, coordinates, from_coordinates
 
-#: As in biorbd's own example of marker inverse kinematics.
-NOISE_FACTOR, ERROR_FACTOR = 1e-10, 1e-5
-
 
 class Biorbd:
-    """State: angles, velocities and accelerations, 72 numbers."""
+    """State: angles, velocities and accelerations, 72 numbers.
+
+    Parameters
+    ----------
+    problem : Problem
+    noise : float, optional
+        Its noise factor; its own default is 1e-10.
+    """
 
     version = biorbd.__version__
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, *, noise: float | None = None) -> None:
+        self.settings = (RATE,) if noise is None else (RATE, noise)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "body.bioMod"
             path.write_text(_text(problem.plain()), encoding="utf-8")
@@ -36,7 +41,7 @@ class Biorbd:
     def begin(self) -> None:
         """Go to the start."""
         self.filter = biorbd.KalmanReconsMarkers(
-            self.model, biorbd.KalmanParam(RATE, NOISE_FACTOR, ERROR_FACTOR)
+            self.model, biorbd.KalmanParam(*self.settings)
         )
         n = self.model.nbQ()
         self.q = biorbd.GeneralizedCoordinates(_order(self.problem.start))
@@ -53,7 +58,7 @@ class Biorbd:
 
     def run(self, first: int, last: int):
         """Solve frames; configurations, and seconds of each."""
-        solve, clock = self.filter.reconstructFrame, time.perf_counter_ns
+        solve, clock = self.filter.reconstructFrame, time.thread_time_ns
         x, spent = np.empty((last - first, self.model.nbQ())), np.empty(last - first)
         for i in range(first, last):
             frame = self.frames[i]
