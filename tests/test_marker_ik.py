@@ -242,11 +242,25 @@ def test_any_pattern_of_gaps_gives_a_finite_pose(pattern, seed):
     [
         (np.zeros((3, 3)), "expected markers"),
         (np.full((22, 3), np.inf), "found infinity"),
+        (np.diag([np.inf] + [0.3] * 21)[:, :3], "found infinity"),
+        (np.diag([-np.inf] + [np.nan] * 21)[:, :3], "found infinity"),
     ],
 )
-def test_impossible_markers_are_refused(skeleton, markers, said):
+@pytest.mark.parametrize("compiled", [True, False])
+def test_impossible_markers_are_refused(skeleton, markers, said, compiled):
     with pytest.raises(InvalidInput, match=said):
-        MarkerIK(skeleton).solve(markers)
+        MarkerIK(skeleton, compiled=compiled).solve(markers)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("place", [0, 4, 12])
+@pytest.mark.parametrize("compiled", [True, False])
+def test_an_impossible_pose_before_is_refused(skeleton, bad, place, compiled):
+    q = skeleton.neutral()
+    seen = skeleton.markers_in_world(q)
+    q[place] = bad
+    with pytest.raises(InvalidInput, match="the pose before must be finite"):
+        MarkerIK(skeleton, compiled=compiled).solve(seen, q)
 
 
 def test_a_recording_of_something_else_is_refused(skeleton):

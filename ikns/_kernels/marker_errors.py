@@ -12,17 +12,25 @@ __all__ = ["add_penalties", "marker_errors", "penalties", "take_markers"]
 
 
 @compiled
-def take_markers(given: Floats, seen: Floats, weight: Floats, target: Floats) -> int:
-    """Take over the markers that are seen and count; return how many."""
-    n_seen = 0
+def take_markers(
+    given: Floats, seen: Floats, weight: Floats, target: Floats
+) -> tuple[int, bool]:
+    """Take over the markers that are seen, which are finite.
+
+    Returns how many, and whether one is infinite.
+    """
+    n_seen, infinite = 0, False
     for m in range(len(seen)):
-        total = seen[m, 0] + seen[m, 1] + seen[m, 2]
-        weight[m] = given[m] if np.isfinite(total) else 0.0
+        total = 0.0
         for k in range(3):
             target[m, k] = seen[m, k]
+            total += seen[m, k] - seen[m, k]
+            infinite = infinite or np.isinf(seen[m, k])
+        # Zero where all three are finite, NaN otherwise.
+        weight[m] = given[m] if total == 0 else 0.0
         if weight[m] > 0:
             n_seen += 1
-    return n_seen
+    return n_seen, infinite
 
 
 @compiled

@@ -29,7 +29,10 @@ from ikns._kernels.step import integrate
 from ikns._kernels.tree import FREE_FLYER, Floats, Indices, joint_axes
 from ikns._kernels.tree_cholesky import factor, solve
 
-__all__ = ["solve_frame", "solve_frames"]
+__all__ = ["INFINITE", "solve_frame", "solve_frames"]
+
+#: Stands for the iterations of a frame with an infinite marker: a fault, not a gap.
+INFINITE = -1
 
 #: A step with the true Hessian is followed by one of about its square, times how fast
 #: the Hessian changes: up to 50 per radian where markers barely show a joint. A step of
@@ -71,8 +74,10 @@ def solve_frames(
     q : (T, nq) array
         The solutions; the pose before where no marker is seen.
     residual : (T,) array
-        Root mean square distance of the seen markers, m; NaN without any.
+        Root mean square distance of the seen markers, m; NaN without any, infinite
+        where the pose before is not finite.
     iterations, converged : (T,) arrays
+        Iterations are `INFINITE` where a marker is infinite, not seen and not NaN.
     """
     problem = unpack(whole, real)
     s = cut(problem, work)
@@ -81,6 +86,14 @@ def solve_frames(
         residual[i], iterations[i], converged[i] = solve_frame(
             problem, s, markers[i], start, from_scratch and i == first, q[i]
         )
+
+
+@compiled
+def _finite(q: Floats) -> bool:
+    total = 0.0
+    for i in range(len(q)):
+        total += q[i] - q[i]
+    return total == 0
 
 
 @compiled
@@ -103,12 +116,14 @@ def solve_frame(
     Round -1 descends from the pose before. Without it, or lost, rounds 0, 1, ... do
     from several others, and the last goes on from what is best for each limb.
     """
-    n_seen = take_markers(problem.marker_weight, seen, s.weight, s.target)
+    n_seen, infinite = take_markers(problem.marker_weight, seen, s.weight, s.target)
     _copy(before, s.start)
     _copy(before, q)
     best_residual, best_iterations, best_converged = np.inf, 0, False
+    if not _finite(before):
+        return best_residual, best_iterations, best_converged
     if n_seen == 0:
-        return np.nan, best_iterations, best_converged
+        return np.nan, INFINITE if infinite else 0, best_converged
     n_starts = len(problem.starts)
     for k in range(0 if from_scratch else -1, n_starts + 1):
         pull = problem.pull if k < 0 else problem.pull_from_scratch
@@ -158,7 +173,7 @@ def solve_frame(
             )
             s.residuals[k, 0] = residual
             _sum_by_limb(problem.marker_branch, s.weight, s.error, s.residuals[k])
-    return best_residual, best_iterations, best_converged
+    return best_residual, INFINITE if infinite else best_iterations, best_converged
 
 
 @compiled

@@ -98,7 +98,11 @@ class KernelSolver:
         return work
 
     def solve(self, markers: Array, q: Array | None) -> Pose:
-        """Solve one frame of markers (M, 3); NaN where not seen."""
+        """Solve one frame of markers (M, 3); NaN where not seen.
+
+        Iterations of -1 stand for an infinite marker, an infinite residual for a pose
+        before that is not finite.
+        """
         frames = (
             np.empty((1, len(self._neutral))),
             np.empty(1),

@@ -44,7 +44,15 @@ class ReferenceSolver:
         self._weight = np.sqrt([marker.weight for marker in worn])
 
     def solve(self, markers: Array, q: Array | None) -> Pose:
-        """Solve one frame of markers (M, 3); NaN where not seen."""
+        """Solve one frame of markers (M, 3); NaN where not seen.
+
+        Iterations of -1 stand for an infinite marker, an infinite residual for a pose
+        before that is not finite.
+        """
+        if np.isinf(markers).any():
+            return Pose(self.skeleton.neutral(), np.nan, -1, False)
+        if q is not None and not np.isfinite(q).all():
+            return Pose(q, np.inf, 0, False)
         seen = markers.copy()
         seen[~self._tracked] = np.nan
         if not np.isfinite(seen).all(axis=1).any():

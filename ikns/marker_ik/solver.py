@@ -68,6 +68,8 @@ class MarkerIK:
         self.held = skeleton.marker_set.held
         worn = skeleton.marker_set.markers
         self._tracked = np.array([not marker.static_only for marker in worn])
+        self._markers_shape = (len(worn), 3)
+        self._pose_shape = (7 + len(skeleton.joint_names),)
         self.solver = (KernelSolver if compiled else ReferenceSolver)(
             skeleton, max_iterations=max_iterations, tolerance=tolerance
         )
@@ -89,25 +91,24 @@ class MarkerIK:
             With every marker gone it is the pose before, residual NaN, not converged.
         """
         seen = np.ascontiguousarray(markers, dtype=np.float64)
-        expected = (len(self._tracked), 3)
-        if seen.shape != expected:
-            raise InvalidInput(f"expected markers {expected}, found {seen.shape}.")
-        if np.isinf(seen).any():
+        if seen.shape != self._markers_shape:
             raise InvalidInput(
-                "marker positions must be finite or NaN, found infinity."
+                f"expected markers {self._markers_shape}, found {seen.shape}."
             )
         if q is not None:
             q = np.ascontiguousarray(q, dtype=np.float64)
-            if q.shape != (7 + len(self.skeleton.joint_names),):
+            if q.shape != self._pose_shape:
                 raise InvalidInput(
-                    f"expected a pose ({7 + len(self.skeleton.joint_names)},), found "
-                    f"{q.shape}."
+                    f"expected a pose {self._pose_shape}, found {q.shape}."
                 )
-            if not np.isfinite(q).all():
-                raise InvalidInput(
-                    "the pose before must be finite, found NaN or infinity."
-                )
-        return self.solver.solve(seen, q)
+        pose = self.solver.solve(seen, q)
+        if pose.iterations < 0:
+            raise InvalidInput(
+                "marker positions must be finite or NaN, found infinity."
+            )
+        if pose.residual == np.inf:
+            raise InvalidInput("the pose before must be finite, found NaN or infinity.")
+        return pose
 
     def track(
         self,
