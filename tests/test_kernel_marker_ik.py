@@ -18,6 +18,7 @@ from ikns._kernels.tree_cholesky import factor, solve
 from ikns.files import read
 from ikns.marker_ik import LIMIT, PRIOR, MarkerIK
 from ikns.marker_ik.kernel import tree_paths
+from ikns.marker_ik.pose import Frames
 from ikns.rigid import rigid_transform
 from ikns.scaling import scale
 from ikns.skeleton import Skeleton
@@ -354,11 +355,11 @@ def test_a_recording_is_its_frames_one_by_one(skeleton):
         pose = solver.solve(seen, before)
         poses.append(pose)
         before = pose.q
-    batch = [np.empty((30, 25)), np.empty(30), np.empty(30, int), np.empty(30, bool)]
-    batch[0][0] = poses[0].q
-    solver.solver.solve_many(np.array(frames), 1, 30, 1, *batch)
-    np.testing.assert_array_equal(batch[0], [pose.q for pose in poses])
-    np.testing.assert_array_equal(batch[1][1:], [pose.residual for pose in poses[1:]])
+    batch = Frames.empty(30, 25)
+    batch.put(0, poses[0])
+    solver.solver.solve_many(np.array(frames), 1, 30, 1, batch)
+    np.testing.assert_array_equal(batch.q, [pose.q for pose in poses])
+    np.testing.assert_array_equal(batch.residual, [pose.residual for pose in poses])
 
 
 def test_threads_do_not_meet(skeleton):

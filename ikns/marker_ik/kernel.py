@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from ikns.marker_ik.pose import (
     PRIOR,
     PRIOR_FROM_SCRATCH,
     STEP_TOLERANCE,
+    Frames,
     Pose,
     starting_poses,
 )
@@ -103,36 +103,18 @@ class KernelSolver:
         Iterations of -1 stand for an infinite marker, an infinite residual for a pose
         before that is not finite.
         """
-        frames = (
-            np.empty((1, len(self._neutral))),
-            np.empty(1),
-            np.empty(1, dtype=np.int64),
-            np.empty(1, dtype=np.bool_),
-        )
-        self._solve(markers[None], 0, 1, 1, q, *frames)
-        solved, residual, iterations, converged = frames
-        return Pose(
-            solved[0], float(residual[0]), int(iterations[0]), bool(converged[0])
-        )
+        frames = Frames.empty(1, len(self._neutral))
+        self._solve(markers[None], 0, 1, 1, q, frames)
+        return frames.pose(0)
 
     def solve_many(
-        self,
-        markers: Array,
-        first: int,
-        last: int,
-        way: int,
-        q: Array,
-        residual: Array,
-        iterations: NDArray[np.int64],
-        converged: NDArray[np.bool_],
+        self, markers: Array, first: int, last: int, way: int, frames: Frames
     ) -> None:
         """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
 
-        Markers are (T, M, 3); the others (T, ...) are written, each frame starting from
-        the one beside it.
+        Markers are (T, M, 3); each frame starts from the one beside it.
         """
-        frames = (q, residual, iterations, converged)
-        self._solve(markers, first, last, way, q[first - way], *frames)
+        self._solve(markers, first, last, way, frames.q[first - way], frames)
 
     def _solve(
         self,
@@ -141,7 +123,7 @@ class KernelSolver:
         last: int,
         way: int,
         before: Array | None,
-        *frames: NDArray[Any],
+        frames: Frames,
     ) -> None:
         start = self._neutral if before is None else before
         span = (first, last, way)

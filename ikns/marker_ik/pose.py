@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ __all__ = [
     "PRIOR",
     "PRIOR_FROM_SCRATCH",
     "STEP_TOLERANCE",
+    "Frames",
     "Pose",
     "starting_poses",
 ]
@@ -71,6 +73,39 @@ class Pose:
     residual: float
     iterations: int
     converged: bool
+
+
+class Frames(NamedTuple):
+    """Solved frames, (T, nq) and (T,) arrays; see :class:`Pose`."""
+
+    q: Array
+    residual: Array
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+
+    @classmethod
+    def empty(cls, n: int, nq: int) -> Self:
+        """Make room for `n` frames."""
+        return cls(
+            np.empty((n, nq)),
+            np.empty(n),
+            np.empty(n, dtype=np.int64),
+            np.empty(n, dtype=np.bool_),
+        )
+
+    def pose(self, i: int) -> Pose:
+        """Return one of them."""
+        return Pose(
+            self.q[i],
+            float(self.residual[i]),
+            int(self.iterations[i]),
+            bool(self.converged[i]),
+        )
+
+    def put(self, i: int, pose: Pose) -> None:
+        """Write one of them."""
+        self.q[i], self.residual[i] = pose.q, pose.residual
+        self.iterations[i], self.converged[i] = pose.iterations, pose.converged
 
 
 def starting_poses(skeleton: Skeleton) -> Array:

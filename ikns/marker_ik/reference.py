@@ -16,6 +16,7 @@ from ikns.marker_ik.pose import (
     LOST,
     PRIOR,
     PRIOR_FROM_SCRATCH,
+    Frames,
     Pose,
     starting_poses,
 )
@@ -67,25 +68,14 @@ class ReferenceSolver:
         return pose
 
     def solve_many(
-        self,
-        markers: Array,
-        first: int,
-        last: int,
-        way: int,
-        q: Array,
-        residual: Array,
-        iterations: NDArray[np.int64],
-        converged: NDArray[np.bool_],
+        self, markers: Array, first: int, last: int, way: int, frames: Frames
     ) -> None:
         """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
 
-        Markers are (T, M, 3); the others (T, ...) are written, each frame starting from
-        the one beside it.
+        Markers are (T, M, 3); each frame starts from the one beside it.
         """
         for i in range(first, last, way):
-            pose = self.solve(markers[i], q[i - way])
-            q[i], residual[i] = pose.q, pose.residual
-            iterations[i], converged[i] = pose.iterations, pose.converged
+            frames.put(i, self.solve(markers[i], frames.q[i - way]))
 
     def _from_scratch(self, seen: Array) -> Pose:
         """Try several arm poses, then join each side's best."""

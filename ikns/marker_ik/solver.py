@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.derivative import slope
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.marker_ik.kernel import KernelSolver
-from ikns.marker_ik.pose import MAX_ITERATIONS, STEP_TOLERANCE, Pose
+from ikns.marker_ik.pose import MAX_ITERATIONS, STEP_TOLERANCE, Frames, Pose
 from ikns.marker_ik.reference import ReferenceSolver
 from ikns.motion import Motion
 from ikns.recording import Recording
@@ -146,32 +146,21 @@ class MarkerIK:
         visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
         start = int(np.argmax(visible))
         first = self.solve(markers[start])
-        q = np.empty((n, len(first.q)))
-        residual, iterations = np.empty(n), np.empty(n, dtype=np.int64)
-        converged = np.empty(n, dtype=np.bool_)
-        q[start], residual[start] = first.q, first.residual
-        iterations[start], converged[start] = first.iterations, first.converged
-        frames = (q, residual, iterations, converged)
+        frames = Frames.empty(n, len(first.q))
+        frames.put(start, first)
         done = 1
         for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
             for at in range(begin, end, way * _CHUNK):
                 stop = min(at + _CHUNK, n) if way == 1 else max(at - _CHUNK, -1)
-                self.solver.solve_many(markers, at, stop, way, *frames)
+                self.solver.solve_many(markers, at, stop, way, frames)
                 done += abs(stop - at)
                 if progress is not None:
                     progress(done, n)
-        return self._motion(recording.time, *frames)
+        return self._motion(recording.time, frames)
 
-    def _motion(
-        self,
-        time: Array,
-        q: Array,
-        residual: Array,
-        iterations: NDArray[np.int64],
-        converged: NDArray[np.bool_],
-    ) -> Motion:
+    def _motion(self, time: Array, frames: Frames) -> Motion:
         """Add hands, and velocities by :func:`ikns.derivative.slope`."""
-        skeleton = self.skeleton
+        skeleton, q = self.skeleton, frames.q
         position, rotation = skeleton.hands_in_thorax(q)
         steps = np.zeros((len(q), skeleton.nv))
         for i in range(1, len(q)):
@@ -184,8 +173,8 @@ class MarkerIK:
             hand_in_thorax=position,
             hand_rotation_in_thorax=rotation,
             hand_velocity_in_thorax=slope(position, time),
-            residual=residual,
-            iterations=iterations,
-            converged=converged,
+            residual=frames.residual,
+            iterations=frames.iterations,
+            converged=frames.converged,
             held=self.held,
         )
