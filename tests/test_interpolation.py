@@ -294,3 +294,12 @@ def test_its_arrays_cannot_be_changed_from_outside():
     assert (net.points == CUBE).all()
     for array in (net.points, net.values, net.edges, net.simplices, net.hull_facets):
         assert not array.flags.writeable
+
+
+@pytest.mark.parametrize("x", [np.full(3, 0.3), [0.3, 0.3, 0.3], [[0.3, 0.3, 0.3]]])
+def test_one_value_comes_in_the_shape_of_the_query(x):
+    cube = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
+    height = NaturalNeighborInterpolator(cube, cube[:, 2])
+    assert height(x).shape == np.shape(x)[:-1]
+    # Linear values come back but for the rounding of eight products.
+    np.testing.assert_allclose(height(x), np.asarray(x)[..., 2], atol=1e-15)

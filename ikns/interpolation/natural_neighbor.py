@@ -166,7 +166,7 @@ class NaturalNeighborInterpolator:
         if again.size:
             weights = reference_weights(self._space, queries[again], self.outside)
             found[again] = weights @ self.values.reshape(len(self.points), -1)
-        return found.reshape(*shape, *self.values.shape[1:])
+        return found.reshape((*shape, *self.values.shape[1:]))
 
     def weights(self, x: ArrayLike) -> Floats:
         """Sibson weights of the sites.
