@@ -28,14 +28,13 @@ _INFINITY = -1
 _FREE = -2  # in place 0 of a row that holds no cell
 #: Vertices of a facet in turn, seen from outside.
 OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-# Columns of notes: when a cell was last seen (in the cavity: 2 step, beside it: one
-# more); list of the cavity's cells; list of free rows.
+# Columns of notes: the mark of the step that last saw a cell, plus one if the cell was
+# beside that step's cavity; list of the cavity's cells; list of free rows.
 _SEEN, _CAVITY, _SPARE = 0, 1, 2
 
 
-@compiled
 def triangulate(sites: Sites, order: Integers) -> tuple[Integers, Integers]:
-    """Triangulate sites.
+    """Triangulate sites that are all different.
 
     Parameters
     ----------
@@ -47,77 +46,63 @@ def triangulate(sites: Sites, order: Integers) -> tuple[Integers, Integers]:
     -------
     simplices : (T, 4) integer array
         Tetrahedra of positive volume: seen from the last, the others turn left. None at
-        all if the sites lie in one plane or two of them in one place.
+        all if the sites lie in one plane.
     neighbors : (T, 4) integer array
         The tetrahedron across the facet that leaves out each vertex; -1 on the hull.
     """
+    cells = first = _first_cells(sites, order)
+    room = 4 * len(order) + 32  # at first half; random sites need 7 times their number
+    used = 0
+    while len(first) and not used:
+        room *= 2
+        cells = np.empty((room, 8), dtype=np.int64)
+        cells[:5] = first
+        others = order[~np.isin(order, first[0, :4])]
+        used = insert(sites, others, cells, np.zeros((room, 3), dtype=np.int64))
+    finite = cells[:used, 0] >= 0
+    number = np.where(finite, finite.cumsum() - 1, -1)
+    cells = cells[:used][finite]
+    return cells[:, :4].copy(), number[cells[:, 4:] >> 2].copy()
+
+
+def _first_cells(sites: Sites, order: Integers) -> Integers:
+    """One tetrahedron and the four infinite ones around it, if there are any."""
     R = np.empty(SCRATCH, dtype=np.int64)
-    room = 8 * len(order) + 64  # random sites need 7 times their number
-    cells = np.empty((room, 8), dtype=np.int64)
-    notes = np.zeros((room, 3), dtype=np.int64)
-    used = _first_cells(sites, R, order, cells)
-    start = (cells[0, 0], cells[0, 1], cells[0, 2], cells[0, 3])
-    last = spare = np.int64(0)
-    for step in range(1, len(order) + 1):
-        site = order[step - 1]
-        if used == 0 or site in start:
-            continue
+    a, b, c = order[:3]
+    for d in order[3:]:
+        volume = orientation(sites, R, a, b, c, d)
+        if volume:
+            break
+    else:
+        return np.empty((0, 8), dtype=np.int64)
+    corners = [a, b, c, d] if volume > 0 else [a, c, b, d]
+    vertices = [corners]
+    for i, j, k in OUTWARD:
+        vertices.append([_INFINITY, corners[i], corners[k], corners[j]])
+    left_out = [_INFINITY, *corners]  # by each of the five
+    links = [
+        [
+            4 * left_out.index(vertex) + vertices[left_out.index(vertex)].index(missing)
+            for vertex in row
+        ]
+        for row, missing in zip(vertices, left_out, strict=True)
+    ]
+    return np.hstack([vertices, links])
+
+
+@compiled
+def insert(sites: Sites, order: Integers, cells: Integers, notes: Integers) -> int:
+    """Insert sites one by one; the number of rows used, or 0 if they do not suffice."""
+    R = np.empty(SCRATCH, dtype=np.int64)
+    used, spare, last = np.int64(5), np.int64(0), np.int64(0)
+    for step in range(len(order)):
+        site, mark = order[step], 2 * step + 2
         last = _locate(sites, R, cells, last, site)
-        if _coincident(sites, cells, last, site):
-            used = np.int64(0)
-            continue
-        size, rim = _find_cavity(sites, R, cells, notes, last, site, 2 * step)
-        while used + rim > room:
-            cells, notes = _doubled(cells), _doubled(notes)
-            room *= 2
-        used, spare, last = _fill(cells, notes, size, used, spare, site, 2 * step)
-    return _finite(cells, notes, used)
-
-
-@compiled
-def _doubled(table: Integers) -> Integers:
-    larger = np.zeros((2 * table.shape[0], table.shape[1]), dtype=np.int64)
-    for i in range(table.shape[0]):
-        for k in range(table.shape[1]):
-            larger[i, k] = table[i, k]
-    return larger
-
-
-@compiled
-def _place(cells: Integers, cell: int, vertex: int) -> int:
-    """Where a vertex is in its cell."""
-    for k in range(3):
-        if cells[cell, k] == vertex:
-            return k
-    return 3
-
-
-@compiled
-def _first_cells(sites: Sites, R: Integers, order: Integers, cells: Integers) -> int:
-    """One tetrahedron and the four infinite ones around it; the number of cells."""
-    a, b, c, d = order[0], order[1], order[2], order[3]
-    volume = 0
-    for i in range(3, len(order)):
-        if volume == 0:
-            d = order[i]
-            volume = orientation(sites, R, a, b, c, d)
-    if volume == 0:
-        return 0
-    cells[0, 0], cells[0, 3] = a, d
-    cells[0, 1], cells[0, 2] = (b, c) if volume > 0 else (c, b)
-    for k in range(4):
-        i, j, m = OUTWARD[k]
-        cells[k + 1, 0] = _INFINITY
-        cells[k + 1, 1] = cells[0, i]
-        cells[k + 1, 2] = cells[0, m]
-        cells[k + 1, 3] = cells[0, j]
-    for p in range(5):  # each leaves out one of the five vertices
-        for q in range(5):
-            if p != q:
-                i = _place(cells, p, cells[0, q - 1] if q > 0 else _INFINITY)
-                j = _place(cells, q, cells[0, p - 1] if p > 0 else _INFINITY)
-                cells[p, 4 + i] = 4 * q + j
-    return 5
+        size, rim = _find_cavity(sites, R, cells, notes, last, site, mark)
+        if used + rim > len(cells):
+            return 0
+        used, spare, last = _fill(cells, notes, size, used, spare, site, mark)
+    return int(used)
 
 
 @compiled
@@ -145,36 +130,6 @@ def _locate(sites: Sites, R: Integers, cells: Integers, cell: int, site: int) ->
 
 
 @compiled
-def _coincident(sites: Sites, cells: Integers, cell: int, site: int) -> bool:
-    """Whether a site is in the place of one of a cell's vertices."""
-    for k in range(4):
-        vertex = cells[cell, k]
-        if (
-            vertex >= 0
-            and sites.x[vertex, 0] == sites.x[site, 0]
-            and sites.x[vertex, 1] == sites.x[site, 1]
-            and sites.x[vertex, 2] == sites.x[site, 2]
-        ):
-            return True
-    return False
-
-
-@compiled
-def _holds(sites: Sites, R: Integers, cells: Integers, cell: int, site: int) -> bool:
-    """Whether the sphere of a cell holds a site."""
-    if cells[cell, 0] == _INFINITY:
-        side = orientation(
-            sites, R, site, cells[cell, 1], cells[cell, 2], cells[cell, 3]
-        )
-        if side != 0:
-            return side > 0
-        cell = cells[cell, 4] >> 2  # cuts the plane of the facet in the same circle
-    return in_sphere(
-        sites, R, cells[cell, 0], cells[cell, 1], cells[cell, 2], cells[cell, 3], site
-    )
-
-
-@compiled
 def _find_cavity(
     sites: Sites,
     R: Integers,
@@ -192,7 +147,16 @@ def _find_cavity(
         for k in range(4):
             other = cells[notes[i, _CAVITY], 4 + k] >> 2
             if notes[other, _SEEN] < mark:
-                if _holds(sites, R, cells, other, site):
+                side, finite = 0, other
+                if cells[other, 0] == _INFINITY:
+                    v, w = cells[other, 2], cells[other, 3]
+                    side = orientation(sites, R, site, cells[other, 1], v, w)
+                    finite = cells[other, 4] >> 2  # cuts the facet's plane alike
+                if side == 0:
+                    u, v = cells[finite, 0], cells[finite, 1]
+                    w, z = cells[finite, 2], cells[finite, 3]
+                    side = 1 if in_sphere(sites, R, u, v, w, z, site) else -1
+                if side > 0:
                     notes[other, _SEEN] = mark
                     notes[size, _CAVITY] = other
                     size += 1
@@ -268,25 +232,7 @@ def _around_edge(cells: Integers, cell: int, k: int, j: int) -> tuple[int, int]:
         left = cells[cell, place]
         link = cells[cell, 4 + ahead]
         cell, place = link >> 2, link & 3
-        ahead = _place(cells, cell, left)
+        ahead = 0
+        while cells[cell, ahead] != left:
+            ahead += 1
     return ~cells[cell, 4 + ahead], place
-
-
-@compiled
-def _finite(cells: Integers, notes: Integers, used: int) -> tuple[Integers, Integers]:
-    """Return the finite cells, numbered anew."""
-    count = 0
-    for cell in range(used):
-        notes[cell, _SEEN] = -1
-        if cells[cell, 0] >= 0:
-            notes[cell, _SEEN] = count
-            count += 1
-    simplices = np.empty((count, 4), dtype=np.int64)
-    neighbors = np.empty((count, 4), dtype=np.int64)
-    for cell in range(used):
-        row = notes[cell, _SEEN]
-        if row >= 0:
-            for k in range(4):
-                simplices[row, k] = cells[cell, k]
-                neighbors[row, k] = notes[cells[cell, 4 + k] >> 2, _SEEN]
-    return simplices, neighbors

@@ -34,7 +34,7 @@ __all__ = [
     "determinants",
     "on_lattice",
     "sign_of",
-    "value_of",
+    "values",
 ]
 
 Floats = NDArray[np.float64]
@@ -216,8 +216,34 @@ def sign_of(R: Integers, row: int, n: int) -> int:
 
 
 @compiled
-def value_of(R: Integers, row: int, step: float, n: int) -> tuple[float, float]:
-    """Value of a row: a float, and what it rounds off, to 2**-100 of the value."""
+def values(
+    sites: Sites, fives: Integers, last: int, row: int, value: Floats, rest: Floats
+) -> None:
+    """Write some rows of K sets of five sites: floats, and what they round off.
+
+    Together they are off by less than 2**-100 of the value.
+
+    Parameters
+    ----------
+    sites : Sites
+    fives : (K, 5) integer array
+    last : int
+        The last stage to compute.
+    row : int
+        The first row to write.
+    value, rest : (K, M) array
+        Of M rows.
+    """
+    R = np.empty(SCRATCH, dtype=np.int64)
+    for i in range(len(fives)):
+        a, b, c, d = fives[i, 0], fives[i, 1], fives[i, 2], fives[i, 3]
+        step, n = determinants(sites, R, a, b, c, d, fives[i, 4], last)
+        for k in range(value.shape[1]):
+            value[i, k], rest[i, k] = _value(R, row + k, step, n)
+
+
+@compiled
+def _value(R: Integers, row: int, step: float, n: int) -> tuple[float, float]:
     top = _DEGREE[row] * n - 1
     while top > 0 and R[row, top] == 0:
         top -= 1

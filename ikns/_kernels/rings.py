@@ -18,7 +18,6 @@ __all__ = ["lines", "rings"]
 Integers = NDArray[np.int64]
 
 
-@compiled
 def lines(
     simplices: Integers, neighbors: Integers
 ) -> tuple[Integers, Integers, Integers]:
@@ -32,46 +31,15 @@ def lines(
         Tetrahedra on the two sides; T outside the hull.
     """
     outside = len(simplices)
-    count = 0
-    for here in range(outside):
-        for k in range(4):
-            if not 0 <= neighbors[here, k] < here:
-                count += 1
-    facets = np.empty((count, 3), dtype=np.int64)
-    behind = np.empty(count, dtype=np.int64)
-    ahead = np.empty(count, dtype=np.int64)
-    f = 0
-    for here in range(outside):
-        for k in range(4):
-            there = neighbors[here, k]
-            if 0 <= there < here:
-                continue
-            for j in range(3):
-                facets[f, j] = simplices[here, OUTWARD[k, j]]
-            behind[f] = here
-            ahead[f] = there if there >= 0 else outside
-            f += 1
-    return facets, behind, ahead
+    ahead = np.where(neighbors < 0, outside, neighbors)
+    owned = ahead > np.arange(outside)[:, None]
+    behind, place = map(np.ascontiguousarray, np.nonzero(owned))
+    facets = simplices[behind[:, None], OUTWARD[place]]
+    return facets, behind, ahead[owned]
 
 
-@compiled
-def _sorted_by(key: Integers, order: Integers, bound: int) -> Integers:
-    """Sort rows by a key below a bound; equal ones keep their order."""
-    start = np.zeros(bound + 1, dtype=np.int64)
-    for row in order:
-        start[key[row] + 1] += 1
-    for i in range(bound):
-        start[i + 1] += start[i]
-    after = np.empty_like(order)
-    for row in order:
-        after[start[key[row]]] = row
-        start[key[row]] += 1
-    return after
-
-
-@compiled
 def rings(
-    facets: Integers, behind: Integers, ahead: Integers, outside: int, n: int
+    facets: Integers, behind: Integers, ahead: Integers, outside: int
 ) -> tuple[Integers, Integers, Integers, Integers, Integers, Integers]:
     """Sides of each edge's polygon, counterclockwise; from the ray, if there is one.
 
@@ -85,34 +53,30 @@ def rings(
         Where the sides of an edge begin.
     side_facet, side_edge, entering, leaving : (S,) integer array
     """
-    count = 3 * len(facets)
-    low = np.empty(count, dtype=np.int64)
-    high = np.empty(count, dtype=np.int64)
-    for side in range(count):
-        a, b = facets[side // 3, side % 3], facets[side // 3, (side + 1) % 3]
-        low[side], high[side] = min(a, b), max(a, b)
-    order = _sorted_by(low, _sorted_by(high, np.arange(count), n), n)
+    a, b = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    order = np.lexsort([high, low])
+    low, high, along = low[order], high[order], a[order] == low[order]
+    new = np.append(True, (np.diff(low) != 0) | (np.diff(high) != 0))
+    begin = np.append(np.flatnonzero(new), len(new))
+    side_facet, side_edge = order // 3, new.cumsum() - 1
+    entering = np.where(along, behind[side_facet], ahead[side_facet])
+    leaving = np.where(along, ahead[side_facet], behind[side_facet])
+    in_turn(begin, outside, side_facet, entering, leaving)
+    edges = np.column_stack([low, high])[new]
+    return edges, begin, side_facet, side_edge, entering, leaving
 
-    side_facet = np.empty(count, dtype=np.int64)
-    side_edge = np.empty(count, dtype=np.int64)
-    entering = np.empty(count, dtype=np.int64)
-    leaving = np.empty(count, dtype=np.int64)
-    begin = np.empty(count + 1, dtype=np.int64)
-    number = 0
-    for s in range(count):
-        side = order[s]
-        f = side // 3
-        if s == 0 or low[side] != low[order[s - 1]] or high[side] != high[order[s - 1]]:
-            begin[number] = s
-            number += 1
-        along = facets[f, side % 3] == low[side]
-        side_facet[s], side_edge[s] = f, number - 1
-        entering[s] = behind[f] if along else ahead[f]
-        leaving[s] = ahead[f] if along else behind[f]
-    begin[number] = count
-    edges = np.empty((number, 2), dtype=np.int64)
-    for e in range(number):
-        edges[e, 0], edges[e, 1] = low[order[begin[e]]], high[order[begin[e]]]
+
+@compiled
+def in_turn(
+    begin: Integers,
+    outside: int,
+    side_facet: Integers,
+    entering: Integers,
+    leaving: Integers,
+) -> None:
+    """Put the sides of each polygon in turn: each starts where the last one ends."""
+    for e in range(len(begin) - 1):
         at = entering[begin[e]]
         for s in range(begin[e], begin[e + 1]):
             if entering[s] == outside:
@@ -125,4 +89,3 @@ def rings(
             side_facet[s], side_facet[q] = side_facet[q], side_facet[s]
             entering[s], entering[q] = entering[q], entering[s]
             leaving[s], leaving[q] = leaving[q], leaving[s]
-    return edges, begin[: number + 1].copy(), side_facet, side_edge, entering, leaving
