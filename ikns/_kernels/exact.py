@@ -139,7 +139,7 @@ def determinants(
 ) -> tuple[float, int]:
     """Compute the rows of all stages up to the last one, for five sites.
 
-    Sites that those stages do not see may be any.
+    Those that the stages do not see had best be some of the others again.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def _load(R: Integers, row: int, a: float, b: float, step: float, n: int) -> Non
         digit = np.floor(high * _SHARES[i] + 0.5)
         high -= digit * _COUNTS[i]
         R[row, i] = np.int64(digit)
-    R[row, 0] = np.int64(high) + np.int64(rest)  # below 2**50
+    R[row, 0] = np.int64(high) + np.int64(rest)  # below 2**58
     _carry(R, row, n)
 
 

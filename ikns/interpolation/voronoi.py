@@ -1,7 +1,8 @@
 """The Voronoi diagram of some sites, laid out so that one half-space cuts it fast.
 
 Every number below is a ratio of integers times square roots of integers, rounded once:
-a corner 1e15 away and an angle of 1e-15 keep all their digits. The words:
+a corner 1e15 away and an angle of 1e-15 keep all their digits. `diagram` does the same
+in compiled code and is held to this. The words:
 
 - corner: a Voronoi vertex, the center of the sphere through a tetrahedron;
 - line: a Voronoi edge, at a right angle to a Delaunay facet, from the corner behind the
