@@ -1,5 +1,6 @@
 """Machine code is kept for exactly the sources that it was made from."""
 
+import ast
 import shutil
 import subprocess
 import sys
@@ -60,6 +61,40 @@ def test_without_any_place_code_is_compiled_and_not_kept(copy, monkeypatch):
 def test_numba_is_asked_to_keep_code_where_the_user_wants_it(copy, monkeypatch):
     monkeypatch.setattr(module.config, "CACHE_DIR", str(copy / "wanted"))
     assert folder_of("step").is_relative_to(copy / "wanted")
+
+
+def calls(node: ast.AST) -> set[str]:
+    return {
+        call.func.id
+        for call in ast.walk(node)
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
+    }
+
+
+@pytest.mark.parametrize("path", sorted(KERNELS.glob("*.py")), ids=lambda p: p.stem)
+def test_python_never_calls_a_kernel_that_has_no_way_in(path):
+    # It would end the process without a word.
+    private, plain = set(), []
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef):
+            marks = {d.id for d in node.decorator_list if isinstance(d, ast.Name)}
+            if "compiled" not in marks:
+                plain.append(node)
+            elif node.name.startswith("_"):
+                private.add(node.name)
+    assert not any(calls(node) & private for node in plain)
+
+
+def test_nobody_else_imports_a_kernel_that_has_no_way_in():
+    root = KERNELS.parents[1]
+    for path in (
+        p for d in ("ikns", "tests", "benchmarks") for p in root.glob(f"{d}/**/*.py")
+    ):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module is not None:
+                names = {alias.name for alias in node.names}
+                if node.module.startswith("ikns._kernels"):
+                    assert not any(name.startswith("_") for name in names), path
 
 
 def test_importing_the_package_does_not_load_numba():

@@ -29,6 +29,8 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 REVOLUTE, PRISMATIC, FREE_FLYER = 0, 1, 2
+#: Not a plain 2, for which numba would compile what takes it once more.
+_Z = np.int64(2)
 
 
 class Tree(NamedTuple):
@@ -133,7 +135,7 @@ def joint_axes(tree: Tree, rotation: Floats, translation: Floats, axes: Floats) 
                 turning = REVOLUTE if k >= 3 else PRISMATIC
                 _axis(rotation, translation, j, k % 3, turning, axes, at + k)
         else:
-            _axis(rotation, translation, j, 2, kind, axes, at)
+            _axis(rotation, translation, j, _Z, kind, axes, at)
 
 
 @compiled
