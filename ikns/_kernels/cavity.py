@@ -2,11 +2,12 @@
 
 A corner is the center of the sphere through a tetrahedron's sites. Its power is its
 squared radius less its squared distance to the query: positive inside the sphere, where
-the query takes it. The tetrahedra of these corners, the cavity, hang together. In a
-small set all are tried. In a large one a walk toward the query, through facets with the
-query beyond them, meets one of them, and the others are its neighbors (A. Bowyer,
-Computing Dirichlet tessellations, 1981; D. F. Watson, 1981). The walk ends, because a
-Delaunay triangulation has no cycles seen from anywhere (H. Edelsbrunner, 1990).
+the query takes it. The tetrahedra of these corners, the cavity, hang together. A walk
+toward the query, through facets with the query beyond them, meets one of them, and the
+others are its neighbors (A. Bowyer, Computing Dirichlet tessellations, 1981; D. F.
+Watson, Computing the n-dimensional Delaunay tessellation, 1981). The walk ends because
+a Delaunay triangulation, seen from anywhere, has no cycles (H. Edelsbrunner, An
+acyclicity theorem for cell complexes in d dimensions, 1990).
 """
 
 from __future__ import annotations
@@ -17,27 +18,28 @@ from numpy.typing import NDArray
 from ikns._kernels.compiled import compiled
 from ikns._kernels.diagram import (
     CORNER,
-    CORNER_EDGES,
-    CORNER_LINES,
+    CORNER_ROWS,
     CORNERS,
     DEPTH,
-    EDGE_ROWS,
-    EDGES,
+    FOUND,
     HULL,
     KEPT,
     LENGTH,
     LINE_ENDS,
     LINES,
-    LISTS,
+    MARK,
+    NEAR,
     PLANE,
     POWER,
     SITES,
+    START,
     UNKNOWN,
+    place,
 )
-from ikns._kernels.hull import CANCELED, depth_behind
+from ikns._kernels.hull import CANCELED, depth_behind, exact_depth
 from ikns._kernels.twofold import Triple, difference, twofold_dot
 
-__all__ = ["all_powers", "cavity", "forget_cavity", "keep_line"]
+__all__ = ["find_cavity", "forget_cavity", "kept_length", "power_to", "try_all"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -47,36 +49,36 @@ _NOTHING = 1e-300
 
 
 @compiled
-def _power(numbers: Floats, corner: int, x: Triple, rest: Triple) -> float:
-    """Power of a query, twofold, to the corner packed at a place."""
-    p = x[0] - numbers[corner + 6]
-    q = x[1] - numbers[corner + 7]
-    r = x[2] - numbers[corner + 8]
-    power = (
-        (2 * numbers[corner] - p) * p
-        + (2 * numbers[corner + 1] - q) * q
-        + (2 * numbers[corner + 2] - r) * r
+def power_to(numbers: Floats, corner: int, x: Triple) -> float:
+    """Power of a query to the corner packed at a place."""
+    at = place(corner)
+    p = x[0] - numbers[at + place(6)]
+    q = x[1] - numbers[at + place(7)]
+    r = x[2] - numbers[at + place(8)]
+    return (
+        (2 * numbers[at] - p) * p
+        + (2 * numbers[at + place(1)] - q) * q
+        + (2 * numbers[at + place(2)] - r) * r
     )
-    if abs(power) < CANCELED * numbers[corner + 9]:
-        power = _exact_power(numbers, corner, x, rest)
-    return power
 
 
 @compiled
 def _exact_power(numbers: Floats, corner: int, x: Triple, rest: Triple) -> float:
-    p, p_rest = difference(x[0], numbers[corner + 6])
-    q, q_rest = difference(x[1], numbers[corner + 7])
-    r, r_rest = difference(x[2], numbers[corner + 8])
+    """Power of a query, twofold, to 1e-30 of its terms."""
+    c = numbers[corner : corner + 9]
+    p, p_rest = difference(x[0], c[6])
+    q, q_rest = difference(x[1], c[7])
+    r, r_rest = difference(x[2], c[8])
     p_rest, q_rest, r_rest = p_rest + rest[0], q_rest + rest[1], r_rest + rest[2]
-    u, u_rest = difference(2 * numbers[corner], p)
-    v, v_rest = difference(2 * numbers[corner + 1], q)
-    w, w_rest = difference(2 * numbers[corner + 2], r)
+    u, u_rest = difference(2 * c[0], p)
+    v, v_rest = difference(2 * c[1], q)
+    w, w_rest = difference(2 * c[2], r)
     return twofold_dot(
         (u, v, w),
         (
-            u_rest + 2 * numbers[corner + 3] - p_rest,
-            v_rest + 2 * numbers[corner + 4] - q_rest,
-            w_rest + 2 * numbers[corner + 5] - r_rest,
+            u_rest + 2 * c[3] - p_rest,
+            v_rest + 2 * c[4] - q_rest,
+            w_rest + 2 * c[5] - r_rest,
         ),
         (p, q, r),
         (p_rest, q_rest, r_rest),
@@ -84,150 +86,162 @@ def _exact_power(numbers: Floats, corner: int, x: Triple, rest: Triple) -> float
 
 
 @compiled
-def keep_line(numbers: Floats, indices: Indices, line: int, work: Floats) -> None:
-    """Write the length of a line on the query's side, from the powers of its ends.
+def kept_length(length: float, behind: float, ahead: float) -> float:
+    """Length of a line on the query's side, from the powers of its ends.
 
-    The power falls linearly along the line. On a line to infinity it falls by twice
-    the query's depth behind the hull's facet for each unit of length.
+    The power falls linearly along the line: 1, behind / (behind - ahead), or 0.
     """
-    ends, power = indices[LINE_ENDS] + 2 * line, indices[POWER]
-    behind = work[power + indices[ends]]
-    hull = line - (indices[LINES] - indices[HULL])
-    if hull >= 0:
-        kept = max(behind, 0.0) / (2 * work[indices[DEPTH] + hull])
-    else:
-        ahead = work[power + indices[ends + 1]]
-        kept = numbers[indices[LENGTH] + line] * (
-            (max(behind, 0.0) + max(ahead, 0.0)) / (abs(behind) + abs(ahead) + _NOTHING)
-        )
-    work[indices[KEPT] + line] = kept
+    return length * (
+        (max(behind, 0.0) + max(ahead, 0.0)) / (abs(behind) + abs(ahead) + _NOTHING)
+    )
 
 
 @compiled
-def all_powers(
+def try_all(
     numbers: Floats, indices: Indices, x: Triple, rest: Triple, work: Floats
-) -> None:
-    """Write the powers of all corners, and what is kept of all lines."""
-    corner, power = indices[CORNER], indices[POWER]
+) -> tuple[int, int]:
+    """Write the powers of all corners and what is kept of all lines.
+
+    Returns
+    -------
+    corners, sites : int
+        How many are listed: the corners that are taken, and all sites.
+    """
+    corners, powers = indices[CORNER], indices[POWER]
+    unsure = False
     for t in range(indices[CORNERS]):
-        work[power + t] = _power(numbers, corner + 10 * t, x, rest)
-    for line in range(indices[LINES]):
-        keep_line(numbers, indices, line, work)
+        power = power_to(numbers, corners + 10 * t, x)
+        work[place(powers + t)] = power
+        unsure |= abs(power) < numbers[place(corners + 10 * t + 9)]
+    if unsure:
+        for t in range(indices[CORNERS]):
+            if abs(work[place(powers + t)]) < numbers[place(corners + 10 * t + 9)]:
+                power = _exact_power(numbers, corners + 10 * t, x, rest)
+                work[place(powers + t)] = power
+    lists = work[indices[START] :].view(np.int64)
+    found, near = indices[FOUND] - indices[START], indices[NEAR] - indices[START]
+    count = 0
+    for t in range(indices[CORNERS]):
+        lists[place(found + count)] = t
+        count += work[place(powers + t)] > 0
+    for i in range(indices[SITES]):
+        lists[place(near + i)] = i
+    kept, depths, lengths = indices[KEPT], indices[DEPTH], indices[LENGTH]
+    ends, hull = indices[LINE_ENDS], indices[LINES] - indices[HULL]
+    for line in range(hull):
+        behind = work[place(powers + indices[place(ends + 2 * line)])]
+        ahead = work[place(powers + indices[place(ends + 2 * line + 1)])]
+        length = numbers[place(lengths + line)]
+        work[place(kept + line)] = kept_length(length, behind, ahead)
+    for line in range(hull, indices[LINES]):
+        behind = work[place(powers + indices[place(ends + 2 * line)])]
+        depth = work[place(depths + line - hull)]
+        work[place(kept + line)] = max(behind, 0.0) / (2 * depth)
+    return count, indices[SITES]
 
 
 @compiled
-def _met(
+def _meet(
     numbers: Floats, indices: Indices, x: Triple, rest: Triple, start: int
 ) -> tuple[int, float]:
     """Walk to a corner that the query takes; also its power. -1 where none is met."""
-    t = start
-    corner, lines = indices[CORNER], indices[CORNER_LINES]
-    ends, planes = indices[LINE_ENDS], indices[PLANE]
-    for _ in range(indices[CORNERS]):
-        power = _power(numbers, corner + 10 * t, x, rest)
+    rows, corners, planes = indices[CORNER_ROWS], indices[CORNER], indices[PLANE]
+    infinity, ends, t = indices[CORNERS], indices[LINE_ENDS], start
+    for _ in range(infinity):
+        corner = corners + 10 * t
+        power = power_to(numbers, corner, x)
+        if abs(power) < numbers[place(corner + 9)]:
+            power = _exact_power(numbers, corner, x, rest)
         if power > 0:
             return t, power
-        onward = -1
+        onward = infinity
         for k in range(4):
-            line = indices[lines + 4 * t + k]
-            behind, ahead = indices[ends + 2 * line], indices[ends + 2 * line + 1]
-            depth = depth_behind(numbers, planes + 10 * line, x, rest)
-            if behind == t and depth < 0 and ahead < indices[CORNERS]:
-                onward = ahead
+            line = indices[place(rows + 30 * t + k)]
+            depth = depth_behind(numbers, planes + 10 * line, x)
+            if abs(depth) < CANCELED:
+                depth = exact_depth(numbers, planes + 10 * line, x, rest)
+            beyond = depth < 0 if indices[place(ends + 2 * line)] == t else depth > 0
+            if beyond:
+                onward = indices[place(rows + 30 * t + 4 + k)]
                 break
-            if ahead == t and depth > 0:
-                onward = behind
-                break
-        if onward < 0:
+        if onward == infinity:
             break
         t = onward
     return -1, 0.0
 
 
 @compiled
-def cavity(
+def find_cavity(
     numbers: Floats,
     indices: Indices,
     x: Triple,
     rest: Triple,
     start: int,
     work: Floats,
-) -> tuple[int, int, int]:
+) -> tuple[int, int]:
     """Write the powers of the cavity and around it, and what is kept of its lines.
 
     Returns
     -------
-    corners, edges, sites : int
-        How many there are in the lists: after three numbers, `SITES` places for sites,
-        `EDGES` for edges whose polygons are cut, `CORNERS` for the cavity. No corners
-        when the walk failed.
+    corners, sites : int
+        How many are listed; no corners when the walk failed.
     """
-    n, e = indices[SITES], indices[EDGES]
-    lists = work[indices[LISTS] :].view(np.int64)
-    sites, edges, found = 3, 3 + n, 3 + n + e
-    site_marks = found + indices[CORNERS]
-    edge_marks = site_marks + n
-    power, corner = indices[POWER], indices[CORNER]
-    t, height = _met(numbers, indices, x, rest, start)
+    t, height = _meet(numbers, indices, x, rest, start)
     if t < 0:
-        return 0, 0, 0
-    work[power + t] = height
-    lists[found] = t
-    count, reached = 1, 0
+        return 0, 0
+    infinity, hull = indices[CORNERS], indices[LINES] - indices[HULL]
+    powers, kept, depths = indices[POWER], indices[KEPT], indices[DEPTH]
+    rows, corners, lengths = indices[CORNER_ROWS], indices[CORNER], indices[LENGTH]
+    lists = work[indices[START] :].view(np.int64)
+    found, near = indices[FOUND] - indices[START], indices[NEAR] - indices[START]
+    mark = indices[MARK] - indices[START]
+    work[place(powers + t)] = height
+    lists[0] = lists[place(found)] = t
+    count, sites, reached = 1, 0, 0
     while reached < count:
-        t = lists[found + reached]
+        t = lists[place(found + reached)]
+        mine, row = work[place(powers + t)], rows + 30 * t
         reached += 1
         for k in range(4):
-            ends = indices[LINE_ENDS] + 2 * indices[indices[CORNER_LINES] + 4 * t + k]
-            other = indices[ends] + indices[ends + 1] - t
-            if other < indices[CORNERS] and work[power + other] == UNKNOWN:
-                height = _power(numbers, corner + 10 * other, x, rest)
-                work[power + other] = height
+            line, other = indices[place(row + k)], indices[place(row + 4 + k)]
+            if other == infinity:
+                # The power falls by twice the query's depth for each unit of length.
+                depth = work[place(depths + line - hull)]
+                work[place(kept + line)] = mine / (2 * depth)
+                continue
+            height = work[place(powers + other)]
+            if height == UNKNOWN:
+                corner = corners + 10 * other
+                height = power_to(numbers, corner, x)
+                if abs(height) < numbers[place(corner + 9)]:
+                    height = _exact_power(numbers, corner, x, rest)
+                work[place(powers + other)] = height
                 if height > 0:
-                    lists[found + count] = other
+                    lists[place(found + count)] = other
                     count += 1
-    edge_count, site_count = 0, 0
-    for c in range(count):
-        t = lists[found + c]
-        for k in range(4):
-            keep_line(
-                numbers, indices, indices[indices[CORNER_LINES] + 4 * t + k], work
-            )
-        for k in range(6):
-            edge = indices[indices[CORNER_EDGES] + 6 * t + k]
-            if lists[edge_marks + edge] == 0:
-                lists[edge_marks + edge] = 1
-                lists[edges + edge_count] = edge
-                edge_count += 1
-                for end in range(2):
-                    site = indices[indices[EDGE_ROWS] + 5 * edge + end]
-                    if lists[site_marks + site] == 0:
-                        lists[site_marks + site] = 1
-                        lists[sites + site_count] = site
-                        site_count += 1
-    return count, edge_count, site_count
+            length = numbers[place(lengths + line)]
+            work[place(kept + line)] = kept_length(length, mine, height)
+        for k in range(8, 12):
+            site = indices[place(row + k)]
+            if lists[place(mark + site)] == 0:
+                lists[place(mark + site)] = 1
+                lists[place(near + sites)] = site
+                sites += 1
+    return count, sites
 
 
 @compiled
-def forget_cavity(
-    indices: Indices, corners: int, edges: int, sites: int, work: Floats
-) -> None:
+def forget_cavity(indices: Indices, corners: int, sites: int, work: Floats) -> None:
     """Leave the scratch memory as it was found."""
-    n, e = indices[SITES], indices[EDGES]
-    lists = work[indices[LISTS] :].view(np.int64)
-    found = 3 + n + e
-    site_marks = found + indices[CORNERS]
-    edge_marks = site_marks + n
+    rows, powers = indices[CORNER_ROWS], indices[POWER]
+    lists = work[indices[START] :].view(np.int64)
+    found, near = indices[FOUND] - indices[START], indices[NEAR] - indices[START]
+    mark = indices[MARK] - indices[START]
     for c in range(corners):
-        t = lists[found + c]
-        work[indices[POWER] + t] = UNKNOWN
-        for k in range(4):
-            line = indices[indices[CORNER_LINES] + 4 * t + k]
-            work[indices[KEPT] + line] = 0.0
-            for end in range(2):
-                other = indices[indices[LINE_ENDS] + 2 * line + end]
-                work[indices[POWER] + other] = UNKNOWN
-    for c in range(edges):
-        lists[edge_marks + lists[3 + n + c]] = 0
+        t = lists[place(found + c)]
+        work[place(powers + t)] = UNKNOWN
+        for k in range(4, 8):
+            other = indices[place(rows + 30 * t + k)]
+            work[place(powers + other)] = UNKNOWN
     for c in range(sites):
-        lists[site_marks + lists[3 + c]] = 0
+        lists[place(mark + lists[place(near + c)])] = 0

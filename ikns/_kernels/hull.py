@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.diagram import DEPTH, HULL, LINES, PLANE
+from ikns._kernels.diagram import DEPTH, HULL, LINES, PLANE, place
 from ikns._kernels.twofold import Triple, difference, twofold_dot
 
-__all__ = ["CANCELED", "depth_behind", "hull_depths"]
+__all__ = ["CANCELED", "depth_behind", "exact_depth", "hull_depths"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -23,26 +23,26 @@ CANCELED = 1e-3
 
 
 @compiled
-def depth_behind(numbers: Floats, plane: int, x: Triple, rest: Triple) -> float:
-    """How far a point, twofold, lies behind the plane packed at a place."""
-    depth = (
-        numbers[plane] * (numbers[plane + 6] - x[0])
-        + numbers[plane + 1] * (numbers[plane + 7] - x[1])
-        + numbers[plane + 2] * (numbers[plane + 8] - x[2])
+def depth_behind(numbers: Floats, plane: int, x: Triple) -> float:
+    """How far a point lies behind the plane packed at a place."""
+    at = place(plane)
+    return (
+        numbers[at] * (numbers[at + place(6)] - x[0])
+        + numbers[at + place(1)] * (numbers[at + place(7)] - x[1])
+        + numbers[at + place(2)] * (numbers[at + place(8)] - x[2])
     )
-    if abs(depth) < CANCELED:
-        depth = _exact_depth(numbers, plane, x, rest)
-    return depth
 
 
 @compiled
-def _exact_depth(numbers: Floats, plane: int, x: Triple, rest: Triple) -> float:
-    p, p_rest = difference(numbers[plane + 6], x[0])
-    q, q_rest = difference(numbers[plane + 7], x[1])
-    r, r_rest = difference(numbers[plane + 8], x[2])
+def exact_depth(numbers: Floats, plane: int, x: Triple, rest: Triple) -> float:
+    """How far a point, twofold, lies behind a plane, to 1e-30."""
+    n = numbers[plane : plane + 9]
+    p, p_rest = difference(n[6], x[0])
+    q, q_rest = difference(n[7], x[1])
+    r, r_rest = difference(n[8], x[2])
     return twofold_dot(
-        (numbers[plane], numbers[plane + 1], numbers[plane + 2]),
-        (numbers[plane + 3], numbers[plane + 4], numbers[plane + 5]),
+        (n[0], n[1], n[2]),
+        (n[3], n[4], n[5]),
         (p, q, r),
         (p_rest - rest[0], q_rest - rest[1], r_rest - rest[2]),
     )
@@ -61,14 +61,23 @@ def hull_depths(
     depth : float
         The least; positive inside.
     part : float
-        The least part of the way from a facet to the middle of the sites.
+        The least part of the way from a facet to the middle of the sites, where that
+        may be less than CANCELED.
     """
+    depths, facets = indices[DEPTH], indices[HULL]
+    planes = indices[PLANE] + 10 * (indices[LINES] - facets)
     least, part = np.inf, np.inf
-    depths = indices[DEPTH]
-    plane = indices[PLANE] + 10 * (indices[LINES] - indices[HULL])
-    for h in range(indices[HULL]):
-        depth = depth_behind(numbers, plane + 10 * h, x, rest)
-        work[depths + h] = depth
+    for h in range(facets):
+        depth = depth_behind(numbers, planes + 10 * h, x)
+        work[place(depths + h)] = depth
         least = min(least, depth)
-        part = min(part, depth * numbers[plane + 10 * h + 9])
+    if least < CANCELED:
+        least = np.inf
+        for h in range(facets):
+            plane, depth = planes + 10 * h, work[place(depths + h)]
+            if abs(depth) < CANCELED:
+                depth = exact_depth(numbers, plane, x, rest)
+                work[place(depths + h)] = depth
+            least = min(least, depth)
+            part = min(part, depth * numbers[place(plane + 9)])
     return least, part

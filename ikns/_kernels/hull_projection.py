@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.diagram import HULL, HULL_SITES, SITE
+from ikns._kernels.diagram import HULL, HULL_SITES, SITE, place
 from ikns._kernels.twofold import Triple
 
 __all__ = ["nearest_on_hull"]
@@ -26,8 +26,8 @@ _TIE = 1e-12
 
 @compiled
 def _site(numbers: Floats, indices: Indices, facet: int, k: int) -> Triple:
-    at = indices[SITE] + 3 * indices[indices[HULL_SITES] + 3 * facet + k]
-    return numbers[at], numbers[at + 1], numbers[at + 2]
+    at = indices[SITE] + 3 * indices[place(indices[HULL_SITES] + 3 * facet + k)]
+    return numbers[place(at)], numbers[place(at + 1)], numbers[place(at + 2)]
 
 
 @compiled

@@ -26,88 +26,87 @@ from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.diagram import (
-    AXIS,
-    EDGE_ROWS,
+    ANGLE,
+    CORNER_ROWS,
+    EDGE,
+    FOUND,
     KEPT,
     LAPLACE,
     METHOD,
     POWER,
     RING,
-    SITE,
     TOWARD,
     VOLUME,
+    place,
 )
-from ikns._kernels.twofold import Triple
 
-__all__ = ["add_edge", "face_site"]
+__all__ = ["add_polygons"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
 @compiled
-def face_site(
-    numbers: Floats, indices: Indices, site: int, x: Triple, work: Floats
-) -> float:
-    """Write the way from the query to a site; return its square."""
-    at, toward = indices[SITE] + 3 * site, indices[TOWARD] + 3 * site
-    p, q, r = numbers[at] - x[0], numbers[at + 1] - x[1], numbers[at + 2] - x[2]
-    work[toward], work[toward + 1], work[toward + 2] = p, q, r
-    return p * p + q * q + r * r
+def add_polygons(numbers: Floats, indices: Indices, corners: int, work: Floats) -> None:
+    """Add up V, or F times 12 |p|, of the sites around a cavity of so many corners.
 
+    The corners that the query takes of a polygon follow each other. So each polygon is
+    met once at the first of them, or at its first corner where all are taken. One long
+    loop, because calls that pass arrays cost as much as a polygon.
+    """
+    toward, volume, power = indices[TOWARD], indices[VOLUME], indices[POWER]
+    kept, lengths, rows = indices[KEPT], indices[RING], indices[CORNER_ROWS]
+    edges, angles = indices[EDGE], indices[ANGLE]
+    found = work[indices[FOUND] :].view(np.int64)
+    laplace = indices[METHOD] == LAPLACE
+    for c in range(corners):
+        row = rows + 30 * found[place(c)]
+        for corner_edge in range(12, 30, 3):
+            slot = place(row + corner_edge)
+            edge, start = place(edges + indices[slot]), indices[slot + place(1)]
+            sides = indices[edge + place(2)]
+            whole = work[place(power + indices[slot + place(2)])] > 0
+            if whole and start < sides - 1:
+                continue
+            ring = edge + place(4)
+            k, n = start, 0
+            while n < sides:
+                line = indices[ring + place(k)]
+                work[place(lengths + n)] = work[place(kept + line)]
+                k, n = k + 1 if k < sides - 1 else 0, n + 1
+                if not work[place(power + indices[ring + place(sides + k)])] > 0:
+                    break
+            if whole and n < sides:
+                continue
 
-@compiled
-def _kept_area(numbers: Floats, indices: Indices, row: int, work: Floats) -> float:
-    """Twice the area on the query's side of the polygon whose edge is packed there."""
-    sides, ring, sines = indices[row + 2], indices[row + 3], indices[row + 4]
-    power, kept, lengths = indices[POWER], indices[KEPT], indices[RING]
-    corners = ring + 2 * sides
-    start, taken = 0, 0
-    before = work[power + indices[corners]] > 0
-    for k in range(sides):
-        after = work[power + indices[corners + k + 1]] > 0
-        if after and not before:
-            start = k
-        taken += after
-        before = after
-    if taken == 0:
-        return 0.0
-    for k in range(sides):
-        work[lengths + k] = work[kept + indices[ring + start + k]]
-    area = 0.0
-    for k in range(sides - 1):
-        at = start + k
-        if at >= sides:
-            at -= sides
-        at = sines + at * (sides - 1) - 1
-        across = 0.0
-        for m in range(1, sides - k):
-            across += work[lengths + k + m] * numbers[at + m]
-        area += work[lengths + k] * across
-    return area
+            angle = place(angles + indices[edge + place(3)])
+            sine = angle + place(3 + start * (sides - 1))
+            area = work[place(lengths)] * work[place(lengths + 1)] * numbers[sine]
+            if n > 2:
+                area, k = 0.0, start
+                for m in range(n - 1):
+                    across, sine = 0.0, angle + place(2 + k * (sides - 1))
+                    for gap in range(1, n - m):
+                        across += (
+                            work[place(lengths + m + gap)] * numbers[sine + place(gap)]
+                        )
+                    area += work[place(lengths + m)] * across
+                    k = k + 1 if k < sides - 1 else 0
 
-
-@compiled
-def add_edge(numbers: Floats, indices: Indices, edge: int, work: Floats) -> None:
-    """Add what one polygon contributes to the coordinates of its two sites."""
-    row, axis = indices[EDGE_ROWS] + 5 * edge, indices[AXIS] + 3 * edge
-    area = _kept_area(numbers, indices, row, work)
-    if area == 0:
-        return
-    i, j = indices[row], indices[row + 1]
-    to_i, to_j = indices[TOWARD] + 3 * i, indices[TOWARD] + 3 * j
-    along_i = (
-        numbers[axis] * work[to_i]
-        + numbers[axis + 1] * work[to_i + 1]
-        + numbers[axis + 2] * work[to_i + 2]
-    )
-    along_j = (
-        numbers[axis] * work[to_j]
-        + numbers[axis + 1] * work[to_j + 1]
-        + numbers[axis + 2] * work[to_j + 2]
-    )
-    if indices[METHOD] == LAPLACE:
-        along_i, along_j = along_j, along_i
-        area = -area
-    work[indices[VOLUME] + i] += area * along_j
-    work[indices[VOLUME] + j] -= area * along_i
+            i, j = indices[edge], indices[edge + place(1)]
+            to_i, to_j = place(toward + 3 * i), place(toward + 3 * j)
+            u, v, w = (
+                numbers[angle],
+                numbers[angle + place(1)],
+                numbers[angle + place(2)],
+            )
+            along_i = (
+                u * work[to_i] + v * work[to_i + place(1)] + w * work[to_i + place(2)]
+            )
+            along_j = (
+                u * work[to_j] + v * work[to_j + place(1)] + w * work[to_j + place(2)]
+            )
+            if laplace:
+                along_i, along_j = -along_j, -along_i
+            work[place(volume + i)] += area * along_j
+            work[place(volume + j)] -= area * along_i

@@ -7,41 +7,40 @@ cell that it had to give up.
 
 from __future__ import annotations
 
-import threading
-from typing import Any, get_args
+import math
+from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy import empty, ndarray
 from numpy.typing import ArrayLike, NDArray
 
-from ikns._kernels.diagram import UNSURE, new_work
-from ikns._kernels.natural_neighbor import (
-    interpolate_many,
-    interpolate_one,
-    weigh_many,
-)
+from ikns._kernels.diagram import CORNERS, UNSURE
+from ikns._kernels.natural_neighbor import answer_many, answer_one
+from ikns._kernels.side_by_side import answer_rows, rows_of_work
 from ikns.errors import InvalidInput
 from ikns.interpolation.border import checked_points, checked_values
 from ikns.interpolation.domain import domain
 from ikns.interpolation.faces import solid_angles
-from ikns.interpolation.packed import packed
-from ikns.interpolation.reference import (
-    Outside,
-    placed,
-    reference_weights,
-    scaled,
-)
+from ikns.interpolation.morton import morton_order
+from ikns.interpolation.packed import FEW, packed
+from ikns.interpolation.queries import checked_out, checked_queries
+from ikns.interpolation.reference import Outside, placed, reference_weights, scaled
+from ikns.interpolation.smooth import slopes, smooth_values
 
-__all__ = ["NaturalNeighborInterpolator", "Outside"]
+__all__ = ["Method", "NaturalNeighborInterpolator", "Outside"]
 
+Method = Literal["sibson", "laplace", "sibson_c1"]
 Floats = NDArray[np.float64]
 
 _FLOAT = np.dtype(np.float64)
 #: Faces that fill less than this much of a site's view, steradian, make no neighbors.
 _GLIMPSE = 1e-9
+#: Queries that are answered side by side: enough for vectors, few enough for a cache.
+_ROW = 64
 
 
 class NaturalNeighborInterpolator:
-    """Exact Sibson interpolation between sites in space.
+    """Exact natural-neighbor interpolation between sites in space.
 
     Inside the convex hull the weights are at least 0, sum to 1, reproduce the query
     (``weights @ points == x``), are 1 at a site, continuous everywhere, and follow the
@@ -57,6 +56,20 @@ class NaturalNeighborInterpolator:
     outside : {"nearest", "project", "nan"}
         Outside the hull: the value of the nearest site (the paper's rule; it jumps at
         the hull), the value at the nearest point of the hull (continuous), or NaN.
+    method : {"sibson", "laplace", "sibson_c1"}
+        Sibson's weights: the volume that the query's Voronoi cell takes from the
+        site's. Smooth inside the hull (C1) but at the sites, where values have peaks.
+
+        Laplace's weights: the area of the face between these cells over the distance.
+        Continuous, with creases at the sites and on the spheres through tetrahedra.
+
+        Sibson's smooth interpolant: his weights and tangent planes at the sites. C1
+        everywhere inside the hull, with the gradients at the sites that are given or
+        estimated. Exact for linear functions, and with exact gradients for spherical
+        quadratics, ``a + b . x + c |x|**2``. Values may exceed those of the sites.
+    gradients : (N, ..., 3) array, optional
+        For "sibson_c1": of the values, per m. By default they are estimated: the plane
+        through each site's value that is nearest to its neighbors'.
 
     Attributes
     ----------
@@ -71,6 +84,11 @@ class NaturalNeighborInterpolator:
         A Delaunay triangulation; ties are broken by the order of the sites.
     hull_facets : (H, 3) integer array
         Triangles of the convex hull, counterclockwise from outside.
+    gradients : (N, ..., 3) array or None
+        Those in use.
+    packed : tuple of a float array and an integer array
+        All that compiled code needs: ``natural_weights`` in
+        :mod:`ikns._kernels.natural_neighbor`. Not to be changed.
 
     Raises
     ------
@@ -78,7 +96,7 @@ class NaturalNeighborInterpolator:
         Fewer than 4 points, coincident points (closer than 1e-10 of the set's size), or
         points in a plane (thinner than 1e-9 of it).
     InvalidInput
-        Points or values of the wrong shape or not finite; an unknown `outside`.
+        Points, values or gradients of the wrong shape or not finite; an unknown option.
 
     Notes
     -----
@@ -87,6 +105,12 @@ class NaturalNeighborInterpolator:
     jittered by 1e-17 to 1e-1. Within 1e-11 of the way from the hull to the middle,
     weights are those at 1e-11. Where rounding leaves a query outside the hull it is
     moved in as well: on sets thinner than 1e-6 of their width, by more than 1e-10.
+
+    Queries are answered by compiled code, one or many at a time, which may round
+    differently. One interpolator can be used by many threads at once.
+
+    R. Sibson, A brief description of natural neighbour interpolation (1981).
+    V. V. Belikov et al., The non-Sibsonian interpolation (1997).
 
     Examples
     --------
@@ -107,88 +131,115 @@ class NaturalNeighborInterpolator:
         values: ArrayLike | None = None,
         *,
         outside: Outside = "nearest",
+        method: Method = "sibson",
+        gradients: ArrayLike | None = None,
     ) -> None:
         self.points = checked_points(points)
         self.values = None if values is None else checked_values(values, self.points)
-        if outside not in get_args(Outside):
-            raise InvalidInput(
-                f"unknown outside '{outside}', expected one of {get_args(Outside)}."
-            )
+        for option, given, known in (
+            ("outside", outside, get_args(Outside)),
+            ("method", method, get_args(Method)),
+        ):
+            if given not in known:
+                raise InvalidInput(
+                    f"unknown {option} '{given}', expected one of {known}."
+                )
         self.outside: Outside = outside
+        self.method: Method = method
         self._space = domain(self.points)
         diagram, n = self._space.diagram, len(self.points)
-        flat = np.empty((n, 0)) if self.values is None else self.values.reshape(n, -1)
-        self.packed = packed(self._space, flat, "sibson", outside)
-        self._width = flat.shape[1]
-        self._scratch = threading.local()
         self.simplices = diagram.simplices
         self.hull_facets = diagram.hull_facets
-        self.edges = diagram.edges[solid_angles(diagram, self._space.sites) >= _GLIMPSE]
+        view = solid_angles(diagram, self._space.sites)
+        self.edges = diagram.edges[view >= _GLIMPSE]
+
+        there = np.empty((n, 0)) if self.values is None else self.values
+        self._flat = there.reshape(n, -1)
+        self._each = there.shape[1:], (n,)  # shapes of a value and of weights
+        self._width = there.shape[1] if there.ndim == 2 else 0
+        self._slopes = np.empty((n, 0, 3))
+        self.gradients: Floats | None = None
+        if method == "sibson_c1":
+            self._slopes = slopes(self._space, view, self.values, gradients)
+            self.gradients = self._slopes * self._space.scale
+            self.gradients = self.gradients.reshape(*there.shape, 3)
+        elif gradients is not None:
+            raise InvalidInput("gradients are only for method='sibson_c1'.")
+        self._diagram = packed(self._space, self._flat, self._slopes, method, outside)
+        # Copies that no thread is using: queries write to the one that they take.
+        self._idle: list[Floats] = []
         for array in (self.points, self.simplices, self.hull_facets, self.edges):
             array.flags.writeable = False
 
+    @property
+    def packed(self) -> tuple[Floats, NDArray[np.int64]]:
+        """All that compiled code needs, one array read as floats and as integers.
+
+        For ``natural_weights`` in :mod:`ikns._kernels.natural_neighbor`.
+        """
+        return self._diagram, self._diagram.view(np.int64)
+
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out the threads' scratch memory."""
-        return {name: v for name, v in self.__dict__.items() if name != "_scratch"}
+        """Leave out scratch memory."""
+        return {**self.__dict__, "_idle": []}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Start with no scratch memory."""
-        self.__dict__.update(state, _scratch=threading.local())
-
-    def __call__(self, x: ArrayLike) -> Floats:
+    def __call__(self, x: ArrayLike, *, out: Floats | None = None) -> Floats:
         """Interpolate the values.
 
         Parameters
         ----------
         x : (..., 3) array
             Queries, m. A query that is not finite gives NaN.
+        out : (..., value shape) array, optional
+            Where to write them: float64, C-contiguous.
 
         Returns
         -------
         (..., value shape) array
         """
+        # Live, a point at a time: nothing that is not needed.
+        if type(x) is ndarray and x.dtype is _FLOAT and x.ndim == 1 and out is None:
+            if self._width and x.flags.carray:
+                found = empty(self._width)
+                try:
+                    diagram = self._idle.pop()
+                except IndexError:
+                    diagram = self._diagram.copy()
+                status = answer_one(diagram, x, found)
+                self._idle.append(diagram)
+                if status != UNSURE:
+                    return found
         if self.values is None:
             raise InvalidInput(
                 "these points were given no values, only their weights can be asked."
             )
-        numbers, indices = self.packed
-        if type(x) is np.ndarray and x.dtype is _FLOAT and x.shape == (3,):
-            out = np.empty(self._width)
-            status = interpolate_one(numbers, indices, *x.tolist(), self._work(), out)
-            if status != UNSURE:
-                return out.reshape(self.values.shape[1:])
-        queries, shape = self._checked(x)
-        found = np.empty((len(queries), self._width))
-        state = np.empty(len(queries), dtype=np.int64)
-        order = np.arange(len(queries))
-        interpolate_many(numbers, indices, queries, order, self._work(), found, state)
-        again = np.flatnonzero(state == UNSURE)
-        if again.size:
-            weights = reference_weights(self._space, queries[again], self.outside)
-            found[again] = weights @ self.values.reshape(len(self.points), -1)
-        return found.reshape((*shape, *self.values.shape[1:]))
+        return self._answer(x, 0, out)
 
-    def weights(self, x: ArrayLike) -> Floats:
-        """Sibson weights of the sites.
+    def weights(self, x: ArrayLike, *, out: Floats | None = None) -> Floats:
+        """Weights of the sites.
 
         Parameters
         ----------
         x : (..., 3) array
             Queries, m. A query that is not finite gives NaN.
+        out : (..., N) array, optional
+            Where to write them: float64, C-contiguous.
 
         Returns
         -------
         (..., N) array
+
+        Raises
+        ------
+        InvalidInput
+            For "sibson_c1", whose values also depend on gradients.
         """
-        queries, shape = self._checked(x)
-        found = np.empty((len(queries), len(self.points)))
-        state = np.empty(len(queries), dtype=np.int64)
-        order = np.arange(len(queries))
-        weigh_many(*self.packed, queries, order, self._work(), found, state)
-        again = np.flatnonzero(state == UNSURE)
-        if again.size:
-            found[again] = reference_weights(self._space, queries[again], self.outside)
-        return found.reshape(*shape, len(self.points))
+        if self.method == "sibson_c1":
+            raise InvalidInput(
+                "weights do not tell the values of method 'sibson_c1', which also have "
+                "gradients; method='sibson' has weights."
+            )
+        return self._answer(x, 1, out)
 
     def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
         """Whether queries are in the convex hull or, but for rounding, on it.
@@ -202,7 +253,7 @@ class NaturalNeighborInterpolator:
         -------
         (...) boolean array
         """
-        queries, shape = self._checked(x)
+        queries, shape = checked_queries(x)
         queries = scaled(self._space, queries)
         within = np.zeros(len(queries), dtype=bool)
         seen = np.flatnonzero(np.isfinite(queries).all(axis=1))
@@ -212,19 +263,48 @@ class NaturalNeighborInterpolator:
             within[rows] = placed(self._space, queries[rows], "nan")[1]
         return within.reshape(shape)
 
-    def _checked(self, x: ArrayLike) -> tuple[Floats, tuple[int, ...]]:
-        queries = np.ascontiguousarray(x, dtype=np.float64)
-        if queries.ndim == 0 or queries.shape[-1] != 3:
-            raise InvalidInput(
-                f"expected queries of shape (..., 3), found {np.shape(x)}."
-            )
-        # A copy where needed: compiled code knows only arrays that could be written.
-        flat = np.require(queries.reshape(-1, 3), requirements=["C", "W"])
-        return flat, queries.shape[:-1]
+    def _answer(self, x: ArrayLike, weigh: int, out: Floats | None) -> Floats:
+        """Answer queries with weights or with values."""
+        each = self._each[weigh]
+        queries, shape = checked_queries(x)
+        found = checked_out(out, (*shape, *each))
+        answers = found.reshape(len(queries), math.prod(each))
+        state = np.full(len(queries), UNSURE)
+        self._answer_many(queries, weigh, answers, state)
+        again = np.flatnonzero(state == UNSURE)
+        if again.size:  # never seen
+            answers[again] = self._reference(queries[again], weigh)
+        return found
 
-    def _work(self) -> Floats:
-        """Scratch memory of this thread."""
-        if not hasattr(self._scratch, "work"):
-            self._scratch.work = new_work(self.packed[1])
-        work: Floats = self._scratch.work
-        return work
+    def _answer_many(
+        self, x: Floats, weigh: int, found: Floats, state: NDArray[np.int64]
+    ) -> None:
+        """Write the weights or values of (Q, 3) queries, and what became of them."""
+        diagram, indices = self.packed
+        if len(x) > 1 and indices[CORNERS] <= FEW and self.method != "sibson_c1":
+            work = np.empty((rows_of_work(indices), _ROW))
+            answer_rows(diagram, indices, x, work, weigh, found, state)
+            order = np.flatnonzero(state == UNSURE)
+        else:
+            order = morton_order(x, self.points.min(axis=0), self.points.max(axis=0))
+        diagram = self._taken()
+        answer_many(diagram, x, order, weigh, found, state)
+        self._idle.append(diagram)
+
+    def _taken(self) -> Floats:
+        """Return a copy of the diagram that no other thread has."""
+        try:
+            return self._idle.pop()
+        except IndexError:
+            return self._diagram.copy()
+
+    def _reference(self, x: Floats, weigh: int) -> Floats:
+        """Weights or values of (Q, 3) queries from NumPy."""
+        weights, places = reference_weights(
+            self._space, x, self.outside, laplace=self.method == "laplace"
+        )
+        if weigh:
+            return weights
+        if self.method != "sibson_c1":
+            return weights @ self._flat
+        return smooth_values(self._space, places, weights, self._flat, self._slopes)

@@ -1,6 +1,7 @@
-"""A Voronoi diagram and values at its sites as two flat arrays, for compiled queries.
+"""A Voronoi diagram and values at its sites as one flat array, for compiled queries.
 
-The layout is told in ikns._kernels.diagram.
+The layout is told in ikns._kernels.diagram. Tetrahedra, lines and edges are numbered
+anew, so that those that are close in space are close in memory.
 """
 
 from __future__ import annotations
@@ -9,154 +10,161 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels import diagram as at
+from ikns._kernels.hull import CANCELED
 from ikns.interpolation.domain import Domain
+from ikns.interpolation.morton import morton_order
 from ikns.interpolation.voronoi import Voronoi
 
-__all__ = ["packed"]
+__all__ = ["FEW", "packed"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: Sets with more tetrahedra are searched by walking, not by trying all.
-_ALL = 40
+#: Up to so many tetrahedra trying all is faster than walking (measured).
+FEW = 60
 
-_METHODS = {"sibson": at.SIBSON, "laplace": at.LAPLACE}
+_METHODS = {"sibson": at.SIBSON, "laplace": at.LAPLACE, "sibson_c1": at.SMOOTH}
 _RULES = {"nearest": at.NEAREST, "project": at.PROJECT, "nan": at.NOWHERE}
 
 
 def packed(
-    space: Domain, values: Floats, method: str, outside: str
-) -> tuple[Floats, Indices]:
+    space: Domain, values: Floats, slopes: Floats, method: str, outside: str
+) -> Floats:
     """Pack what queries need.
 
     Parameters
     ----------
     space : Domain
     values : (N, M) array
-    method : {"sibson", "laplace"}
+    slopes : (N, M, 3) array
+        Of the values, per scaled unit of length, for "sibson_c1" only.
+    method : {"sibson", "laplace", "sibson_c1"}
     outside : {"nearest", "project", "nan"}
 
     Returns
     -------
-    numbers : float array
-    indices : integer array
+    (K,) array
     """
     d = space.diagram
-    n, t, e = len(space.sites), len(d.simplices), len(d.edges)
+    n, t = len(space.sites), len(d.simplices)
     f, h = len(d.length), len(d.hull)
-    lines = np.concatenate([np.flatnonzero(d.ahead < t), d.hull])  # the hull's last
-    sides = np.bincount(d.side_edge)
-    header = np.zeros(at.HEADER, dtype=np.int64)
-    header[: at.WALK + 1] = [
-        *(n, t, f, h, e, sides.max()),
-        *(values.shape[1], _METHODS[method], _RULES[outside]),
-        _middle(space) if t > _ALL else -1,
-    ]
-    rings, edges = _rings(d, lines, sides)
-    blocks = {
-        at.CORNER_LINES: _by_corner(
-            np.concatenate([d.behind[lines], d.ahead[lines]]), np.tile(np.arange(f), 2)
-        ),
-        at.CORNER_EDGES: _by_corner(d.entering, d.side_edge),
-        at.LINE_ENDS: np.column_stack([d.behind, d.ahead])[lines],
-        at.HULL_SITES: d.hull_facets,
-        at.EDGE_ROWS: edges,
-        at.RING_LINES: rings,
-    }
-    _place(header, at.HEADER, {name: block.size for name, block in blocks.items()})
-    numbers = {
-        at.SITE: space.sites,
-        at.CORNER: np.column_stack(
+    middle = space.sites[d.simplices].mean(axis=1)
+    corners = morton_order(middle, space.sites.min(axis=0), space.sites.max(axis=0))
+    number = np.append(_turns(corners), t)  # of each tetrahedron; infinity stays last
+    lines = np.argsort(np.where(d.ahead < t, number[d.behind], t), kind="stable")
+    lines[f - h :] = d.hull  # the hull's come last
+    ends = number[np.concatenate([d.behind[lines], d.ahead[lines]])]
+    slots, rings, angles = _edges(d, number, _turns(lines))
+    integers = {
+        at.CORNER_ROWS: np.column_stack(
             [
-                *(d.corner, d.corner_rest, space.sites[d.simplices[:, 0]]),
-                1 + np.abs(d.corner).max(axis=1),
+                *_by_corner(ends, np.tile(np.arange(f), 2), np.roll(ends, f)),
+                d.simplices[corners],
+                slots,
             ]
         ),
-        at.LENGTH: np.where(np.isfinite(d.length), d.length, 0)[lines],
-        at.PLANE: _planes(space, lines),
-        at.AXIS: d.axis,
-        at.VALUE: values,
-        at.SINE: _sines(d, sides),
+        at.LINE_ENDS: ends.reshape(2, -1).T,
+        at.HULL_SITES: d.hull_facets,
+        at.EDGE: rings,
     }
-    _place(header, at.NUMBERS, {name: block.size for name, block in numbers.items()})
-    edges[:, 3] += header[at.RING_LINES]
-    edges[:, 4] += header[at.SINE]
-    room = {
+    first = space.sites[d.simplices[:, 0]]
+    sure = CANCELED * (1 + np.abs(d.corner).max(axis=1))
+    floats = {
+        at.SITE: space.sites,
+        at.CORNER: np.column_stack([d.corner, d.corner_rest, first, sure])[corners],
+        at.LENGTH: np.where(np.isfinite(d.length), d.length, 0)[lines],
+        at.PLANE: _planes(space)[lines],
+        at.ANGLE: angles,
+        at.VALUE: values,
+        at.GRADIENT: slopes,
+    }
+    longest = int(np.bincount(d.side_edge).max())
+    scratch = {
         at.POWER: t + 1,
         at.KEPT: f,
         at.DEPTH: h,
         at.VOLUME: n,
         at.TOWARD: 3 * n,
-        at.RING: int(sides.max()),
-        at.LISTS: 3 + 2 * n + 2 * e + t,
+        at.RING: longest,
+        at.START: 1,
+        at.FOUND: t + 1,
+        at.NEAR: n,
+        at.MARK: n,
     }
-    header[at.WORK] = _place(header, 0, room)
-    return (
-        np.concatenate(
-            [
-                *([space.scale], space.center, [space.rounding]),
-                *(block.ravel() for block in numbers.values()),
-            ]
-        ),
-        np.concatenate([header, *(block.ravel() for block in blocks.values())]),
+    start = int(((middle[corners] - space.center) ** 2).sum(axis=1).argmin())
+    header = np.zeros(at.HEADER, dtype=np.int64)
+    header[: at.MIDDLE + 1] = [
+        *(n, t, f, h, len(d.edges), longest, values.shape[1]),
+        *(_METHODS[method], _RULES[outside], start if t > FEW else -1),
+    ]
+    header[at.SCALE : at.ROUNDING + 1] = np.array(
+        [space.scale, *space.center, space.rounding]
+    ).view(np.int64)
+    blocks = {name: np.zeros(size, dtype=np.int64) for name, size in scratch.items()}
+    blocks[at.POWER] = np.full(t + 1, at.UNKNOWN)
+    blocks |= integers | floats
+    place = at.HEADER
+    for name, block in blocks.items():
+        header[name] = place
+        place += block.size
+    parts = (np.ascontiguousarray(block).ravel() for block in blocks.values())
+    return np.concatenate(
+        [header.view(np.float64), *(part.view(np.float64) for part in parts)]
     )
 
 
-def _place(header: Indices, start: int, sizes: dict[int, int]) -> int:
-    """Note where blocks begin that follow each other; return where they end."""
-    for name, size in sizes.items():
-        header[name] = start
-        start += size
-    return start
+def _turns(order: Indices) -> Indices:
+    """Tell for each item when its turn comes in an order."""
+    turn = np.empty(len(order), dtype=np.int64)
+    turn[order] = np.arange(len(order))
+    return turn
 
 
-def _middle(space: Domain) -> int:
-    """Tetrahedron nearest to the middle of all sites."""
-    middle = space.sites[space.diagram.simplices].mean(axis=1)
-    return int(((middle - space.center) ** 2).sum(axis=1).argmin())
-
-
-def _by_corner(corner: Indices, item: Indices) -> Indices:
-    """Items of each tetrahedron, as many for all; those of infinity are left out."""
+def _by_corner(corner: Indices, *items: Indices) -> list[Indices]:
+    """Items of each tetrahedron, a row each; those of infinity are left out."""
     order = np.argsort(corner, kind="stable")
-    count = np.bincount(corner)
-    return item[order][: count[0] * (len(count) - 1)]
+    corners = int(corner.max())
+    order = order[: np.searchsorted(corner[order], corners)]
+    return [item[order].reshape(corners, -1) for item in items]
 
 
-def _planes(space: Domain, lines: Indices) -> Floats:
+def _planes(space: Domain) -> Floats:
     """Rows of the planes of facets."""
     d = space.diagram
-    site = np.empty(len(lines), dtype=np.int64)
-    site[d.side_facet] = d.edges[d.side_edge, 0]  # the last one written, any will do
+    site = np.empty(len(d.length), dtype=np.int64)
+    site[d.side_facet] = d.edges[d.side_edge, 0]  # any of its three sites will do
     site[d.hull] = d.hull_facets[:, 0]
-    part = np.zeros(len(lines))
+    part = np.zeros(len(d.length))
     part[d.hull] = 1 / space.center_depth
-    return np.column_stack([d.normal, d.normal_rest, space.sites[site], part])[lines]
+    return np.column_stack([d.normal, d.normal_rest, space.sites[site], part])
 
 
-def _rings(d: Voronoi, lines: Indices, sides: Indices) -> tuple[Indices, Indices]:
-    """Rings, and rows of edges: where among rings and sines theirs begin."""
-    place = np.empty(len(lines), dtype=np.int64)
-    place[lines] = np.arange(len(lines))
-    begin = np.concatenate([[0], np.cumsum(3 * sides + 1)])
-    first = np.concatenate([[0], np.cumsum(sides)])[:-1]
-    rings = np.empty(begin[-1], dtype=np.int64)
-    e = d.side_edge
-    k = begin[e] + np.arange(len(e)) - first[e]
-    rings[k] = rings[k + sides[e]] = place[d.side_facet]
-    rings[k + 2 * sides[e]] = d.entering
-    rings[begin[1:] - 1] = d.entering[first]
-    sines = np.concatenate([[0], np.cumsum(sides * (sides - 1))])[:-1]
-    return rings, np.column_stack([d.edges, sides, begin[:-1], sines])
+def _edges(
+    d: Voronoi, number: Indices, line: Indices
+) -> tuple[Indices, Indices, Floats]:
+    """Edges as their tetrahedra know them, their integers and their floats."""
+    e, sides = d.side_edge, np.bincount(d.side_edge)
+    first = np.cumsum(sides) - sides
+    corner, k = number[d.entering], np.arange(len(e)) - first[e]
+    order = np.argsort(np.minimum.reduceat(corner, first), kind="stable")
+    begin = np.empty((2, len(sides)), dtype=np.int64)
+    for row, width in zip(begin, (4 + 2 * sides, 3 + sides * (sides - 1)), strict=True):
+        row[order] = np.cumsum(width[order]) - width[order]
+    edge, angle = begin
 
+    before = first[e] + (k - 1) % sides[e]
+    slots = _by_corner(corner, edge[e], before - first[e], corner[before])
+    integers = np.empty((4 + 2 * sides).sum(), dtype=np.int64)
+    for place, item in enumerate((*d.edges.T, sides, angle)):
+        integers[edge + place] = item
+    integers[edge[e] + 4 + k] = line[d.side_facet]
+    integers[edge[e] + 4 + sides[e] + k] = corner
 
-def _sines(d: Voronoi, sides: Indices) -> Floats:
-    """Sines of the angles from each side of a polygon to the following ones."""
+    floats = np.empty((3 + sides * (sides - 1)).sum())
+    for place in range(3):
+        floats[angle + place] = d.axis[:, place]
     e = d.side_edge[d.first]
-    begin = np.concatenate([[0], np.cumsum(sides * (sides - 1))])
-    first = np.concatenate([[0], np.cumsum(sides)])[e]
-    a, b, s = d.first - first, d.second - first, sides[e]
-    sines = np.empty(begin[-1])
-    sines[begin[e] + a * (s - 1) + b - a - 1] = d.sine
-    sines[begin[e] + b * (s - 1) + a - b + s - 1] = -d.sine
-    return sines
+    a, b, s = d.first - first[e], d.second - first[e], sides[e]
+    floats[angle[e] + 3 + a * (s - 1) + b - a - 1] = d.sine
+    floats[angle[e] + 3 + b * (s - 1) + a - b + s - 1] = -d.sine
+    return np.stack(slots, axis=2).reshape(-1, 18), integers, floats

@@ -31,7 +31,7 @@ _FAR = 1e9
 
 def reference_weights(
     space: Domain, x: Floats, outside: Outside, *, laplace: bool = False
-) -> Floats:
+) -> tuple[Floats, Floats]:
     """Weights of the sites.
 
     Parameters
@@ -46,20 +46,22 @@ def reference_weights(
 
     Returns
     -------
-    (Q, N) array
+    weights : (Q, N) array
+    places : (Q, 3) array
+        Where the weights hold, in the domain's units.
     """
-    queries = scaled(space, x)
-    weights = np.full((len(queries), len(space.sites)), np.nan)
-    seen = np.flatnonzero(np.isfinite(queries).all(axis=1))
+    places = scaled(space, x)
+    weights = np.full((len(places), len(space.sites)), np.nan)
+    seen = np.flatnonzero(np.isfinite(places).all(axis=1))
     step = max(1, 50_000 // len(space.diagram.side_edge))  # blocks that fit a cache
     for start in range(0, len(seen), step):
         rows = seen[start : start + step]
-        weights[rows] = _block(space, queries[rows], outside, laplace)
-    return weights
+        weights[rows], places[rows] = _block(space, places[rows], outside, laplace)
+    return weights, places
 
 
 def scaled(space: Domain, x: Floats) -> Floats:
-    """Bring queries, m, near and to the domain's units; infinite where they overflow."""
+    """Bring queries, m, near, in the domain's units; where they overflow, infinite."""
     with np.errstate(over="ignore", invalid="ignore"):
         queries = x * space.scale
         away = queries - space.center
@@ -74,9 +76,8 @@ def placed(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Project scaled queries where that is the rule; also say which are in the hull."""
     within = _depths(space, x).min(axis=1) >= -space.rounding
-    away = np.flatnonzero(~within)
+    away, x = np.flatnonzero(~within), x.copy()
     if outside == "project" and away.size:
-        x = x.copy()
         facets = space.diagram.hull_facets
         x[away] = nearest_on_hull(space.sites, facets, x[away])
     return x, within
@@ -86,8 +87,10 @@ def _depths(space: Domain, x: Floats) -> Floats:
     return depths(space.diagram, space.sites, x, np.zeros_like(x))
 
 
-def _block(space: Domain, x: Floats, outside: Outside, laplace: bool) -> Floats:
-    """Weights of finite, scaled queries, (Q, N)."""
+def _block(
+    space: Domain, x: Floats, outside: Outside, laplace: bool
+) -> tuple[Floats, Floats]:
+    """Weights of finite, scaled queries, (Q, N), and where they hold, (Q, 3)."""
     weights = np.full((len(x), len(space.sites)), np.nan)
     x, within = placed(space, x, outside)
     if outside == "nearest":
@@ -99,8 +102,8 @@ def _block(space: Domain, x: Floats, outside: Outside, laplace: bool) -> Floats:
     at_site = square <= 1e-36  # nearer, nothing could be told apart
     weights[rows[at_site]] = np.eye(len(space.sites))[nearest[at_site]]
     rows = rows[~at_site]
-    weights[rows] = _inside(space, x[rows], laplace)
-    return weights
+    weights[rows], x[rows] = _inside(space, x[rows], laplace)
+    return weights, x
 
 
 def _nearest(space: Domain, x: Floats) -> tuple[NDArray[np.intp], Floats]:
@@ -109,8 +112,8 @@ def _nearest(space: Domain, x: Floats) -> tuple[NDArray[np.intp], Floats]:
     return nearest, square[np.arange(len(x)), nearest]
 
 
-def _inside(space: Domain, x: Floats, laplace: bool) -> Floats:
-    """Weights of queries in the hull that are not sites."""
+def _inside(space: Domain, x: Floats, laplace: bool) -> tuple[Floats, Floats]:
+    """Weights of queries in the hull that are not sites, and the queries, moved in."""
     # Part of the way from the hull to the middle: linear along every such ray.
     depth = _depths(space, x)
     part = (depth / space.center_depth).min(axis=1, initial=np.inf)
@@ -127,4 +130,4 @@ def _inside(space: Domain, x: Floats, laplace: bool) -> Floats:
             "more is certain."
         )
     weights = weights.clip(0, None)
-    return weights / weights.sum(axis=1, keepdims=True)
+    return weights / weights.sum(axis=1, keepdims=True), x
