@@ -93,20 +93,28 @@ def _volume(body: Polyhedron) -> Fraction:
     return total
 
 
-def sibson_weights(sites, query) -> list[Fraction]:
-    """Exact weights of the given floats; the query strictly inside, not at a site."""
-    *points, q = _integers([*sites, query])
+def _distance(a, b) -> int:
+    """Squared distance."""
+    return sum((i - j) ** 2 for i, j in zip(a, b, strict=True))
 
-    def distance(a, b):
-        return sum((i - j) ** 2 for i, j in zip(a, b, strict=True))
 
+def _cell(points, q) -> Polyhedron:
+    """The query's own Voronoi cell."""
     far = 2**300 * max(abs(value) for point in (*points, q) for value in point)
     cell = _box(far)
-    for site in sorted(points, key=lambda site: distance(site, q)):
+    for site in sorted(points, key=lambda site: _distance(site, q)):
         cell = _cut(cell, _closer(q, site))
     corners = {point for face in cell for point in face}
     if any(abs(value) == far * w for *place, w in corners for value in place):
         raise ValueError("the query is not inside the hull")
+    return cell
+
+
+def sibson_weights(sites, query) -> list[Fraction]:
+    """Exact weights of the given floats; the query strictly inside, not at a site."""
+    *points, q = _integers([*sites, query])
+    cell = _cell(points, q)
+    corners = {point for face in cell for point in face}
     # Only sites with a face on the cell can be nearest to a place in it; the last line
     # checks that nothing is missed.
     near = [
@@ -118,10 +126,43 @@ def sibson_weights(sites, query) -> list[Fraction]:
     weights = dict.fromkeys(points, Fraction(0))
     for mine in near:
         part = cell
-        for other in sorted(near, key=lambda site: distance(site, mine)):
+        for other in sorted(near, key=lambda site: _distance(site, mine)):
             if part and other is not mine:
                 part = _cut(part, _closer(mine, other))
         weights[mine] = _volume(part) / whole
     if sum(weights.values()) != 1:
         raise AssertionError("the parts do not add up to the whole cell")
     return list(weights.values())
+
+
+def laplace_weights(sites, query) -> list[Fraction]:
+    """Exact areas of the cell's faces over distances, of a sum of one.
+
+    A face's area vector points along the way to its site, so that area over distance is
+    the scalar product of the two over the distance squared: no roots.
+    """
+    *points, q = _integers([*sites, query])
+    cell = _cell(points, q)
+    shares = []
+    for site in points:
+        bisector = _closer(q, site)
+        way = [a - b for a, b in zip(site, q, strict=True)]
+        twice = Fraction(0)
+        for face in cell:
+            if any(_value(bisector, corner) for corner in face):
+                continue
+            first, *rest = [[Fraction(v, w) for v in place] for *place, w in face]
+            for second, third in zip(rest, rest[1:], strict=False):
+                u, v = (
+                    [a - b for a, b in zip(corner, first, strict=True)]
+                    for corner in (second, third)
+                )
+                across = (
+                    u[1] * v[2] - u[2] * v[1],
+                    u[2] * v[0] - u[0] * v[2],
+                    u[0] * v[1] - u[1] * v[0],
+                )
+                twice += sum(a * b for a, b in zip(across, way, strict=True))
+        shares.append(twice / _distance(site, q))
+    whole = sum(shares)
+    return [share / whole for share in shares]

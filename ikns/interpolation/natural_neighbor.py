@@ -37,6 +37,8 @@ _FLOAT = np.dtype(np.float64)
 _GLIMPSE = 1e-9
 #: Queries that are answered side by side: enough for vectors, few enough for a cache.
 _ROW = 64
+#: Fewer queries are not worth bringing in order or side by side (measured).
+_BATCH = 8
 
 
 class NaturalNeighborInterpolator:
@@ -156,7 +158,7 @@ class NaturalNeighborInterpolator:
         there = np.empty((n, 0)) if self.values is None else self.values
         self._flat = there.reshape(n, -1)
         self._each = there.shape[1:], (n,)  # shapes of a value and of weights
-        self._width = there.shape[1] if there.ndim == 2 else 0
+        self._width, self._is_row = self._flat.shape[1], there.ndim == 2
         self._slopes = np.empty((n, 0, 3))
         self.gradients: Floats | None = None
         if method == "sibson_c1":
@@ -208,7 +210,7 @@ class NaturalNeighborInterpolator:
                 status = answer_one(diagram, x, found)
                 self._idle.append(diagram)
                 if status != UNSURE:
-                    return found
+                    return found if self._is_row else found.reshape(self._each[0])
         if self.values is None:
             raise InvalidInput(
                 "these points were given no values, only their weights can be asked."
@@ -281,8 +283,10 @@ class NaturalNeighborInterpolator:
     ) -> None:
         """Write the weights or values of (Q, 3) queries, and what became of them."""
         diagram, indices = self.packed
-        if len(x) > 1 and indices[CORNERS] <= FEW and self.method != "sibson_c1":
-            work = np.empty((rows_of_work(indices), _ROW))
+        if len(x) < _BATCH:
+            order = np.arange(len(x))
+        elif indices[CORNERS] <= FEW and self.method != "sibson_c1":
+            work = np.empty((rows_of_work(indices), min(_ROW, len(x))))
             answer_rows(diagram, indices, x, work, weigh, found, state)
             order = np.flatnonzero(state == UNSURE)
         else:
