@@ -165,17 +165,34 @@ def test_smooth_values_have_the_given_gradients_at_sites(seed):
     assert errors[1] < 0.02 * errors[0] < 0.02
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_smooth_values_have_no_creases(seed):
-    rng = np.random.default_rng(seed)
-    net = some_function(seed)
-    a, b = away_from_hull(net.points, 2, rng)
-    along = np.linspace(0, 1, 2001)[:, None]
+def steps_of_slope(net, a, b):
+    """Largest step of the slope from a to b, over that of steps four times as long.
+
+    A quarter where the slope is continuous; more where it jumps, up to 1.
+    """
+    along = np.linspace(0, 1, 2002)[:, None]
     rise = np.gradient(net(a + along * (b - a)), along[:, 0])
-    # Where slopes are continuous, their largest step falls with the step's length; on
-    # a crease it would stay. Halving the length shows which.
-    fine, coarse = np.abs(np.diff(rise)).max(), np.abs(np.diff(rise[::4])).max()
-    assert fine < 0.5 * coarse
+    return np.abs(np.diff(rise)).max() / np.abs(np.diff(rise[::4])).max()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_only_the_smooth_interpolant_has_no_peaks_at_sites(seed):
+    net = some_function(seed)
+    site = net.points[-1]
+    u = 0.1 * np.random.default_rng(seed).normal(size=3)
+    assert steps_of_slope(net, site - u, site + u) < 0.35
+    for method in ("sibson", "laplace"):
+        other = NaturalNeighborInterpolator(net.points, net.values, method=method)
+        assert steps_of_slope(other, site - u, site + u) > 0.5
+
+
+@pytest.mark.parametrize("method", ["sibson", "laplace", "sibson_c1"])
+@pytest.mark.parametrize("seed", range(3))
+def test_between_sites_there_are_no_creases(seed, method):
+    net = some_function(seed)
+    other = NaturalNeighborInterpolator(net.points, net.values, method=method)
+    a, b = away_from_hull(net.points, 2, np.random.default_rng(seed))
+    assert steps_of_slope(other, a, b) < 0.35
 
 
 def test_smooth_kernels_equal_the_reference():

@@ -60,10 +60,8 @@ class NaturalNeighborInterpolator:
         the hull), the value at the nearest point of the hull (continuous), or NaN.
     method : {"sibson", "laplace", "sibson_c1"}
         Sibson's weights: the volume that the query's Voronoi cell takes from the
-        site's. Smooth inside the hull (C1) but at the sites, where values have peaks.
-
-        Laplace's weights: the area of the face between these cells over the distance.
-        Continuous, with creases at the sites and on the spheres through tetrahedra.
+        site's. Laplace's: the area of the face between these cells over the distance.
+        Both are smooth (C1) inside the hull but at the sites, where values have peaks.
 
         Sibson's smooth interpolant: his weights and tangent planes at the sites. C1
         everywhere inside the hull, with the gradients at the sites that are given or
