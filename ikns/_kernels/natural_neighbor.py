@@ -265,14 +265,14 @@ def _give(
 
 
 @compiled
-def answer_one(diagram: Floats, x: Floats, out: Floats) -> int:
-    """Write the value (M,) at a query (3,), m; return its status."""
+def answer_one(diagram: Floats, x: Floats, out: Floats) -> bool:
+    """Write the value (M,) at a query (3,), m; return whether it is sure."""
     if len(x) != 3:
-        return UNSURE
+        return False
     indices, at = diagram.view(np.int64), (x[0], x[1], x[2])
     status, count = _weights(diagram, indices, at, indices[MIDDLE], diagram)
     _give(diagram, indices, status, count, diagram, 0, out)
-    return status
+    return status != UNSURE
 
 
 @compiled

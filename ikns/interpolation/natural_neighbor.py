@@ -205,9 +205,9 @@ class NaturalNeighborInterpolator:
                     diagram = self._idle.pop()
                 except IndexError:
                     diagram = self._diagram.copy()
-                status = answer_one(diagram, x, found)
+                sure = answer_one(diagram, x, found)
                 self._idle.append(diagram)
-                if status != UNSURE:
+                if sure:
                     return found if self._is_row else found.reshape(self._each[0])
         if self.values is None:
             raise InvalidInput(
