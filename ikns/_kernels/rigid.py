@@ -27,7 +27,8 @@ def rigid_pose(
 ) -> None:
     """Write the pose (7,) that carries `source` onto `target`, both (M, 3).
 
-    Points of weight zero do not count, others all the same. `N` and `V` are (4, 4) scratch.
+    Points of weight zero do not count, others all the same. `N` and `V` are (4, 4)
+    scratch.
     """
     n = 0
     ax = ay = az = bx = by = bz = 0.0
