@@ -28,6 +28,7 @@ from scipy.interpolate import (
     NearestNDInterpolator,
     RBFInterpolator,
 )
+from threadpoolctl import threadpool_limits
 
 from ikns.interpolation import NaturalNeighborInterpolator
 
@@ -262,4 +263,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with threadpool_limits(1):
+        main()
