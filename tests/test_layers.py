@@ -10,10 +10,10 @@ import pytest
 ROWS = (
     "errors _kernels",
     "anthropometry body recording motion marker_set files rigid derivative subspace "
-    "clustering interpolation output_folder",
+    "clustering interpolation bootstrap output_folder",
     "skeleton isb finger stream session",
     "marker_ik scaling nullspace_map symbolic",
-    "subject calibration control compare ucm warm_up",
+    "subject calibration ucm control compare warm_up",
     "runtime simulation",
     "experiments",
     "view",
@@ -26,6 +26,7 @@ ONLY_IN = {
     "matplotlib": {"view"},
     "meshcat": {"view"},
     "numba": {"_kernels"},
+    "casadi": {"symbolic"},
     "typer": {"cli"},
     "rich": {"cli"},
 }
