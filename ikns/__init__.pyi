@@ -16,6 +16,7 @@ from .scaling import scale as scale
 from .simulation import simulate_protocol as simulate_protocol
 from .simulation import virtual_subject as virtual_subject
 from .simulation import write_protocol as write_protocol
+from .skeleton import Robot as Robot
 from .skeleton import Skeleton as Skeleton
 from .subject import Subject as Subject
 from .warm_up import warm_up as warm_up

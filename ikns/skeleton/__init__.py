@@ -1,5 +1,6 @@
-"""The skeleton: a person's URDF and markers; sole owner of Pinocchio's model."""
+"""Bodies and robots from a URDF; sole owner of Pinocchio's model."""
 
+from ikns.skeleton.robot import Robot
 from ikns.skeleton.skeleton import Skeleton
 
-__all__ = ["Skeleton"]
+__all__ = ["Robot", "Skeleton"]

@@ -62,14 +62,19 @@ class Frames:
 
     def jacobian(self, q: ArrayLike, chain: str, task: str) -> Array:
         """Jacobians of a chain's hands, (..., k, n)."""
+        hands = tuple(f"{side}_knuckle" for side in chain_sides(chain))
+        return self.jacobian_of(q, hands, chain_joints(chain), task)
+
+    def jacobian_of(
+        self, q: ArrayLike, links: tuple[str, ...], joints: tuple[str, ...], task: str
+    ) -> Array:
+        """Jacobians of links by joints, (..., k, n)."""
         if task not in ("pose", "position"):
             raise InvalidInput(f"task must be 'pose' or 'position', not '{task}'.")
-        joints = chain_joints(chain)
-        hands = tuple(f"{side}_knuckle" for side in chain_sides(chain))
         rows = 6 if task == "pose" else 3
         angles, batch = self._angles(q)
-        jacobian = np.zeros((len(angles), rows * len(hands), len(joints)))
-        write_jacobians(self.paths(hands, joints), angles, rows, jacobian)
+        jacobian = np.zeros((len(angles), rows * len(links), len(joints)))
+        write_jacobians(self.paths(links, joints), angles, rows, jacobian)
         return jacobian.reshape(*batch, *jacobian.shape[1:])
 
     def swivel(self, q: ArrayLike) -> Array:
@@ -111,7 +116,7 @@ class Frames:
 
     def _paths_to(self, links: tuple[str, ...], columns: tuple[str, ...]) -> Paths:
         tree, ends = self.tree, [self.in_tree(link) for link in links]
-        ways = [self._way(joint) for joint, _, _ in ends]
+        ways = [self.way(joint) for joint, _, _ in ends]
         joints = np.array(sum(ways, []), dtype=np.int64)
         names = [self.joint_names[joint - 1] for joint in joints]
         column = np.array(
@@ -125,7 +130,7 @@ class Frames:
             translation=np.stack([*tree.translation[joints], *(p for _, _, p in ends)]),
         )
 
-    def _way(self, joint: int) -> list[int]:
+    def way(self, joint: int) -> list[int]:
         """Joints from the thorax to this one, without the thorax's own."""
         parent = int(self.tree.parent[joint])
-        return [] if parent < 0 else [*self._way(parent), joint]
+        return [] if parent < 0 else [*self.way(parent), joint]
