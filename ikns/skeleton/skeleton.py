@@ -256,6 +256,13 @@ class Skeleton:
         joint, rotation, translation = zip(*hands, strict=True)
         return np.array(joint), np.stack(rotation), np.stack(translation)
 
+    def tree_link(self, link: str) -> tuple[int, Array, Array]:
+        """Joint of the tree that carries a link, and the link's pose in its frame.
+
+        Rotation (3, 3) and translation (3,) m.
+        """
+        return self._frames.in_tree(link)
+
     @cached_property
     def hand_paths(self) -> Paths:
         """From the thorax to the right and the left knuckle frame."""
