@@ -3,6 +3,7 @@
 from ikns.simulation.folder import write_protocol
 from ikns.simulation.movement import Unsteadiness
 from ikns.simulation.protocol import Protocol, simulate_protocol
+from ikns.simulation.robot import explore_null_space, reach_pose
 from ikns.simulation.subject import VirtualSubject, virtual_subject
 from ikns.simulation.trial import Trial
 
@@ -11,6 +12,8 @@ __all__ = [
     "Trial",
     "Unsteadiness",
     "VirtualSubject",
+    "explore_null_space",
+    "reach_pose",
     "simulate_protocol",
     "virtual_subject",
     "write_protocol",
