@@ -1,0 +1,24 @@
+"""A body's kinematics as CasADi expressions, and what optimizers find with them."""
+
+from ikns.symbolic.held_hand import HeldHand, available_range, longest_sweep
+from ikns.symbolic.kinematics import (
+    chain_jacobian,
+    link_in_thorax,
+    markers_in_world,
+)
+from ikns.symbolic.results import AvailableRange, Sweep
+from ikns.symbolic.volumes import Capsule, arm_pairs, capsules
+
+__all__ = [
+    "AvailableRange",
+    "Capsule",
+    "HeldHand",
+    "Sweep",
+    "arm_pairs",
+    "available_range",
+    "capsules",
+    "chain_jacobian",
+    "link_in_thorax",
+    "longest_sweep",
+    "markers_in_world",
+]

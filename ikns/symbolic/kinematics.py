@@ -1,0 +1,231 @@
+"""Forward kinematics and Jacobians as CasADi expressions, from the joint tree.
+
+The same joints as the compiled kernels follow (:mod:`ikns._kernels.tree`), so what an
+optimizer differentiates is the body that everything else moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns._kernels.tree import FREE_FLYER, PRISMATIC, Tree
+from ikns.body import SEGMENTS
+from ikns.errors import InvalidInput
+from ikns.motion import SIDES, chain_joints, chain_sides
+from ikns.skeleton import Skeleton
+from ikns.skeleton.markers import part_along
+
+__all__ = [
+    "chain_jacobian",
+    "frame",
+    "hands_in_thorax",
+    "joint_frames",
+    "link_in_thorax",
+    "markers_in_world",
+    "path_jacobian",
+    "root_at_origin",
+    "sized_markers",
+]
+
+Array = NDArray[np.float64]
+#: Rotation (3, 3) and translation (3, 1), m, as expressions.
+Pose = tuple[ca.SX, ca.SX]
+#: A frame fixed to a joint of a tree: joint, rotation (3, 3), translation (3,) m.
+End = tuple[int, Array, Array]
+
+#: A placement's entry this close to a whole number is one that rounding has blurred;
+#: made whole it drops out of the expressions.
+_BLUR = 1e-15
+
+
+def joint_frames(
+    tree: Tree, q: ca.SX, *, growth: Mapping[int, ca.SX] | None = None
+) -> list[Pose]:
+    """Pose of every joint in the world.
+
+    Parameters
+    ----------
+    tree : Tree
+        From :attr:`ikns.skeleton.Skeleton.tree` or :attr:`ikns.skeleton.Robot.tree`.
+    q : (nq,) expression
+        Configuration; see :func:`root_at_origin`.
+    growth : mapping, optional
+        Factor on what hangs on a joint, by the joint that carries it.
+    """
+    frames: list[Pose] = []
+    grown = {} if growth is None else growth
+    for j, (kind, parent) in enumerate(zip(tree.kind, tree.parent, strict=True)):
+        above = frames[parent] if parent >= 0 else (ca.SX.eye(3), ca.SX.zeros(3, 1))
+        factor = grown.get(int(parent), 1.0)
+        placed = frame(above, tree.rotation[j], factor * _whole(tree.translation[j]))
+        frames.append(_moved(placed, int(kind), q, int(tree.first_q[j])))
+    return frames
+
+
+def frame(above: Pose, rotation: Array, translation: Array | ca.SX) -> Pose:
+    """Pose of a frame that is placed on another."""
+    R, p = above
+    return R @ ca.SX(_whole(rotation)), p + R @ ca.SX(translation)
+
+
+def root_at_origin(angles: ca.SX) -> ca.SX:
+    """Return the configuration (n + 7,) whose free flyer is at the world's origin."""
+    return ca.vertcat(0, 0, 0, 0, 0, 0, 1, angles)
+
+
+def path_jacobian(
+    tree: Tree, frames: Sequence[Pose], end: End, joints: Sequence[int], *, rows: int
+) -> ca.SX:
+    """Jacobian of a frame by joints of the tree, (3 or 6, n).
+
+    Columns ``[z x (x - p); z]`` of revolute and ``[z; 0]`` of sliding joints on the way
+    to the frame, zeros for all others (Siciliano et al. 2009, Robotics, sec. 3.1).
+    """
+    x = frame(frames[end[0]], end[1], end[2])[1]
+    way = {end[0]}
+    while tree.parent[min(way)] >= 0:
+        way.add(int(tree.parent[min(way)]))
+    columns = []
+    for joint in joints:
+        R, p = frames[joint]
+        z = R[:, 2]
+        if joint not in way:
+            column = ca.SX.zeros(6, 1)
+        elif tree.kind[joint] == PRISMATIC:
+            column = ca.vertcat(z, ca.SX.zeros(3, 1))
+        else:
+            column = ca.vertcat(ca.cross(z, x - p), z)
+        columns.append(column[:rows])
+    return ca.horzcat(*columns)
+
+
+def link_in_thorax(skeleton: Skeleton, link: str) -> ca.Function:
+    """Return the function from joint angles (18,) to a link's position and rotation.
+
+    Angles in rad, position (3,) in m, rotation (3, 3), seen from the thorax.
+
+    Examples
+    --------
+    >>> skeleton = Skeleton.load()
+    >>> position, _ = link_in_thorax(skeleton, "right_hand")(np.zeros(18))
+    >>> place = skeleton.link_in_thorax(np.zeros(18), "right_hand")[0]
+    >>> bool(np.allclose(position.full().ravel(), place))
+    True
+    """
+    angles = ca.SX.sym("angles", len(skeleton.joint_names))
+    frames = joint_frames(skeleton.tree, root_at_origin(angles))
+    joint, rotation, translation = skeleton.tree_link(link)
+    R, p = frame(frames[joint], rotation, translation)
+    names = ["angles"], ["position", "rotation"]
+    return ca.Function("link_in_thorax", [angles], [p, R], *names)
+
+
+def hands_in_thorax(skeleton: Skeleton) -> ca.Function:
+    """Return the function from joint angles (18,) rad to both knuckles, (2, 3) m."""
+    angles = ca.SX.sym("angles", len(skeleton.joint_names))
+    frames = joint_frames(skeleton.tree, root_at_origin(angles))
+    ends = [skeleton.tree_link(f"{side}_knuckle") for side in SIDES]
+    places = ca.horzcat(*(frame(frames[j], R, p)[1] for j, R, p in ends)).T
+    return ca.Function("hands_in_thorax", [angles], [places], ["angles"], ["places"])
+
+
+def chain_jacobian(
+    skeleton: Skeleton, chain: str, *, task: str = "pose"
+) -> ca.Function:
+    """Return the function from joint angles (18,) to a chain's Jacobian (k, n).
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    chain, task : str
+        As :meth:`ikns.skeleton.Skeleton.chain_jacobian` takes them, whose rows and
+        columns these are.
+    """
+    if task not in ("pose", "position"):
+        raise InvalidInput(f"task must be 'pose' or 'position', not '{task}'.")
+    angles = ca.SX.sym("angles", len(skeleton.joint_names))
+    tree = skeleton.tree
+    frames = joint_frames(tree, root_at_origin(angles))
+    joints = [skeleton.joint_names.index(name) + 1 for name in chain_joints(chain)]
+    blocks = [
+        path_jacobian(
+            tree,
+            frames,
+            skeleton.tree_link(f"{side}_knuckle"),
+            joints,
+            rows=6 if task == "pose" else 3,
+        )
+        for side in chain_sides(chain)
+    ]
+    J = ca.vertcat(*blocks)
+    return ca.Function("chain_jacobian", [angles], [J], ["angles"], ["jacobian"])
+
+
+def markers_in_world(skeleton: Skeleton) -> ca.Function:
+    """Return the function from a configuration, sizes and offsets to markers.
+
+    From q (25,), the logarithms of size factors (9,) in the order of
+    :data:`ikns.body.SEGMENTS` and offsets (M, 3) m in the links' frames to positions
+    (M, 3) m in the world. With zeros it is
+    :meth:`ikns.skeleton.Skeleton.markers_in_world`, with others that of the skeleton
+    :meth:`~ikns.skeleton.Skeleton.resized` by the factors and then offset.
+    """
+    q = ca.SX.sym("q", 7 + len(skeleton.joint_names))
+    sizes = ca.SX.sym("log_sizes", len(SEGMENTS))
+    offsets = ca.SX.sym("offsets", len(skeleton.marker_set.markers), 3)
+    places = sized_markers(skeleton, q, sizes, offsets)
+    names = ["q", "log_sizes", "offsets"], ["markers"]
+    return ca.Function("markers_in_world", [q, sizes, offsets], [places], *names)
+
+
+def sized_markers(skeleton: Skeleton, q: ca.SX, sizes: ca.SX, offsets: ca.SX) -> ca.SX:
+    """Expression of the markers (M, 3), see :func:`markers_in_world`."""
+    factors = ca.exp(sizes)
+    carriers = {link: skeleton.tree_link(link)[0] for link in SEGMENTS}
+    growth = {carriers[link]: factors[i] for i, link in enumerate(SEGMENTS)}
+    frames = joint_frames(skeleton.tree, q, growth=growth)
+    positions, worn = skeleton.marker_positions, skeleton.marker_set
+    along = part_along(skeleton.urdf, worn, positions)
+    grown = {link: factors[i] - 1 for i, link in enumerate(SEGMENTS)}
+    rows = []
+    for m, marker in enumerate(worn.markers):
+        joint, rotation, translation = skeleton.tree_link(marker.link)
+        place = ca.SX(positions[m]) + offsets[m, :].T
+        place += grown.get(marker.link, 0.0) * along[m]
+        R, p = frame(frames[joint], rotation, translation)
+        rows.append((p + R @ place).T)
+    return ca.vertcat(*rows)
+
+
+def _moved(placed: Pose, kind: int, q: ca.SX, at: int) -> Pose:
+    """Pose after the joint's own motion about or along its z axis."""
+    R, p = placed
+    if kind == FREE_FLYER:
+        x, y, z, w = (q[at + 3 + i] for i in range(4))
+        turn = ca.vertcat(
+            ca.horzcat(
+                1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+            ),
+            ca.horzcat(
+                2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+            ),
+            ca.horzcat(
+                2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+            ),
+        )
+        return R @ turn, p + R @ q[at : at + 3]
+    if kind == PRISMATIC:
+        return R, p + R[:, 2] * q[at]
+    c, s = ca.cos(q[at]), ca.sin(q[at])
+    x, y = R[:, 0], R[:, 1]
+    return ca.horzcat(c * x + s * y, c * y - s * x, R[:, 2]), p
+
+
+def _whole(values: Array) -> Array:
+    """Values with those that are whole but for rounding made whole."""
+    near = np.round(values)
+    return np.where(np.abs(values - near) <= _BLUR, near, values)

@@ -1,0 +1,120 @@
+"""A posture that holds a hand: checked, with all that others must keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.errors import InvalidInput
+from ikns.symbolic.chain import Chain, Held
+
+__all__ = ["Start", "binding", "start_of"]
+
+Array = NDArray[np.float64]
+
+#: A limit or volume binds when this little of it is left, rad and m: a thousand times
+#: what the optimizer's tolerance leaves.
+BINDS = 1e-6
+#: A start may miss a limit or a volume by rounding, rad and m.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A posture and what is fixed by it.
+
+    Parameters
+    ----------
+    x : (n,) array
+        Joints of the chain, rad.
+    angles : (m,) array
+        Angles of the whole body, rad.
+    positions, rotations : (3, h) and (3, 3 h) array
+        Where the hands are, m.
+    null : (d, n) array
+        Joint motions that leave them there, orthonormal rows.
+    """
+
+    x: Array
+    angles: Array
+    positions: Array
+    rotations: Array
+    null: Array
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom left."""
+        return len(self.null)
+
+    @property
+    def hold(self) -> Array:
+        """What the optimizers take as given: matrices column after column."""
+        matrices = (self.positions, self.rotations)
+        return np.concatenate([self.angles, *(m.ravel(order="F") for m in matrices)])
+
+
+def start_of(chain: Chain, held: Held, q: ArrayLike) -> Start:
+    """Check a posture and write down what its hand holds.
+
+    Parameters
+    ----------
+    chain : Chain
+    held : Held
+    q : (m,) or (m + 7,) array
+        Angles of the body, or its configuration; the chain's own (n,) for a robot.
+
+    Raises
+    ------
+    InvalidInput
+        When `q` is not finite, beyond a limit or has volumes that overlap, or nothing
+        is left free to move.
+    """
+    given = np.asarray(q, dtype=np.float64)
+    if given.ndim != 1 or not np.isfinite(given).all():
+        raise InvalidInput(
+            f"expected one finite posture, found an array {given.shape} with "
+            f"{np.count_nonzero(~np.isfinite(given))} values that are not finite."
+        )
+    angles = chain.whole(given)
+    x = angles[chain.columns]
+    beyond = np.maximum(chain.lower - x, x - chain.upper)
+    worst = int(np.argmax(beyond))
+    if beyond[worst] > _ROUNDING:
+        raise InvalidInput(
+            "expected a posture within the joint limits, found "
+            f"{chain.names[worst]} at {np.degrees(x[worst]):.1f} deg, its range being "
+            f"{np.degrees(chain.lower[worst]):.1f} to "
+            f"{np.degrees(chain.upper[worst]):.1f} deg."
+        )
+    x = np.clip(x, chain.lower, chain.upper)
+    room = held.clearance(x, angles).full().ravel()
+    if len(room) and room.min() < -_ROUNDING:
+        worst = int(np.argmin(room))
+        raise InvalidInput(
+            "expected a posture whose volumes are apart, found that "
+            f"{held.names[worst]}, {-1000 * room[worst]:.1f} mm deep."
+        )
+    positions, rotations = (matrix.full() for matrix in held.place(x, angles))
+    _, values, rows = np.linalg.svd(held.jacobian(x, angles).full())
+    rank = int(np.sum(values > 1e-9 * values[0]))
+    if rank == len(x):
+        raise InvalidInput(
+            f"the held hand leaves none of {len(x)} joints free to move."
+        )
+    return Start(x, angles, positions, rotations, rows[rank:])
+
+
+def binding(chain: Chain, held: Held, x: Array, angles: Array) -> tuple[str, ...]:
+    """Name the limits and volumes that leave a posture x (n,) no room."""
+    limits = [
+        f"{name} at its {end} limit"
+        for end, room in (("lower", x - chain.lower), ("upper", chain.upper - x))
+        for name, left in zip(chain.names, room, strict=True)
+        if left < BINDS
+    ]
+    room = held.clearance(x, angles).full().ravel()
+    touching = [held.names[i] for i in np.flatnonzero(room < BINDS)]
+    # The rods of one box share a name.
+    return tuple(dict.fromkeys([*limits, *touching]))

@@ -1,0 +1,71 @@
+"""What comes out of a held hand: a sweep, a range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["AvailableRange", "Sweep"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The self-motion through a posture, as far as it goes both ways.
+
+    Parameters
+    ----------
+    postures : (2 K + 1, n) array
+        From one end to the other, the start in the middle, rad.
+    length : float
+        Joint-space length of the polygon through them, rad.
+    stops : (tuple, tuple) of str
+        What ended it, at the first posture and at the last: names of joint limits and
+        of volumes that touch, or ``closed``, ``singular posture``, ``long``.
+    solved : (bool, bool)
+        Whether the optimizer met its tolerance on either side. Where it did not, the
+        side ends at the last posture of the walk, up to 0.05 rad short.
+    status : (str, str)
+        In the optimizer's own words.
+    """
+
+    postures: Array
+    length: float
+    stops: tuple[tuple[str, ...], tuple[str, ...]]
+    solved: tuple[bool, bool]
+    status: tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class AvailableRange:
+    """How far a direction can go while the hand is held.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Least and greatest ``direction @ x``, rad; compare with m and M of a map.
+    postures : (2, n) array
+        Where they are, rad.
+    stops : (tuple, tuple) of str
+        What binds there: joint limits, volumes that touch, or ``turns back`` where the
+        direction has its extreme between all limits.
+    solved : (bool, bool)
+        Whether the optimizer met its tolerance.
+    status : (str, str)
+        In the optimizer's own words.
+    freedom : int
+        Degrees of freedom left with the hand held. With one the range is that of the
+        curve through the start; with more the best of several starts, so it may be too
+        small, and nothing says that all of it can be reached without letting go.
+    """
+
+    lower: float
+    upper: float
+    postures: Array
+    stops: tuple[tuple[str, ...], tuple[str, ...]]
+    solved: tuple[bool, bool]
+    status: tuple[str, str]
+    freedom: int

@@ -1,0 +1,105 @@
+"""Follow a self-motion step by step: along the null direction, then back to the hand.
+
+A walk gives the optimizer its first guess, and tells how far the curve goes before a
+limit or a volume stops it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["STRIDE", "Function", "Walk", "come_back", "walk"]
+
+Array = NDArray[np.float64]
+Function = Callable[[Array], Array]
+
+#: Step along the curve, rad of joint-space length.
+STRIDE = 0.05
+#: No self-motion of an arm is longer than this, rad; a continuous joint's may be.
+_LONGEST = 30.0
+#: Hands are back where they were when off by less than this, m and rad.
+_TOLERANCE = 1e-10
+#: The next joint motion that moves the hand by so little of what the strongest does
+#: belongs to the null space too: there the curve branches.
+_SINGULAR = 1e-4
+_MAX_STEPS = 20
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Postures one after another along a self-motion.
+
+    Parameters
+    ----------
+    postures : (K, n) array
+        From the start, rad.
+    why : {"blocked", "closed", "singular", "long"}
+        What ended it: a limit or volume, the start reached again, a singular posture,
+        or its length.
+    beyond : (n,) array, optional
+        The first posture that a limit or volume forbids.
+    """
+
+    postures: Array
+    why: str
+    beyond: Array | None = None
+
+
+def come_back(off: Function, jacobian: Function, x: Array) -> Array | None:
+    """Return the nearest joints whose hands are where they were; None if not found."""
+    for _ in range(_MAX_STEPS):
+        error = off(x)
+        if np.abs(error).max() < _TOLERANCE:
+            return x
+        step = np.linalg.lstsq(jacobian(x), -error, rcond=1e-8)[0]
+        x = x + step * min(1.0, 0.3 / max(np.abs(step).max(), 1e-12))
+    return None
+
+
+def walk(
+    off: Function,
+    jacobian: Function,
+    free: Callable[[Array], bool],
+    start: Array,
+    ahead: Array,
+) -> Walk:
+    """Walk from a posture until something stops it.
+
+    Parameters
+    ----------
+    off, jacobian : callable
+        From joints (n,) to how far the hands are off (k,), and its derivative (k, n).
+    free : callable
+        Whether a posture keeps all limits and volumes apart.
+    start : (n,) array
+    ahead : (n,) array
+        Which of both ways to go.
+    """
+    postures, x, length = [start], start, 0.0
+    while length < _LONGEST:
+        _, values, rows = np.linalg.svd(jacobian(x))
+        if values[-1] < _SINGULAR * values[0]:
+            return Walk(np.array(postures), "singular")
+        null = rows[-1]
+        ahead = null if null @ ahead > 0 else -null
+        stride = STRIDE
+        # Where the curve bends sharply a shorter step finds back.
+        while (after := come_back(off, jacobian, x + stride * ahead)) is None or (
+            np.linalg.norm(after - x) > 1.5 * stride
+        ):
+            stride /= 2
+            if stride < 1e-4:
+                return Walk(np.array(postures), "singular")
+        if not free(after):
+            return Walk(np.array(postures), "blocked", after)
+        length += float(np.linalg.norm(after - x))
+        apart = np.abs(np.angle(np.exp(1j * (after - start)))).max()
+        if length > 4 * STRIDE and apart < STRIDE / 2 + 1e-3:
+            return Walk(np.array([*postures, after]), "closed")
+        postures.append(after)
+        x = after
+    return Walk(np.array(postures), "long")
