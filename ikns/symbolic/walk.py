@@ -82,7 +82,8 @@ def walk(
     postures, x, length = [start], start, 0.0
     while length < _LONGEST:
         _, values, rows = np.linalg.svd(jacobian(x))
-        if values[-1] < _SINGULAR * values[0]:
+        # A curve: of n joints n - 1 move the hand.
+        if values[len(x) - 2] < _SINGULAR * values[0]:
             return Walk(np.array(postures), "singular")
         null = rows[-1]
         ahead = null if null @ ahead > 0 else -null
