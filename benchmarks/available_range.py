@@ -37,13 +37,12 @@ HOLDS = {
 }
 
 
-def subject(seed: int, *, seconds: float, n_points: int) -> dict:
+def subject(seed: int, *, seconds: float, every: int) -> dict:
     """Return used and available ranges of one simulated subject, point by point."""
     person = virtual_subject(seed)
     run = simulate_protocol(
         person,
         seed=seed,
-        n_points=n_points,
         free_seconds=0.1,
         point_seconds=seconds,
         rate=50,
@@ -60,7 +59,8 @@ def subject(seed: int, *, seconds: float, n_points: int) -> dict:
         for name, (chain, task, pairs) in HOLDS.items()
     }
     rows = []
-    for k, Z in enumerate(learned.directions_[:, 0]):
+    for k in range(0, len(learned.centers_), every):
+        Z = learned.directions_[k, 0]
         own = np.flatnonzero(learned.labels_ == k)
         middle = np.linalg.norm(q[own] - learned.cluster_means_[k], axis=1).argmin()
         posture = truth.q[gate[own[middle]]]
@@ -153,8 +153,8 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     seeds = range(1 if options.quick else options.seeds)
-    seconds, n_points = (2.0, 5) if options.quick else (5.0, 10)
-    people = [subject(seed, seconds=seconds, n_points=n_points) for seed in seeds]
+    seconds, every = (2.0, 2) if options.quick else (5.0, 1)
+    people = [subject(seed, seconds=seconds, every=every) for seed in seeds]
     about = {
         "simulated": True,
         "seeds": [seeds[0], seeds[-1]],
