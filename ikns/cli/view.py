@@ -1,0 +1,161 @@
+"""``ikns view``: a subject's map, and a recording, in three dimensions."""
+
+from __future__ import annotations
+
+import json
+import sys
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import ikns
+from ikns.cli.options import AsJson, Force
+from ikns.cli.output import (
+    progress,
+    refuse_overwriting,
+    show,
+    table,
+    write_text,
+)
+from ikns.errors import FileError, InvalidInput
+
+__all__ = ["view"]
+
+
+def view(
+    subject: Annotated[Path, typer.Argument(help="Folder that ikns calibrate wrote.")],
+    recording: Annotated[
+        Path | None,
+        typer.Argument(help="Recording to play: .c3d, .trc or Vicon .csv."),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("view.html"),
+    png: Annotated[Path | None, typer.Option(help="Picture to write as well.")] = None,
+    point: Annotated[
+        int | None,
+        typer.Option(
+            help="PCA point, from 1, at which the arm shows its null space; that with "
+            "the widest range by default."
+        ),
+    ] = None,
+    open_page: Annotated[
+        bool, typer.Option("--open", help="Show the page in the browser.")
+    ] = False,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Show PCA points, volume and null space around the body, in one HTML file.
+
+    With a recording the page plays it, beside what the map says.
+    """
+    from ikns.calibration import track_chain
+
+    refuse_overwriting(out, force=force)
+    if png is not None:
+        refuse_overwriting(png, force=force)
+        if png.absolute() == out.absolute():
+            raise InvalidInput(f"{png}: expected two files, found one for both.")
+    person = ikns.Subject.load(subject)
+    learned, row = person.null_space_map, None if point is None else point - 1
+    simulated = _simulated(person, subject, recording)
+    name = subject.resolve().name
+    frames = None if recording is None else ikns.read(recording)
+
+    from ikns.view.scene import map_scene, recording_scene, scene_html, scene_picture
+
+    if frames is None:
+        scene = map_scene(
+            person.skeleton,
+            learned,
+            person.chain,
+            simulated=simulated,
+            title=f"Null-space map of {name}",
+            point=row,
+        )
+    else:
+        with progress() as report:
+            motion = track_chain(person.skeleton, frames, person.chain, progress=report)
+        scene = recording_scene(
+            person.skeleton,
+            learned,
+            person.chain,
+            motion,
+            frames,
+            simulated=simulated,
+            title=f"{Path(recording or '').name}, {name}",
+            point=row,
+        )
+    page = scene_html(scene)
+    picture = None if png is None else scene_picture(scene)
+    write_text(out, page)
+    remarks = []
+    if png is not None and picture is not None:
+        _write_bytes(png, picture.png)
+        if picture.note:
+            remarks.append(picture.note)
+            sys.stderr.write(f"ikns: {picture.note}.\n")
+    if open_page:
+        webbrowser.open(out.resolve().as_uri())
+    given = 0 if frames is None else len(frames.time)
+    seconds = float(scene.times[-1]) if len(scene.times) else 0.0
+    size = len(page.encode())
+    result = {
+        "subject": subject,
+        "recording": recording,
+        "simulated": simulated,
+        "html": out,
+        "png": png,
+        "points": len(learned.centers_),
+        "frames_of_the_recording": given,
+        "frames_played": len(scene.times),
+        "seconds": seconds,
+        "page_bytes": size,
+        "notes": remarks,
+    }
+    rows = [
+        ["PCA points", f"{len(learned.centers_)}"],
+        ["seconds to play", f"{seconds:.1f}"],
+        ["size of the page, MB", f"{size / 1e6:.1f}"],
+    ]
+    if given > len(scene.times):
+        rows.insert(2, ["frames played", f"{len(scene.times)} of {given}"])
+    show(
+        result,
+        table(
+            scene.title + (" (simulated)" if simulated else ""),
+            {"quantity": "s", "value": "s"},
+            rows,
+        ),
+        f"Wrote {out}" if png is None else f"Wrote {out} and {png}",
+        as_json=as_json,
+    )
+
+
+def _simulated(person: ikns.Subject, folder: Path, recording: Path | None) -> bool:
+    """Whether a virtual subject is known to be behind it.
+
+    The calibration may say so; `ikns demo` says so in the ``summary.json`` beside the
+    subject's folder, and a simulated recording has its ``truth.json`` beside it.
+    """
+    if person.report.get("simulated"):
+        return True
+    if recording is not None and (recording.absolute().parent / "truth.json").is_file():
+        return True
+    try:
+        text = (folder.absolute().parent / "summary.json").read_text(encoding="utf-8")
+        summary = json.loads(text)
+    except (OSError, ValueError):
+        return False
+    return isinstance(summary, dict) and summary.get("simulated") is True
+
+
+def _write_bytes(path: Path, data: bytes) -> None:
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_bytes(data)
+        part.replace(path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,117 @@
+"""A picture of a page, taken by a browser without a window."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+__all__ = ["HOW_TO_GET_ONE", "find_browser", "screenshot"]
+
+HOW_TO_GET_ONE = (
+    "no Chromium or Chrome found; get one with `apt install chromium`, or name yours "
+    "in the environment variable CHROME"
+)
+_NAMES = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+)
+#: WebGL in software, and no calls to anybody.
+_OPTIONS = (
+    "--headless",
+    "--hide-scrollbars",
+    "--no-first-run",
+    "--disable-gpu-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-extensions",
+    "--disable-dev-shm-usage",
+)
+_LONGEST = 60.0  # s for one picture
+
+
+def find_browser(environ: Mapping[str, str] | None = None) -> str | None:
+    """Path of a Chromium or Chrome: that in ``CHROME``, else the first on ``PATH``.
+
+    Parameters
+    ----------
+    environ : mapping, optional
+        Default: the environment of this process.
+
+    Examples
+    --------
+    >>> find_browser({"PATH": ""}) is None
+    True
+    """
+    known = os.environ if environ is None else environ
+    wanted = known.get("CHROME")
+    for name in (wanted,) if wanted else _NAMES:
+        found = shutil.which(name, path=known.get("PATH", ""))
+        if found:
+            return found
+    return None
+
+
+def browser_options() -> list[str]:
+    """Options with which a browser draws 3-D on a machine without a screen."""
+    # Chromium refuses its sandbox to root. The page is ours and loads nothing.
+    root = hasattr(os, "geteuid") and os.geteuid() == 0
+    return [*_OPTIONS, *(["--no-sandbox"] if root else [])]
+
+
+def screenshot(
+    browser: str, page: str, *, width: int, height: int, scale: float = 2.0
+) -> bytes | None:
+    """Picture of a page as PNG, or None when the browser made none.
+
+    Parameters
+    ----------
+    browser : str
+        Path of the program.
+    page : str
+        HTML text.
+    width, height : int
+        Size of the window, in CSS pixels.
+    scale : float
+        Pixels of the picture per CSS pixel.
+    """
+    with tempfile.TemporaryDirectory(
+        prefix="ikns-view-", ignore_cleanup_errors=True
+    ) as folder:
+        place = Path(folder).resolve()
+        picture = place / "page.png"
+        (place / "page.html").write_text(page, encoding="utf-8")
+        command = [
+            browser,
+            *browser_options(),
+            f"--user-data-dir={place / 'profile'}",
+            f"--window-size={width},{height}",
+            f"--force-device-scale-factor={scale:g}",
+            # Time in the page runs on until it has drawn, however slow the machine is.
+            "--virtual-time-budget=4000",
+            f"--screenshot={picture}",
+            (place / "page.html").as_uri() + "#picture",
+        ]
+        try:
+            subprocess.run(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=_LONGEST,
+                check=True,
+            )
+            return picture.read_bytes()
+        except (OSError, subprocess.SubprocessError):
+            return None

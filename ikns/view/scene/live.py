@@ -1,0 +1,240 @@
+"""One posture after another in an open browser, as they come.
+
+MeshCat's own server listens on every network interface and lives in a process of its
+own. This one listens on the loopback interface alone, in a thread, and only sends: the
+page reads server-sent events.
+"""
+
+from __future__ import annotations
+
+import threading
+import webbrowser
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.errors import FileError, InvalidInput
+from ikns.skeleton import Skeleton
+from ikns.view.scene.body import pose_commands
+from ikns.view.scene.page import packed_json, scene_html
+from ikns.view.scene.scene import Scene
+
+__all__ = ["LiveView"]
+
+_LOOPBACK = "127.0.0.1"
+_FRAMES = "/frames"
+#: A quiet view sends a comment after this many seconds, to notice who has left.
+_HEARTBEAT = 1.0
+
+
+class LiveView:
+    """A scene in the browser whose body follows :meth:`show`.
+
+    Use it as a context manager; leaving it stops the server. :meth:`show` only leaves
+    the newest posture for the browser and never waits for it, so a slow browser skips
+    frames and a control loop does not.
+
+    Parameters
+    ----------
+    scene : Scene
+        From :func:`ikns.view.scene.map_scene`.
+    skeleton : Skeleton
+        That of the scene.
+    port : int
+        0 takes a free one.
+
+    Raises
+    ------
+    FileError
+        When the port cannot be opened.
+
+    Examples
+    --------
+    >>> from ikns.nullspace_map import NullSpaceMap
+    >>> from ikns.view.scene.map_scene import map_scene
+    >>> body = Skeleton.load()
+    >>> corners = 0.3 + 0.1 * np.array(list(np.ndindex(2, 2, 2)), dtype=float)
+    >>> zero = NullSpaceMap.from_arrays(corners, np.zeros((8, 7)), [0.0] * 8, [0.0] * 8)
+    >>> scene = map_scene(body, zero, "right_arm", simulated=True)
+    >>> with LiveView(scene, body) as live:
+    ...     live.show(body.neutral(), c=0.5)
+    ...     live.url.startswith("http://127.0.0.1:")
+    True
+    """
+
+    def __init__(self, scene: Scene, skeleton: Skeleton, *, port: int = 0) -> None:
+        self._skeleton = skeleton
+        self._page = scene_html(_still(scene), live=_FRAMES).encode()
+        self._changed = threading.Condition()
+        self._frame: bytes | None = None
+        self._count = 0
+        self._closed = False
+        try:
+            self._server = _Server((_LOOPBACK, port), self)
+        except (OSError, OverflowError) as error:
+            raise FileError(
+                f"port {port} of {_LOOPBACK} cannot be opened: {error}."
+            ) from None
+        self._thread = threading.Thread(
+            target=self._server.serve_forever,
+            kwargs={"poll_interval": 0.05},
+            name="ikns live view",
+            daemon=True,
+        )
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """Address of the page, on this machine only."""
+        return f"http://{_LOOPBACK}:{self._server.server_address[1]}/"
+
+    def open(self) -> None:
+        """Show the page in the user's browser."""
+        webbrowser.open(self.url)
+
+    def show(
+        self, q: ArrayLike, *, time: float | None = None, c: float | None = None
+    ) -> None:
+        """Move the body; call it at any rate, from one thread.
+
+        Parameters
+        ----------
+        q : (25,) or (18,) array
+            Posture; one that is not finite leaves the body where it was.
+        time : float, optional
+            s, as text on the page.
+        c : float, optional
+            Control signal, as text and as a bar; NaN says that it is unknown.
+
+        Raises
+        ------
+        InvalidInput
+            When the posture has another shape, or the view is closed.
+        """
+        posture = np.asarray(q, dtype=np.float64)
+        if posture.ndim != 1:
+            raise InvalidInput(f"expected one posture (25,), found {posture.shape}.")
+        if self._closed:
+            raise InvalidInput("the live view is closed.")
+        moves = pose_commands(self._skeleton, posture)
+        known = bool(np.isfinite(posture).all())
+        frame = {
+            "commands": [_lean(move) for move in moves] if known else [],
+            "time": time,
+            "c": c if c is not None and np.isfinite(c) else None,
+        }
+        message = f"data: {packed_json(frame)}\n\n".encode()
+        with self._changed:
+            self._frame = message
+            self._count += 1
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Stop the server; calling it again does nothing."""
+        with self._changed:
+            if self._closed:
+                return
+            self._closed = True
+            self._changed.notify_all()
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        """Return the view itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop the server."""
+        self.close()
+
+    def _next(self, last: int) -> tuple[int, bytes] | None:
+        """Frame after number `last`, a comment if none comes, None at the end."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._closed or self._count > last, timeout=_HEARTBEAT
+            )
+            if self._closed:
+                return None
+            if self._frame is None or self._count == last:
+                return last, b":\n\n"
+            return self._count, self._frame
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    block_on_close = False
+
+    def __init__(self, address: tuple[str, int], view: LiveView) -> None:
+        self.view = view
+        super().__init__(address, _Handler)
+        host, port = address[0], self.server_address[1]
+        self.hosts = {f"{host}:{port}", f"localhost:{port}"}
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+
+    def do_GET(self) -> None:
+        # A foreign page may have its name lead here; its browser still says the name.
+        if self.headers.get("Host") not in self.server.hosts:
+            self.send_error(403)
+        elif self.path == "/":
+            page = self.server.view._page
+            self._head("text/html; charset=utf-8", len(page))
+            self.wfile.write(page)
+        elif self.path == _FRAMES:
+            self._head("text/event-stream")
+            self._send_frames()
+        else:
+            self.send_error(404)
+
+    def _head(self, kind: str, length: int | None = None) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-store")
+        if length is not None:
+            self.send_header("Content-Length", str(length))
+        self.end_headers()
+
+    def _send_frames(self) -> None:
+        last = 0
+        try:
+            while (found := self.server.view._next(last)) is not None:
+                last, message = found
+                self.wfile.write(message)
+        except OSError:
+            return  # the browser has gone
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing: stdout and stderr belong to the command."""
+
+
+def _still(scene: Scene) -> Scene:
+    """Return the scene without its animation."""
+    commands = [c for c in scene.commands if c["type"] != "set_animation"]
+    nothing: NDArray[np.float64] = np.zeros(0)
+    return Scene(
+        scene.title,
+        "Live, seen from the thorax.",
+        scene.simulated,
+        commands,
+        scene.layers,
+        scene.camera,
+        scene.target,
+        times=nothing,
+        c=nothing,
+    )
+
+
+def _lean(command: dict[str, Any]) -> dict[str, Any]:
+    """Return the command with fewer digits: a micrometer cannot be seen."""
+    return command | {"matrix": command["matrix"].round(6)}

@@ -1,0 +1,139 @@
+"""The scene of a map: what the arm can do at one PCA point, among all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.colors import to_hex
+
+from ikns.errors import InvalidInput
+from ikns.nullspace_map import NullSpaceMap
+from ikns.skeleton import Skeleton
+from ikns.view.scene.body import body_commands, marker_commands
+from ikns.view.scene.commands import ROOT, Command, property_command, root_commands
+from ikns.view.scene.places import point_commands, volume_commands
+from ikns.view.scene.playback import animation_command
+from ikns.view.scene.postures import posture_at_point
+from ikns.view.scene.scene import Layer, Scene, camera_and_target
+from ikns.view.scene.swivel import Swivel, swivel_commands, swivel_tracks
+from ikns.view.style import INK, VOLUME, point_color
+
+__all__ = ["hidden", "map_commands", "map_layers", "map_scene", "chosen_point"]
+
+#: Legend of things in many colors.
+_MANY = "conic-gradient({} 33%, {} 0 67%, {} 0)".format(
+    *(to_hex(point_color(k)) for k in range(3))
+)
+
+
+def map_scene(
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    chain: str,
+    *,
+    simulated: bool,
+    title: str = "Null-space map",
+    point: int | None = None,
+) -> Scene:
+    """Scene of a map: body, PCA points, volume, ghosts along Z, sweep of the elbow.
+
+    The body plays the sweep: its hand is held while c goes from 0 to 1 and back; one
+    ghost goes along Z with the same c.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    learned : NullSpaceMap
+    chain : str
+        Joints of the map.
+    simulated : bool
+        Whether the map comes from a virtual subject; the page says so.
+    title : str
+    point : int, optional
+        Row of ``learned.centers_`` where the body stands. Default: the point with the
+        widest range.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InvalidInput
+        When there is no such point.
+    """
+    chosen = chosen_point(learned, point)
+    q = posture_at_point(skeleton, learned, chain, chosen)
+    swivel = Swivel.at(skeleton, learned, chain, chosen, q)
+    tracks = swivel_tracks(skeleton, swivel, chain)
+    commands = [
+        *root_commands(),
+        *body_commands(skeleton, q, chain),
+        *marker_commands(skeleton),
+        *map_commands(learned),
+        *swivel_commands(skeleton, swivel, chain, playing=True),
+    ]
+    layers = map_layers(skeleton, learned, chosen)
+    if tracks:
+        commands.append(animation_command(swivel.times, tracks))
+    return Scene(
+        title,
+        f"Arm at PCA point {chosen + 1} with the hand held: the Jacobian's self-motion "
+        "(body) beside the learned direction Z (ghosts).",
+        simulated,
+        commands + hidden(layers),
+        layers,
+        *camera_and_target(skeleton, learned, chain, q),
+        times=swivel.times,
+        c=swivel.playing_c,
+        start=swivel.start,
+    )
+
+
+def chosen_point(learned: NullSpaceMap, point: int | None) -> int:
+    """Return `point`, or the PCA point whose range M - m is the widest."""
+    if point is None:
+        return int(np.argmax((learned.upper_ - learned.lower_)[:, 0]))
+    if not 0 <= point < len(learned.centers_):
+        raise InvalidInput(
+            f"expected a PCA point from 1 to {len(learned.centers_)}, "
+            f"found {point + 1}."
+        )
+    return point
+
+
+def map_commands(learned: NullSpaceMap) -> list[Command]:
+    """Draw the PCA points of a map and the volume between them."""
+    facets = getattr(learned.interpolator_, "hull_facets", None)
+    return [
+        *point_commands(learned.centers_),
+        *volume_commands(learned.centers_, facets),
+    ]
+
+
+def map_layers(
+    skeleton: Skeleton, learned: NullSpaceMap, point: int, *, playing: bool = False
+) -> list[Layer]:
+    """Name what of a map can be switched; `playing` hides what is at one point."""
+    links = dict.fromkeys(m.link for m in skeleton.marker_set.markers)
+    worn = tuple(f"{ROOT}/body/{link}/markers" for link in links)
+    ghost = to_hex(point_color(point))
+    where = f" at point {point + 1}" if playing else ""
+    return [
+        Layer("markers of the model", worn, "#4A4F57", shown=False),
+        Layer("PCA points", (f"{ROOT}/points",), _MANY),
+        Layer("interpolation volume", (f"{ROOT}/volume",), VOLUME),
+        Layer(f"along learned Z{where}", (f"{ROOT}/ghosts",), ghost, not playing),
+        Layer(f"self-motion (Jacobian){where}", (f"{ROOT}/sweep",), INK, not playing),
+    ]
+
+
+def hidden(layers: Sequence[Layer]) -> list[Command]:
+    """Hide what is not shown at first."""
+    return [
+        property_command(path, "visible", False)
+        for layer in layers
+        if not layer.shown
+        for path in layer.paths
+    ]

@@ -1,0 +1,131 @@
+"""A scene as one HTML file that loads nothing: MeshCat's viewer, the scene, a slider.
+
+MeshCat's own export needs its server and a web socket; the viewer itself does not.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from functools import cache
+from html import escape
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ikns.errors import FileError
+from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
+
+__all__ = ["packed_json", "scene_html"]
+
+#: Arrays up to this many numbers are written as such.
+_SHORT = 16
+_KINDS = {"f": ("<f4", "f4"), "u": ("<u4", "u4"), "i": ("<u4", "u4")}
+
+
+def scene_html(scene: Scene, *, live: str | None = None) -> str:
+    """Return the page; the same scene gives the same text.
+
+    Parameters
+    ----------
+    scene : Scene
+    live : str, optional
+        Address on the same server from which poses come
+        (:class:`ikns.view.scene.live.LiveView`).
+
+    Raises
+    ------
+    FileError
+        When MeshCat's viewer is not installed.
+    """
+    data = {
+        "commands": scene.commands,
+        "layers": [layer.__dict__ for layer in scene.layers],
+        "camera": scene.camera,
+        "target": scene.target,
+        "fov": FIELD_OF_VIEW,
+        "times": np.asarray(scene.times, dtype=np.float32),
+        "c": np.asarray(scene.c, dtype=np.float32),
+        "start": scene.start,
+        "live": live,
+    }
+    here = files("ikns.view.scene")
+    style, script = (
+        here.joinpath(name).read_text(encoding="utf-8")
+        for name in ("page.css", "page.js")
+    )
+    # The browser itself refuses whatever else the page would load.
+    policy = (
+        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+        f"img-src data: blob:{'; connect-src ' + repr('self') if live else ''}"
+    )
+    badge = '<p class="badge">Simulated subject</p>' if scene.simulated else ""
+    title = escape(scene.title)
+    return f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}{" (simulated)" if scene.simulated else ""}</title>
+<style>
+{style}</style></head><body>
+<div id="pane"></div>
+<header id="head" class="panel">{badge}<h1>{title}</h1>
+<p>{escape(scene.caption)}</p></header>
+<ul id="legend" class="panel"></ul>
+<div id="player" class="panel" hidden>
+<button id="play" type="button">&#9654;</button>
+<input id="time" type="range" min="0" step="any" value="0" aria-label="Time">
+<output id="clock"></output><output id="c"></output>
+<div id="gauge" title="control signal c, 0 to 1"><i></i></div></div>
+<p id="fault" hidden></p>
+<script id="scene" type="application/json">{packed_json(data)}</script>
+<script>
+{_viewer()}
+</script>
+<script>
+{script}</script>
+</body></html>
+"""
+
+
+def packed_json(value: Any) -> str:
+    """Return JSON that may stand in a page; long arrays are base64 of float32.
+
+    >>> packed_json({"matrix": np.eye(2)})
+    '{"matrix":[[1.0,0.0],[0.0,1.0]]}'
+    >>> packed_json(np.zeros(17, dtype=np.float32))[:24]
+    '{"$":"f4","data":"AAAAAA'
+    """
+    text = json.dumps(value, default=_packed, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")
+
+
+def _packed(value: Any) -> Any:
+    if not isinstance(value, np.ndarray):
+        raise TypeError(f"a scene holds no {type(value).__name__}")
+    if value.size <= _SHORT and np.isfinite(value).all() and value.size:
+        return value.tolist()
+    stored, name = _KINDS[value.dtype.kind]
+    if value.dtype == np.uint8:
+        stored = name = "u1"
+    data = np.ascontiguousarray(value, dtype=stored).tobytes()
+    return {"$": name, "data": base64.b64encode(data).decode("ascii")}
+
+
+@cache
+def _viewer() -> str:
+    # Found, not imported: the package starts with IPython and a message queue.
+    package = find_spec("meshcat")
+    folder = Path((package and package.origin) or "meshcat").parent
+    file = folder / "viewer" / "dist" / "main.min.js"
+    try:
+        text = file.read_text(encoding="utf-8")
+    except OSError as error:
+        raise FileError(
+            f"{file}: MeshCat's viewer cannot be read ({error.strerror}); "
+            "install meshcat again."
+        ) from None
+    return text.replace("</script", "<\\/script")

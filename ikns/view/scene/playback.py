@@ -1,0 +1,163 @@
+"""Poses over time: tracks that a player interpolates, and the command that plays them.
+
+A track moves one node; its times are seconds from the first frame, shared by all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ikns.skeleton import Skeleton
+from ikns.view.scene.body import drawn_links
+from ikns.view.scene.commands import ROOT, Command
+
+__all__ = [
+    "Track",
+    "animation_command",
+    "body_tracks",
+    "kept_frames",
+    "marker_tracks",
+    "markers_in_thorax",
+    "pose_tracks",
+]
+
+Array = NDArray[np.float64]
+
+#: Frames in one page at most: 15 MB of tracks for a body with 24 markers.
+MOST_FRAMES = 18_000
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """How a node moves in its parent.
+
+    Parameters
+    ----------
+    path : str
+        The node.
+    position : (F, 3) array
+        m.
+    quaternion : (F, 4) array, optional
+        x, y, z, w; neighbors on the same half of the sphere, as a player blends them.
+    visible : (F,) boolean array, optional
+        Whether it is shown; what is not keeps its last place.
+    """
+
+    path: str
+    position: Array
+    quaternion: Array | None = None
+    visible: NDArray[np.bool_] | None = None
+
+
+def kept_frames(time: Array, *, rate: float = 30.0) -> NDArray[np.int64]:
+    """Frames to play: every one, or every n-th so that about `rate` a second stay.
+
+    Never more than 18 000 (ten minutes at 30/s).
+
+    Examples
+    --------
+    >>> kept_frames(np.arange(10) / 100.0)
+    array([0, 3, 6, 9])
+    """
+    if len(time) < 2:
+        return np.arange(len(time))
+    step = float(np.median(np.diff(time)))
+    every = max(1, round(1 / (rate * step)), -(-len(time) // MOST_FRAMES))
+    return np.arange(0, len(time), every)
+
+
+def body_tracks(skeleton: Skeleton, q: Array) -> list[Track]:
+    """Tracks of a body that takes the postures (F, 18 or 25)."""
+    names = drawn_links(skeleton)
+    return pose_tracks(skeleton, q, names, f"{ROOT}/body")
+
+
+def pose_tracks(
+    skeleton: Skeleton, q: Array, links: list[str], path: str
+) -> list[Track]:
+    """Tracks of ``<path>/<link>`` for links at postures (F, 18 or 25).
+
+    An unknown posture (NaN) is drawn as the one before it, or the first known.
+    """
+    known = np.all(np.isfinite(q), axis=1)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(q)), 0))
+    held = q[np.where(known[last], last, int(np.argmax(known)))]
+    tracks = []
+    for link in links:
+        position, rotation = skeleton.link_in_thorax(held, link)
+        tracks.append(Track(f"{path}/{link}", position, _quaternions(rotation)))
+    return tracks
+
+
+def markers_in_thorax(markers: Array, q: Array) -> Array:
+    """Markers in the world (F, M, 3) m as the thorax of `q` (F, 25) sees them."""
+    unknown = ~np.all(np.isfinite(q[:, :7]), axis=1)
+    turn = np.where(unknown[:, None], [0.0, 0, 0, 1], q[:, 3:7])
+    rotation = Rotation.from_quat(turn).as_matrix()
+    seen = np.einsum("fji,fmj->fmi", rotation, markers - q[:, None, :3])
+    seen[unknown] = np.nan
+    return np.asarray(seen)
+
+
+def marker_tracks(places: Array, labels: tuple[str, ...], path: str) -> list[Track]:
+    """Tracks of ``<path>/<label>`` for places (F, M, 3) m; NaN is not shown."""
+    tracks = []
+    for m, label in enumerate(labels):
+        seen = np.all(np.isfinite(places[:, m]), axis=1)
+        if not seen.any():
+            continue
+        last = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), 0))
+        held = places[np.where(seen[last], last, int(np.argmax(seen))), m]
+        tracks.append(
+            Track(f"{path}/{label}", held, visible=None if seen.all() else seen)
+        )
+    return tracks
+
+
+def animation_command(times: Array, tracks: list[Track]) -> Command:
+    """Play tracks at `times` (F,) s, over and over, standing still at first."""
+    when = np.asarray(times, dtype=np.float32)
+
+    def clip(track: Track) -> Command:
+        curves = [("position", "vector3", track.position)]
+        if track.quaternion is not None:
+            curves.append(("quaternion", "quaternion", track.quaternion))
+        parts: list[Command] = [
+            {
+                "name": f".{name}",
+                "type": kind,
+                "times": when,
+                "values": np.asarray(values, dtype=np.float32).ravel(),
+            }
+            for name, kind, values in curves
+        ]
+        if track.visible is not None:
+            parts.append(
+                {
+                    "name": ".visible",
+                    "type": "bool",
+                    "times": when,
+                    "values": track.visible.astype(np.uint8),
+                }
+            )
+        # Three.js counts times in frames of a clip: one a second makes them seconds.
+        return {"fps": 1, "name": track.path, "tracks": parts}
+
+    return {
+        "type": "set_animation",
+        "animations": [{"path": t.path, "clip": clip(t)} for t in tracks],
+        # Infinity has no place in JSON; at 10^9 nobody is watching any more.
+        "options": {"play": False, "repetitions": 10**9},
+    }
+
+
+def _quaternions(rotation: Array) -> Array:
+    """Quaternions (F, 4) of rotations (F, 3, 3), without jumps to the other sign."""
+    quaternion = Rotation.from_matrix(rotation).as_quat()
+    turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
+    sign = np.where(np.cumsum(np.concatenate([[0], turned])) % 2, -1.0, 1.0)
+    return np.asarray(quaternion * sign[:, None])

@@ -1,0 +1,149 @@
+"""The scene of a recording: the body plays it, among the points of a map."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.motion import SIDES, Motion, chain_sides
+from ikns.nullspace_map import NullSpaceMap
+from ikns.recording import Recording
+from ikns.skeleton import Skeleton
+from ikns.view.scene.body import body_commands, marker_commands
+from ikns.view.scene.commands import ROOT, Command, object_command, root_commands
+from ikns.view.scene.map_scene import (
+    chosen_point,
+    hidden,
+    map_commands,
+    map_layers,
+)
+from ikns.view.scene.places import trail_commands
+from ikns.view.scene.playback import (
+    Track,
+    animation_command,
+    body_tracks,
+    kept_frames,
+    marker_tracks,
+    markers_in_thorax,
+)
+from ikns.view.scene.postures import posture_at_point
+from ikns.view.scene.scene import Layer, Scene, camera_and_target
+from ikns.view.scene.swivel import Swivel, swivel_commands
+from ikns.view.style import BLUE
+
+__all__ = ["recording_scene"]
+
+Array = NDArray[np.float64]
+
+_SEEN = "#222222"
+_BALL = {
+    "type": "SphereGeometry",
+    "radius": 0.007,
+    "widthSegments": 16,
+    "heightSegments": 12,
+}
+#: Frames that are played, each second.
+_RATE = 30.0
+
+
+def recording_scene(
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    chain: str,
+    motion: Motion,
+    recording: Recording,
+    *,
+    simulated: bool,
+    title: str = "Recording",
+    point: int | None = None,
+) -> Scene:
+    """Scene of a recording: the body plays it, with its markers and the hand's trail.
+
+    Ghosts and sweep are there too, switched off at first.
+
+    Parameters
+    ----------
+    skeleton, learned, chain, simulated, title, point
+        As :func:`map_scene` takes them.
+    motion : Motion
+        The recording as tracked with `skeleton`.
+    recording : Recording
+        Gives the markers.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InvalidInput
+        When motion and recording differ in length, or there is no such point.
+    NotEnoughData
+        When the motion has no known posture.
+    """
+    if len(motion.time) != len(recording.time):
+        raise InvalidInput(
+            f"expected the motion of this recording with {len(recording.time)} frames, "
+            f"found one of {len(motion.time)}."
+        )
+    known = np.all(np.isfinite(motion.q), axis=1)
+    if not known.any():
+        raise NotEnoughData(f"{recording.source}: no frame shows a posture to draw.")
+    chosen = chosen_point(learned, point)
+    place = motion.place(chain)
+    distance = np.linalg.norm(place - learned.centers_[chosen], axis=1)
+    near = int(np.argmin(np.where(known & np.isfinite(distance), distance, np.inf)))
+    q = posture_at_point(skeleton, learned, chain, chosen, start=motion.q[near])
+    swivel = Swivel.at(skeleton, learned, chain, chosen, q)
+
+    kept = kept_frames(motion.time, rate=_RATE)
+    times = motion.time[kept] - motion.time[kept[0]]
+    seen = _seen_markers(skeleton, motion, recording, kept)
+    first = int(kept[np.argmax(known[kept])])
+    signals = learned.control_signal(motion.chain_angles(chain), place)
+    c = signals.reshape(len(place), -1)[:, 0]
+    commands = [
+        *root_commands(),
+        *body_commands(skeleton, motion.q[first if known[first] else near], chain),
+        *marker_commands(skeleton),
+        *(object_command(track.path, _BALL, _SEEN) for track in seen),
+        *_trails(motion, chain, kept),
+        *map_commands(learned),
+        *swivel_commands(skeleton, swivel, chain, playing=False),
+        animation_command(times, body_tracks(skeleton, motion.q[kept]) + seen),
+    ]
+    layers = [
+        Layer("markers seen", (f"{ROOT}/seen",), _SEEN),
+        Layer("where the hand went", (f"{ROOT}/trail",), BLUE),
+        *map_layers(skeleton, learned, chosen, playing=True),
+    ]
+    return Scene(
+        title,
+        "The recording as tracked, seen from the thorax.",
+        simulated,
+        commands + hidden(layers),
+        layers,
+        *camera_and_target(skeleton, learned, chain, q),
+        times=times,
+        c=c[kept],
+        start=float(motion.time[first] - motion.time[kept[0]]),
+    )
+
+
+def _seen_markers(
+    skeleton: Skeleton, motion: Motion, recording: Recording, kept: NDArray[np.int64]
+) -> list[Track]:
+    """Tracks of the markers that the cameras saw and the skeleton knows."""
+    worn = skeleton.marker_set
+    markers = worn.pick(recording.labels, recording.markers)[kept]
+    places = markers_in_thorax(markers, motion.q[kept])
+    return marker_tracks(places, worn.labels, f"{ROOT}/seen")
+
+
+def _trails(motion: Motion, chain: str, kept: NDArray[np.int64]) -> list[Command]:
+    commands: list[Command] = []
+    for side in chain_sides(chain):
+        hand = motion.hand_in_thorax[kept, SIDES.index(side)]
+        commands += trail_commands(f"{ROOT}/trail/{side}", hand)
+    return commands

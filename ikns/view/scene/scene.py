@@ -1,0 +1,99 @@
+"""A whole scene as data, and where one looks at it from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.motion import SIDES, chain_sides
+from ikns.nullspace_map import NullSpaceMap
+from ikns.skeleton import Skeleton
+from ikns.view.scene.commands import Command
+
+__all__ = ["FIELD_OF_VIEW", "Layer", "Scene", "camera_and_target"]
+
+Array = NDArray[np.float64]
+
+#: Vertical angle of view, deg: long enough that near things do not loom.
+FIELD_OF_VIEW = 28.0
+#: From the front, above and the side of the arm, in the thorax frame.
+_FROM = np.array([0.80, 0.30, 0.52])
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Something that a viewer can switch on and off.
+
+    Parameters
+    ----------
+    name : str
+        For people.
+    paths : tuple of str
+        Nodes that make it up.
+    color : str
+        For the legend, as CSS has it.
+    shown : bool
+        At first.
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    color: str
+    shown: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is drawn, and what stands around it.
+
+    Parameters
+    ----------
+    title, caption : str
+        For people.
+    simulated : bool
+        Whether any of it comes from a virtual subject.
+    commands : list of dict
+        MeshCat's, in order (see :mod:`ikns.view.scene.commands`).
+    layers : list of Layer
+    camera, target : (3,) array
+        Where from and where to one looks, m in the thorax frame.
+    times : (F,) array
+        Of the animation's frames, s; empty without one.
+    c : (F,) array
+        Control signal there, not clipped; NaN where unknown.
+    start : float
+        Time that is shown at first, s.
+    """
+
+    title: str
+    caption: str
+    simulated: bool
+    commands: list[Command]
+    layers: list[Layer]
+    camera: Array
+    target: Array
+    times: Array = field(default_factory=lambda: np.zeros(0))
+    c: Array = field(default_factory=lambda: np.zeros(0))
+    start: float = 0.0
+
+
+def camera_and_target(
+    skeleton: Skeleton, learned: NullSpaceMap, chain: str, q: Array
+) -> tuple[Array, Array]:
+    """Camera and target that show the trunk, the arms of a chain and the points."""
+    sides = chain_sides(chain)
+    shown = [learned.centers_, [[-0.03, 0.32, 0.0], [-0.06, -0.23, 0.0]]]
+    for side in SIDES:
+        links = ("upper_arm", "forearm", "hand", "knuckle") if side in sides else ()
+        for link in ("upper_arm", *links):
+            shown.append([skeleton.link_in_thorax(q, f"{side}_{link}")[0]])
+    places = np.concatenate([np.asarray(part) for part in shown])
+    target = (places.min(axis=0) + places.max(axis=0)) / 2
+    radius = float(np.linalg.norm(places - target, axis=1).max())
+    way = _FROM * [1.0, 1.0, 1.0 if "right" in sides else -1.0]
+    if len(sides) > 1:
+        way = way * [1.0, 1.0, 0.3]
+    way = way / np.linalg.norm(way)
+    return target + 1.05 * radius / np.sin(np.radians(FIELD_OF_VIEW / 2)) * way, target
