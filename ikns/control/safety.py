@@ -1,0 +1,123 @@
+"""When the finger may move: five states, and a reason for every way between them.
+
+    disarmed -> armed -> active <-> holding -> safe -> disarmed
+
+Only in ``active`` does the finger follow the signal. Poses that stop coming lead from
+``active`` to ``holding`` (the finger stays where it is) and then to ``safe`` (the safe
+state that was chosen: hold, open or limp); poses that come back lead from ``holding``
+to ``active``. A stop leads to ``safe`` from anywhere but ``disarmed``, and out of
+``safe`` there is no way but to disarm: somebody has to look and arm again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple
+
+from ikns.errors import InvalidInput
+
+__all__ = ["Changes", "Safety", "State", "Transition"]
+
+State = Literal["disarmed", "armed", "active", "holding", "safe"]
+
+
+class Transition(NamedTuple):
+    """One change of state.
+
+    Parameters
+    ----------
+    time : float
+        On the caller's monotonic clock, s.
+    before, after : str
+        States.
+    reason : str
+        Why, in words.
+    """
+
+    time: float
+    before: State
+    after: State
+    reason: str
+
+
+Changes = tuple[Transition, ...]
+
+
+class Safety:
+    """The state machine. It has no clock: every call says what time it is.
+
+    Every call returns the changes of state that it made, for the log.
+
+    Parameters
+    ----------
+    hold_after : float
+        Without a valid pose for longer than this the finger holds, s.
+    safe_after : float
+        Without one for longer than this the finger goes to its safe state, s.
+
+    Attributes
+    ----------
+    state : str
+    """
+
+    def __init__(self, *, hold_after: float = 0.1, safe_after: float = 0.5) -> None:
+        if not 0 < hold_after <= safe_after < math.inf:
+            raise InvalidInput(
+                "expected 0 s < hold_after <= safe_after, found "
+                f"{hold_after:g} s and {safe_after:g} s."
+            )
+        self.hold_after, self.safe_after = hold_after, safe_after
+        self.state: State = "disarmed"
+        self._now = -math.inf
+        self._seen = -math.inf
+
+    def arm(self, now: float, reason: str = "asked to arm") -> Changes:
+        """Allow the finger to become active."""
+        return self._go(now, "armed", reason) if self.state == "disarmed" else ()
+
+    def activate(self, now: float, reason: str = "asked to start") -> Changes:
+        """Let the finger follow, if armed and poses are coming."""
+        now = self._at(now)
+        ready = self.state == "armed" and now - self._seen <= self.hold_after
+        return self._go(now, "active", reason) if ready else ()
+
+    def pose(self, now: float) -> Changes:
+        """Tell that a valid pose has come."""
+        # The watchdog speaks first: what comes after too long a silence is too late.
+        late = self.check(now)
+        if self.state != "safe":
+            self._seen = self._at(now)
+        if self.state == "holding":
+            return late + self._go(now, "active", "poses are back")
+        return late
+
+    def check(self, now: float) -> Changes:
+        """Ask the watchdog; to be called at least as often as the finger is told."""
+        now = self._at(now)
+        silence = now - self._seen
+        moving = self.state in ("active", "holding")
+        if moving and silence > self.safe_after:
+            return self._go(now, "safe", f"no valid pose for {silence:.3f} s")
+        if self.state == "active" and silence > self.hold_after:
+            return self._go(now, "holding", f"no valid pose for {silence:.3f} s")
+        return ()
+
+    def stop(self, now: float, reason: str) -> Changes:
+        """Go to the safe state at once: a fault, or the person asked."""
+        if self.state in ("disarmed", "safe"):
+            return ()
+        return self._go(now, "safe", reason)
+
+    def disarm(self, now: float, reason: str = "asked to disarm") -> Changes:
+        """Leave everything; the finger is relaxed."""
+        return () if self.state == "disarmed" else self._go(now, "disarmed", reason)
+
+    def _at(self, now: float) -> float:
+        """Time never runs back, whatever the clock says; NaN is no time at all."""
+        if now > self._now:
+            self._now = now
+        return self._now
+
+    def _go(self, now: float, after: State, reason: str) -> Changes:
+        before, self.state = self.state, after
+        return (Transition(self._at(now), before, after, reason),)

@@ -1,0 +1,90 @@
+"""Causal smoothing of one signal, and what it costs in delay: the one-euro filter.
+
+A low-pass of first order whose cut-off rises with the speed of the signal: slow parts
+are smooth, fast parts on time. G. Casiez, N. Roussel and D. Vogel (2012), 1 Euro
+filter, CHI, doi 10.1145/2207676.2208639.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ikns.errors import InvalidInput
+
+__all__ = ["OneEuro"]
+
+
+class OneEuro:
+    """A one-euro filter.
+
+    Parameters
+    ----------
+    cutoff : float
+        Of a signal at rest, Hz.
+    beta : float
+        How much the cut-off rises with the signal's speed, Hz per (unit / s).
+    speed_cutoff : float
+        Of the low-pass on the speed itself, Hz; 1 in the publication.
+
+    Attributes
+    ----------
+    value : float
+        The last output; NaN before the first sample.
+    delay : float
+        How far a steadily moving signal is behind at the last cut-off, s. For steps of
+        dt and a share a of each innovation it is ``dt (1 - a) / a``.
+
+    Examples
+    --------
+    >>> smooth = OneEuro(cutoff=1.0, beta=0.0)
+    >>> [round(smooth.step(x, 0.01), 3) for x in (0.0, 1.0, 1.0)]
+    [0.0, 0.059, 0.115]
+    """
+
+    def __init__(
+        self, *, cutoff: float = 1.0, beta: float = 0.5, speed_cutoff: float = 1.0
+    ) -> None:
+        for name, value in (("cutoff", cutoff), ("speed_cutoff", speed_cutoff)):
+            if not 0 < value < math.inf:
+                raise InvalidInput(f"expected a positive {name} in Hz, found {value}.")
+        if not 0 <= beta < math.inf:
+            raise InvalidInput(f"expected a beta of at least 0, found {beta}.")
+        self._cutoff, self._beta, self._speed_cutoff = cutoff, beta, speed_cutoff
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past: the next sample comes out as it is."""
+        self.value = math.nan
+        self.delay = 0.0
+        self._speed = 0.0
+
+    def step(self, x: float, dt: float) -> float:
+        """Return the smoothed signal after one more sample.
+
+        Parameters
+        ----------
+        x : float
+            NaN and infinity are not looked at: the last value stays.
+        dt : float
+            Since the last sample, s. Zero and less are a sample that comes again: the
+            last value stays.
+        """
+        if not math.isfinite(x):
+            return self.value
+        if math.isnan(self.value):
+            self.value = x
+            return x
+        if not 0 < dt < math.inf:
+            return self.value
+        speed = (x - self.value) / dt
+        self._speed += _share(self._speed_cutoff, dt) * (speed - self._speed)
+        share = _share(self._cutoff + self._beta * abs(self._speed), dt)
+        self.value += share * (x - self.value)
+        self.delay = dt * (1 - share) / share
+        return self.value
+
+
+def _share(cutoff: float, dt: float) -> float:
+    """Part of an innovation that passes: that of an RC low-pass, backward Euler."""
+    turn = 2 * math.pi * cutoff * dt
+    return turn / (1 + turn)
