@@ -15,7 +15,6 @@ from ikns.cli.control import control
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
 from ikns.cli.scale import scale
-from ikns.cli.ucm import ucm
 from ikns.cli.view import view
 
 __all__ = ["app", "main"]
@@ -26,7 +25,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
 )
-for command in (demo, scale, calibrate, ik, control, compare, ucm, view):
+for command in (demo, scale, calibrate, ik, control, compare, view):
     app.command()(command)
 
 
