@@ -1,0 +1,1 @@
+"""What `interpolation_error.py` is made of."""
