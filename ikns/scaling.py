@@ -32,7 +32,7 @@ from ikns.recording import Recording
 from ikns.rigid import rigid_transform
 from ikns.skeleton import Skeleton
 
-__all__ = ["ScalingReport", "scale"]
+__all__ = ["ScalingReport", "scale", "size_covariance", "static_posture"]
 
 Array = NDArray[np.float64]
 
@@ -136,19 +136,10 @@ def scale(
     MarkerMismatch
         When no marker is known or a whole segment has none.
     """
-    worn = (
-        marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
+    dressed, target, duration = static_posture(
+        generic, static, marker_set=marker_set, min_duration=min_duration
     )
-    duration = float(static.time[-1] - static.time[0]) if len(static.time) else 0.0
-    duration += 1 / static.rate if len(static.time) > 1 else 0.0
-    if duration < min_duration * (1 - 1e-6):
-        raise NotEnoughData(
-            f"{static.source}: a static trial of at least {min_duration:g} s is "
-            f"expected, found {duration:.2f} s."
-        )
-    target = _mean_posture(static, worn)
-    worn = replace(worn, held=worn.held + _absent_joints(static, worn, target))
-    dressed = generic.wearing(worn)
+    worn = dressed.marker_set
     factors, positions, q, covariance, converged = _fit(dressed, target)
     sized = dressed.resized(_named(factors))
     nominal = sized.marker_positions
@@ -179,6 +170,40 @@ def scale(
         converged=converged,
     )
     return skeleton, report
+
+
+def static_posture(
+    generic: Skeleton,
+    static: Recording,
+    *,
+    marker_set: str | Path | MarkerSet = "oxford24",
+    min_duration: float = 1.0,
+) -> tuple[Skeleton, Array, float]:
+    """Dress the generic body and average the static trial; arguments as :func:`scale`.
+
+    Returns
+    -------
+    dressed : Skeleton
+        The generic body wearing the set at nominal places, joints of arms without any
+        marker held.
+    target : (M, 3) array
+        Mean marker positions, m; NaN where never seen.
+    duration : float
+        Of the trial, s.
+    """
+    worn = (
+        marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
+    )
+    duration = float(static.time[-1] - static.time[0]) if len(static.time) else 0.0
+    duration += 1 / static.rate if len(static.time) > 1 else 0.0
+    if duration < min_duration * (1 - 1e-6):
+        raise NotEnoughData(
+            f"{static.source}: a static trial of at least {min_duration:g} s is "
+            f"expected, found {duration:.2f} s."
+        )
+    target = _mean_posture(static, worn)
+    worn = replace(worn, held=worn.held + _absent_joints(static, worn, target))
+    return generic.wearing(worn), target, duration
 
 
 def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
@@ -243,7 +268,7 @@ def _fit(generic: Skeleton, target: Array) -> tuple[Array, Array, Array, Array, 
     """
     worn = generic.marker_set
     seen = _seen(target)
-    weight = np.linalg.cholesky(np.linalg.inv(_size_covariance())).T
+    weight = np.linalg.cholesky(np.linalg.inv(size_covariance())).T
     placement = np.array([m.placement_sd for m in worn.markers])
     fixed = generic.columns(worn.held)
     free = np.setdiff1d(np.arange(generic.nv), fixed)
@@ -344,8 +369,8 @@ def _seen(markers: Array) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(markers).all(axis=-1))
 
 
-def _size_covariance() -> Array:
-    """Prior covariance of the segments' log factors, (S, S)."""
+def size_covariance() -> Array:
+    """Return the prior covariance of the segments' log factors, (S, S)."""
     kinds = [name.split("_", 1)[-1] if name != "thorax" else name for name in SEGMENTS]
     same = np.array([[a == b for b in kinds] for a in kinds])
     kind_sd = np.array([SEGMENT_SD[kind] for kind in kinds])
