@@ -47,13 +47,13 @@ def block_length(series: ArrayLike) -> int:
     Blocks cut correlations at their ends. A variance from blocks of length b is
     therefore off by the share ``-G / (g(0) b)``, where g(0) is the long-run variance,
     the sum of all autocovariances R(k), and G the sum of ``|k| R(k)``. The length
-    returned makes that share a tenth. Both sums run over lags up to twice the one from which on
-    autocorrelations are no more than noise, with a flat-top window (Politis and White
-    2004, Econometric Reviews 23:53; corrected by Patton, Politis and White 2009,
-    28:372). Their own length, which grows with the cube root of N, has the least mean
-    squared error of the variance; intervals keep their level with longer blocks, while
-    the small number of blocks is allowed for (Sun, Phillips and Jin 2008, Econometrica
-    76:175).
+    returned makes that share a tenth. Both sums run over lags up to twice the one from
+    which on autocorrelations are no more than noise, with a flat-top window (Politis
+    and White 2004, Econometric Reviews 23:53; corrected by Patton, Politis and White
+    2009, 28:372). Their own length, which grows with the cube root of N, has the least
+    mean squared error of the variance; intervals keep their level with longer blocks,
+    while the small number of blocks is allowed for (Sun, Phillips and Jin 2008,
+    Econometrica 76:175).
 
     Parameters
     ----------
