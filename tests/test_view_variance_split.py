@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from ikns.errors import InvalidInput
-from ikns.view.render import png, svg
+from ikns.view.render import pdf, png, svg
 from ikns.view.variance_split import variance_split_figure
 
 RNG = np.random.default_rng(1)
@@ -54,7 +54,7 @@ def test_interval_and_band_reach_from_low_to_high(over: str) -> None:
     named = {area.get_label(): area for area in lower.collections}
     for name, values in (
         ("confidence interval", LOW_HIGH),
-        ("surrogates: joints shuffled", LOW_HIGH - 1),
+        ("surrogates: joints on their own", LOW_HIGH - 1),
     ):
         points = np.concatenate([path.vertices for path in named[name].get_paths()])
         for at, low, high in zip(AT, *values, strict=True):
@@ -80,14 +80,16 @@ def test_the_title_says_simulated_exactly_when_the_data_are(over: str) -> None:
 @pytest.mark.parametrize("over", ["time", "points"])
 def test_the_same_input_gives_the_same_picture(over: str) -> None:
     assert svg(draw(over)) == svg(draw(over))
+    assert pdf(draw(over)) == pdf(draw(over))
     assert png(draw(over)).startswith(b"\x89PNG")
 
 
-def test_gaps_and_infinite_indices_are_drawn() -> None:
-    z = Z.copy()
+@pytest.mark.parametrize("over", ["time", "points"])
+def test_gaps_and_infinite_indices_are_drawn(over) -> None:
+    z, none = Z.copy(), UCM * np.nan
     z[3], z[5] = np.nan, np.inf
-    figure = variance_split_figure(AT, UCM * np.nan, ORT, z, simulated=False)
-    assert svg(figure)
+    assert svg(variance_split_figure(AT, none, ORT, z, over=over, simulated=False))
+    assert svg(variance_split_figure(AT, none, 0 * ORT, z, over=over, simulated=False))
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from ikns.cli.control import control
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
 from ikns.cli.scale import scale
+from ikns.cli.ucm import ucm
 from ikns.cli.view import view
 
 __all__ = ["app", "main"]
@@ -25,7 +26,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
 )
-for command in (demo, scale, calibrate, ik, control, compare, view):
+for command in (demo, scale, calibrate, ik, control, compare, ucm, view):
     app.command()(command)
 
 

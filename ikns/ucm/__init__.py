@@ -5,6 +5,7 @@ The joint variance over repetitions is split along the null space of the task's 
 Brain Res 126:289). From plain arrays, or from motions of a skeleton.
 """
 
+from ikns.ucm.designs import across_trials, within_trial
 from ikns.ucm.intervals import Interval, confidence_interval, mean_interval
 from ikns.ucm.split import VarianceSplit, delta_vz, variance_split
 from ikns.ucm.surrogates import SurrogateTest, surrogate_test
@@ -15,6 +16,7 @@ __all__ = [
     "Interval",
     "SurrogateTest",
     "VarianceSplit",
+    "across_trials",
     "aligned_angles",
     "chain_task",
     "confidence_interval",
@@ -25,4 +27,5 @@ __all__ = [
     "numerical_task",
     "surrogate_test",
     "variance_split",
+    "within_trial",
 ]

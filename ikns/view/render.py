@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ikns.view.style import house_style
 
-__all__ = ["data_uri", "png", "svg"]
+__all__ = ["data_uri", "pdf", "png", "svg"]
 
 #: Dots per inch of a PNG: about two per pixel of a page 900 pixels wide.
 _DPI = 170
@@ -27,6 +27,11 @@ def svg(figure: Figure) -> bytes:
 def png(figure: Figure) -> bytes:
     """Pixel picture."""
     return _saved(figure, "png")
+
+
+def pdf(figure: Figure) -> bytes:
+    """Vector picture for print."""
+    return _saved(figure, "pdf")
 
 
 def data_uri(figure: Figure) -> str:
@@ -51,10 +56,10 @@ def _is_crowded(figure: Figure) -> bool:
 
 def _saved(figure: Figure, kind: str) -> bytes:
     stream = io.BytesIO()
-    # Without these two, the bytes hold the time of day and matplotlib's version.
-    dated = {"Date": None} if kind == "svg" else {"Software": None}
+    # Without these, the bytes hold the time of day or matplotlib's version.
+    dated = {"svg": "Date", "png": "Software", "pdf": "CreationDate"}[kind]
     with house_style(), warnings.catch_warnings():
         # A label in a script that the font lacks shows boxes; the page still stands.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
-        figure.savefig(stream, format=kind, dpi=_DPI, metadata=dated)
+        figure.savefig(stream, format=kind, dpi=_DPI, metadata={dated: None})
     return stream.getvalue()

@@ -82,7 +82,12 @@ def variance_split_figure(
             second=True,
         )
         upper.set_ylabel("variance per DoF (deg²)")
-        upper.set_ylim(bottom=0)
+        if over == "time" or not (np.nan_to_num([ucm, ort]) > 0).any():
+            upper.set_ylim(bottom=0)
+        else:  # a hand that is held keeps V_ORT a hundred times below V_UCM
+            upper.set_yscale("log")
+            upper.yaxis.set_major_formatter("{x:g}")
+            upper.yaxis.set_minor_formatter("")
         _draw_index(lower, over, x, z, *ranges)
         if no_structure is not None:
             name = "V_UCM = V_ORT"
@@ -104,7 +109,7 @@ def _draw_index(
     axes: Any, over: str, x: Array, z: Array, interval: Array | None, band: Array | None
 ) -> None:
     if band is not None:
-        name = "surrogates: joints shuffled"
+        name = "surrogates: joints on their own"
         if over == "time":
             axes.fill_between(x, *band, color="#D9D9D9", lw=0, label=name)
         else:
@@ -112,7 +117,7 @@ def _draw_index(
     if interval is not None:
         name = "confidence interval"
         if over == "time":
-            axes.fill_between(x, *interval, color=BLUE, alpha=0.25, lw=0, label=name)
+            axes.fill_between(x, *interval, fc="none", ec=BLUE, lw=0.8, label=name)
         else:
             axes.vlines(x, *interval, color=GREY, lw=1.2, label=name)
     _draw(axes, over, x, z, BLUE, "dVz")

@@ -1,0 +1,44 @@
+"""A figure as a file: refused before any work, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from ikns.cli.output import refuse_overwriting
+from ikns.errors import InvalidInput
+
+__all__ = ["refuse_picture", "write_picture"]
+
+_ENDINGS = (".png", ".svg", ".pdf")
+
+
+def refuse_picture(path: Path | None, *, force: bool) -> None:
+    """Make sure, before any work, that a picture may be written there.
+
+    Raises
+    ------
+    InvalidInput
+        When its ending is none we write, or the file may not be written.
+    """
+    if path is None:
+        return
+    if path.suffix.lower() not in _ENDINGS:
+        raise InvalidInput(
+            f"{path}: expected a picture with the ending {', '.join(_ENDINGS)}."
+        )
+    refuse_overwriting(path, force=force)
+
+
+def write_picture(path: Path, figure: Any) -> None:
+    """Write a matplotlib figure in the format that the name asks for."""
+    from ikns.view.render import pdf, png, svg
+
+    draw = {".png": png, ".svg": svg, ".pdf": pdf}[path.suffix.lower()]
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(draw(figure))
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

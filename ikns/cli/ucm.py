@@ -1,0 +1,110 @@
+"""``ikns ucm``: joint variance that a task does not see, against that which it does."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+import ikns
+from ikns.cli.options import AsJson, Force, SubjectFolder
+from ikns.cli.output import notes, progress, show
+from ikns.cli.picture import refuse_picture, write_picture
+from ikns.cli.ucm_designs import over_points, over_time
+
+__all__ = ["ucm"]
+
+
+def ucm(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Repetitions of one movement, one file each; or a single recording "
+            "with the hand held at PCA points."
+        ),
+    ],
+    subject: SubjectFolder,
+    task: Annotated[
+        Literal["position", "pose"],
+        typer.Option(help="What the hand keeps: position, or orientation too."),
+    ] = "position",
+    onset_speed: Annotated[
+        float,
+        typer.Option(
+            help="Hand speed (m/s) between whose first and last crossing a repetition "
+            "lies; with a single recording the hand is still below it."
+        ),
+    ] = 0.05,
+    surrogates: Annotated[
+        int, typer.Option(min=1, help="How often to shuffle the joints.")
+    ] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the surrogates.")] = 0,
+    figure: Annotated[
+        Path | None, typer.Option(help="Picture to write: .png, .svg or .pdf.")
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Split joint variance by the null space of the task (uncontrolled manifold).
+
+    Several recordings: variance over repetitions at each normalized time. One: variance
+    over the still samples at each PCA point.
+    """
+    from ikns.calibration import track_chain
+
+    refuse_picture(figure, force=force)
+    calibrated = ikns.Subject.load(subject)
+    with progress() as report:
+        motions = [
+            track_chain(
+                calibrated.skeleton, ikns.read(path), calibrated.chain, progress=report
+            )
+            for path in recordings
+        ]
+    analyze = over_points if len(motions) == 1 else over_time
+    found = analyze(
+        calibrated,
+        motions,
+        [str(path) for path in recordings],
+        task=task,
+        speed=onset_speed,
+        surrogates=surrogates,
+        seed=seed,
+    )
+    simulated = _simulated(recordings)
+    if figure is not None:
+        from ikns.view.variance_split import variance_split_figure
+
+        write_picture(figure, variance_split_figure(**found.drawn, simulated=simulated))
+    show(
+        {
+            "recordings": recordings,
+            "simulated": simulated,
+            "chain": calibrated.chain,
+            "task": task,
+            "onset_speed_m_s": onset_speed,
+            "surrogates": surrogates,
+            "seed": seed,
+            "figure": figure,
+        }
+        | found.result,
+        "Simulated subject" if simulated else "Recorded subject",
+        *found.shown,
+        *notes(found.result["warnings"]),
+        *([] if figure is None else [f"Wrote {figure}"]),
+        as_json=as_json,
+    )
+
+
+def _simulated(recordings: list[Path]) -> bool:
+    """Whether the truth of a virtual subject lies beside any of the recordings."""
+    for folder in {path.parent for path in recordings}:
+        try:
+            truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        if isinstance(truth, dict) and truth.get("simulated"):
+            return True
+    return False

@@ -1,0 +1,243 @@
+"""What ``ikns ucm`` finds in each design: numbers, a table, and what to draw."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import ikns
+from ikns.cli.output import table
+from ikns.errors import NotEnoughData, naming
+
+if TYPE_CHECKING:
+    from ikns.ucm import Interval, SurrogateTest, VarianceSplit
+
+__all__ = ["Found", "over_points", "over_time"]
+
+#: A held hand shows something from this time of still samples on, s; as in calibration.
+_LEAST_STILL = 0.5
+#: Which normalized times the table shows, %; JSON has all.
+_SHOWN = range(0, 101, 10)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a design found.
+
+    Parameters
+    ----------
+    result : dict
+        For JSON.
+    shown : list
+        Tables and sentences.
+    drawn : dict
+        Arguments of the figure.
+    """
+
+    result: dict[str, Any]
+    shown: list[Any]
+    drawn: dict[str, Any]
+
+
+def over_time(
+    subject: ikns.Subject,
+    motions: list[ikns.Motion],
+    sources: list[str],
+    *,
+    task: Literal["position", "pose"],
+    speed: float,
+    surrogates: int,
+    seed: int,
+) -> Found:
+    """Split the variance over repetitions, at each normalized time."""
+    import numpy as np
+
+    from ikns.ucm import across_trials, confidence_interval, movement, surrogate_test
+
+    chain = subject.chain
+    durations = []
+    for motion, source in zip(motions, sources, strict=True):
+        with naming(source):
+            cut = movement(motion.time, motion.hand_speed(chain), threshold=speed)
+        durations.append(float(np.ptp(motion.time[cut])))
+    with naming(f"{len(sources)} recordings"):
+        split = across_trials(
+            subject.skeleton, motions, chain=chain, task=task, threshold=speed
+        )
+    test = surrogate_test(split, n_surrogates=surrogates, seed=seed)
+    each = confidence_interval(split)
+    overall = confidence_interval(split, overall=True)
+    percent = np.linspace(0, 100, len(split.v_ucm))
+    rows = [
+        {"time_percent": float(at)} | row
+        for at, row in zip(percent, _rows(split, test, each), strict=True)
+    ]
+    lost = int(split.rank_lost.sum())
+    warned = [
+        f"the Jacobian has less than rank {split.n_task} at {lost} of "
+        f"{len(percent)} normalized times; there is no split there."
+    ]
+    result = {
+        "design": "across trials",
+        "trials": len(motions),
+        "movement_s": durations,
+        "overall": {
+            "delta_vz": overall.estimate,
+            "delta_vz_interval": [overall.low, overall.high],
+            "delta_vz_no_structure": _no_structure(split),
+            "surrogates_mean": np.nanmean(test.mean),
+            "p": test.p_overall,
+        },
+        "over_time": rows,
+        "warnings": warned if lost else [],
+    }
+    title = f"{len(motions)} trials of {chain}, hand {task}, normalized time"
+    shown = [
+        _table(title, "time %", "time_percent", ".0f", [rows[i] for i in _SHOWN]),
+        f"dVz over the whole movement {overall.estimate:.2f} "
+        f"({overall.low:.2f} to {overall.high:.2f}; {_no_structure(split):.2f} is no "
+        f"structure), with joints shuffled {np.nanmean(test.mean):.2f}, "
+        f"p = {test.p_overall:.3g}",
+    ]
+    return Found(result, shown, {"at": percent} | _drawn(split, test, each))
+
+
+def over_points(
+    subject: ikns.Subject,
+    motions: list[ikns.Motion],
+    sources: list[str],
+    *,
+    task: Literal["position", "pose"],
+    speed: float,
+    surrogates: int,
+    seed: int,
+) -> Found:
+    """Split the variance over the still samples at each PCA point."""
+    import numpy as np
+
+    from ikns.clustering import nearest_center
+    from ikns.nullspace_map import still
+    from ikns.ucm import confidence_interval, surrogate_test, within_trial
+
+    (motion,), (source,) = motions, sources
+    chain, learned = subject.chain, subject.null_space_map
+    gate = still(motion, chain, max_hand_speed=speed)
+    near = np.full(len(gate), -1)
+    if gate.any():
+        places = motion.place(chain)[gate]
+        near[gate] = nearest_center(places, learned.centers_, radius=learned.radius_)[0]
+    n_points, n_joints = len(learned.centers_), learned.directions_.shape[-1]
+    counts = np.bincount(near[near >= 0], minlength=n_points)
+    step = float(np.median(np.diff(motion.time)))
+    least = max(n_joints + 1, int(np.ceil(_LEAST_STILL / step)))
+    rows: list[dict[str, Any]] = [
+        {"point": k + 1, "samples": int(count)} for k, count in enumerate(counts)
+    ]
+    if counts.max() < least:
+        raise NotEnoughData(
+            f"{source}: expected at least {least} samples with the hand slower than "
+            f"{speed:g} m/s near a PCA point, found {counts.max()} at most."
+        )
+    results = []
+    for k in np.flatnonzero(counts >= least).tolist():
+        with naming(f"{source}: PCA point {k + 1}"):
+            split = within_trial(
+                subject.skeleton, motion, near == k, chain=chain, task=task
+            )
+        test = surrogate_test(split, n_surrogates=surrogates, by="shift", seed=seed)
+        each = confidence_interval(split, method="bootstrap", seed=seed)
+        rows[k] |= _rows(split, test, each)[0]
+        results.append({"at": k + 1} | _drawn(split, test, each))
+    warned = [
+        "samples with a still hand are chosen by the task, which by itself makes V_ORT "
+        "small; compare people, points and tasks, not with zero."
+    ]
+    result = {"design": "within a trial", "points": rows, "warnings": warned}
+    title = f"{source}: still samples of {chain} at each PCA point, hand {task}"
+    drawn: dict[str, Any] = {
+        key: np.stack([one[key] for one in results], axis=-1)
+        for key in results[0]
+        if key != "no_structure"
+    }
+    drawn |= {"no_structure": results[0]["no_structure"], "over": "points"}
+    shown = [_table(title, "point", "point", "d", rows)]
+    return Found(result, shown, drawn)
+
+
+def _rows(
+    split: VarianceSplit, test: SurrogateTest, interval: Interval
+) -> list[dict[str, Any]]:
+    import numpy as np
+
+    columns = {
+        "samples": split.trials,
+        "rank": split.rank,
+        "v_ucm_rad2": split.v_ucm,
+        "v_ort_rad2": split.v_ort,
+        "v_tot_rad2": split.v_tot,
+        "delta_v": split.delta_v,
+        "delta_vz": split.delta_vz,
+        "delta_vz_corrected": split.delta_vz_corrected,
+        "delta_vz_low": interval.low,
+        "delta_vz_high": interval.high,
+        "surrogates_mean": test.mean,
+        "p": test.p,
+    }
+    arrays = [np.atleast_1d(column).tolist() for column in columns.values()]
+    return [dict(zip(columns, row, strict=True)) for row in zip(*arrays, strict=True)]
+
+
+def _drawn(
+    split: VarianceSplit, test: SurrogateTest, interval: Interval
+) -> dict[str, Any]:
+    import numpy as np
+
+    return {
+        "v_ucm": split.v_ucm,
+        "v_ort": split.v_ort,
+        "delta_vz": split.delta_vz,
+        "interval": np.stack([interval.low, interval.high]),
+        "surrogates": test.band(),
+        "no_structure": _no_structure(split),
+    }
+
+
+def _no_structure(split: VarianceSplit) -> float:
+    return math.log((split.n_joints - split.n_task) / split.n_task) / 2
+
+
+def _table(
+    title: str, first: str, key: str, form: str, rows: list[dict[str, Any]]
+) -> Any:
+    square_degrees = math.degrees(math.degrees(1.0))
+    scales = {
+        "v_ucm_rad2": square_degrees,
+        "v_ort_rad2": square_degrees,
+        "delta_v": 1.0,
+        "delta_vz": 1.0,
+        "delta_vz_low": 1.0,
+        "delta_vz_high": 1.0,
+        "surrogates_mean": 1.0,
+        "p": 1.0,
+    }
+    return table(
+        title,
+        {
+            first: form,
+            "n": "d",
+            "V_UCM\ndeg2": ".2f",
+            "V_ORT\ndeg2": ".2f",
+            "dV": ".2f",
+            "dVz": ".2f",
+            "95 %\nfrom": ".2f",
+            "\nto": ".2f",
+            "dVz,\nshuffled": ".2f",
+            "p": ".3f",
+        },
+        [
+            [row[key], row["samples"]]
+            + [scale * row.get(name, math.nan) for name, scale in scales.items()]
+            for row in rows
+        ],
+    )
