@@ -1,0 +1,121 @@
+"""Columns of the motion files: names, BIDS types, units, and how a cell is printed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["STATES", "Channel", "marker_channels", "micro", "model_channels"]
+
+#: States of the safety machine by their number in the column ``state``.
+STATES = ("disarmed", "armed", "active", "holding", "safe")
+
+#: Six decimals: micrometers and microseconds.
+_MICRO = "%.6f"
+#: Text as it is; of a number the fewest digits that read back as the same number.
+_EXACT = "%s"
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column of a motion file.
+
+    Parameters
+    ----------
+    name : str
+        Unique within the file.
+    type : str
+        Of BIDS: POS, ORNT, JNTANG, LATENCY, MISC.
+    units : str
+    component : str
+        x, y, z, quat_x to quat_w, or n/a.
+    tracked_point : str
+        What it belongs to.
+    frame : str
+        Reference frame: world, thorax, or n/a.
+    form : str
+        How a number is printed.
+    """
+
+    name: str
+    type: str
+    units: str
+    component: str = "n/a"
+    tracked_point: str = "n/a"
+    frame: str = "n/a"
+    form: str = _MICRO
+
+
+def micro(values: ArrayLike) -> NDArray[np.float64]:
+    """Round to six decimals, m or s, as everything is when it comes in.
+
+    What is printed with six decimals then reads back as the same number, so a session
+    replayed from disk computes with the very numbers that it computed with live. A
+    micrometer is a hundredth of what cameras resolve.
+
+    Examples
+    --------
+    >>> float(f"{float(micro(0.1234567891)):.6f}") == float(micro(0.1234567891))
+    True
+    """
+    # Dividing an integer by a power of ten rounds correctly, as reading decimals does.
+    return np.asarray(np.rint(np.asarray(values, dtype=np.float64) * 1e6) / 1e6 + 0.0)
+
+
+def marker_channels(labels: Sequence[str]) -> list[Channel]:
+    """Columns of what came in: frame number, times, markers.
+
+    Times are LATENCY channels, s from the onset of the run: ``device_time`` by the
+    cameras' clock from their first frame, ``receive_time`` by this machine's.
+    """
+    timing = [
+        Channel("frame", "MISC", "n/a", form="%d"),
+        Channel("device_time", "LATENCY", "s"),
+        Channel("receive_time", "LATENCY", "s"),
+    ]
+    return timing + [
+        Channel(f"{label}_{axis}", "POS", "m", axis, label, "world")
+        for label in labels
+        for axis in "xyz"
+    ]
+
+
+def model_channels(joint_names: Sequence[str], n_dof: int = 1) -> list[Channel]:
+    """Columns of what was made of it, a row a frame.
+
+    Body in the world, joint angles, hand, control signal, what the finger was asked,
+    what was sent and what it measured, and how the stages fared.
+    """
+    body = [
+        Channel(f"thorax_{axis}", "POS", "m", axis, "thorax", "world") for axis in "xyz"
+    ]
+    body += [
+        Channel(f"thorax_{c}", "ORNT", "n/a", c, "thorax", "world")
+        for c in ("quat_x", "quat_y", "quat_z", "quat_w")
+    ]
+    # BIDS asks for degrees.
+    joints = [
+        Channel(name, "JNTANG", "deg", tracked_point=name) for name in joint_names
+    ]
+    hand = [
+        Channel(f"hand_{axis}", "POS", "m", axis, "hand", "thorax") for axis in "xyz"
+    ]
+    signal = [
+        Channel("c" if n_dof == 1 else f"c{k + 1}", "MISC", "n/a", form=_EXACT)
+        for k in range(n_dof)
+    ]
+    finger = [
+        Channel(name, "MISC", "n/a", tracked_point="finger", form=_EXACT)
+        for name in ("flexion_asked", "flexion_sent", "flexion_measured")
+    ]
+    health = [
+        Channel("residual", "MISC", "m"),
+        Channel("inside", "MISC", "n/a", form="%d"),
+        Channel("state", "MISC", "n/a", form="%d"),
+        Channel("solve_time", "MISC", "s"),
+        Channel("latency", "MISC", "s"),
+    ]
+    return body + joints + hand + signal + finger + health
