@@ -61,14 +61,16 @@ def body_commands(skeleton: Skeleton, q: Array, chain: str) -> list[Command]:
         visual_shapes(skeleton.urdf),
         {link: _ARM if link in acting else _BODY for link in drawn_links(skeleton)},
     )
-    return commands + pose_commands(skeleton, q)
+    return commands + pose_commands(f"{ROOT}/body", skeleton, q, drawn_links(skeleton))
 
 
-def pose_commands(skeleton: Skeleton, q: Array) -> list[Command]:
-    """Move a drawn body to a posture, (25,) or (18,)."""
+def pose_commands(
+    path: str, skeleton: Skeleton, q: Array, links: Iterable[str]
+) -> list[Command]:
+    """Move the links ``<path>/<link>`` to a posture, (25,) or (18,)."""
     return [
-        transform_command(f"{ROOT}/body/{link}", link_poses(skeleton, q, link))
-        for link in drawn_links(skeleton)
+        transform_command(f"{path}/{link}", link_poses(skeleton, q, link))
+        for link in links
     ]
 
 
@@ -109,10 +111,7 @@ def ghost_commands(
             opacity=opacity,
             layer=first_layer + k,
         )
-        commands += [
-            transform_command(f"{node}/{link}", link_poses(skeleton, q, link))
-            for link in links
-        ]
+        commands += pose_commands(node, skeleton, q, links)
     return commands
 
 

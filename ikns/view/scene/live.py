@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import FileError, InvalidInput
 from ikns.skeleton import Skeleton
-from ikns.view.scene.body import pose_commands
+from ikns.view.scene.body import drawn_links, pose_commands
+from ikns.view.scene.commands import ROOT
 from ikns.view.scene.page import packed_json, scene_html
 from ikns.view.scene.scene import Scene
 
@@ -66,7 +67,7 @@ class LiveView:
     """
 
     def __init__(self, scene: Scene, skeleton: Skeleton, *, port: int = 0) -> None:
-        self._skeleton = skeleton
+        self._skeleton, self._links = skeleton, drawn_links(skeleton)
         self._page = scene_html(_still(scene), live=_FRAMES).encode()
         self._changed = threading.Condition()
         self._frame: bytes | None = None
@@ -119,7 +120,7 @@ class LiveView:
             raise InvalidInput(f"expected one posture (25,), found {posture.shape}.")
         if self._closed:
             raise InvalidInput("the live view is closed.")
-        moves = pose_commands(self._skeleton, posture)
+        moves = pose_commands(f"{ROOT}/body", self._skeleton, posture, self._links)
         known = bool(np.isfinite(posture).all())
         frame = {
             "commands": [_lean(move) for move in moves] if known else [],
