@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -25,6 +25,12 @@ def control(
     recording: RecordingFile,
     subject: SubjectFolder,
     out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("control.csv"),
+    mode: Annotated[
+        Literal["position", "rate"],
+        typer.Option(
+            help="c from the posture, as in the paper, or from null-space motion."
+        ),
+    ] = "position",
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -38,7 +44,7 @@ def control(
         motion = track_chain(
             calibrated.skeleton, frames, calibrated.chain, progress=report
         )
-    result = write_control(out, calibrated, motion)
+    result = write_control(out, calibrated, motion, mode=mode)
     show(
         {"recording": recording, "csv": out} | result,
         table(
@@ -62,19 +68,26 @@ def control(
 
 
 def write_control(
-    path: Path, subject: ikns.Subject, motion: ikns.Motion
+    path: Path, subject: ikns.Subject, motion: ikns.Motion, *, mode: str = "position"
 ) -> dict[str, Any]:
     """Write ``control.csv`` and return what it holds in short.
 
     The columns are time_s; c, clipped to 0 to 1 (c_1, c_2, ... for several degrees of
     freedom), empty while the chain is not in sight; hand_speed_m_s in the thorax frame;
-    inside (1 within the volume of the PCA points); residual_m of the markers.
+    inside (1 within the volume of the PCA points); residual_m of the markers. In rate
+    mode c is held out of sight, empty only before the arm was first seen, and counts
+    as cut off while it is at 0 or 1.
     """
     import numpy as np
 
+    from ikns.control import RateControl
+
     learned, chain = subject.null_space_map, subject.chain
     place = motion.place(chain)
-    raw = learned.control_signal(motion.chain_angles(chain), place)
+    if mode == "rate":
+        raw = RateControl(learned, subject.skeleton, chain).track(motion)
+    else:
+        raw = learned.control_signal(motion.chain_angles(chain), place)
     raw = raw.reshape(len(place), -1)
     c = np.clip(raw, 0.0, 1.0)
     inside = learned.inside(place)
@@ -87,7 +100,8 @@ def write_control(
         ),
     )
     known = np.isfinite(raw).all(axis=1)
-    beyond = ((raw < 0) | (raw > 1)).any(axis=1)
+    cut = (raw <= 0) | (raw >= 1) if mode == "rate" else (raw < 0) | (raw > 1)
+    beyond = cut.any(axis=1)
     return {
         "frames": len(c),
         "frames_without_signal": int((~known).sum()),
