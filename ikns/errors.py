@@ -24,6 +24,10 @@ class InvalidInput(IknsError, ValueError):
     """An argument is outside what the function accepts."""
 
 
+class StreamError(IknsError, OSError):
+    """A live source does not answer, sends something else, or broke off."""
+
+
 @contextmanager
 def naming(source: str) -> Iterator[None]:
     """Put the name of a file before the sentence of an error that lacks it.

@@ -15,6 +15,7 @@ from ikns.cli.control import control
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
 from ikns.cli.scale import scale
+from ikns.cli.stream import stream
 from ikns.cli.ucm import ucm
 from ikns.cli.view import view
 
@@ -26,7 +27,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
 )
-for command in (demo, scale, calibrate, ik, control, compare, ucm, view):
+for command in (demo, scale, calibrate, ik, control, compare, ucm, view, stream):
     app.command()(command)
 
 

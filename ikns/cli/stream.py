@@ -1,0 +1,111 @@
+"""``ikns stream``: a recording as a live LSL stream, for desk work and tests."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+import ikns
+from ikns.cli.options import AsJson, RecordingFile
+from ikns.cli.output import show, table
+
+__all__ = ["stream"]
+
+
+def stream(
+    recording: RecordingFile,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the stream; the file's by default.")
+    ] = None,
+    speed: Annotated[float, typer.Option(help="1 is as it was recorded.")] = 1.0,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="Start over at the end, until Ctrl-C.")
+    ] = False,
+    fault: Annotated[
+        str,
+        typer.Option(
+            help="Faults with their probability a frame, such as "
+            "drop=0.01,late=0.001:0.3,repeat=0.01,swap=0.01,freeze=0.001:0.5 "
+            "(late and freeze with seconds)."
+        ),
+    ] = "",
+    seed: Annotated[int, typer.Option(help="Of the faults.")] = 0,
+    wait: Annotated[
+        float, typer.Option(help="Seconds to wait for a first listener.")
+    ] = 3600.0,
+    everywhere: Annotated[
+        bool,
+        typer.Option(
+            "--everywhere", help="Serve other machines too; markers are personal data."
+        ),
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Serve a recording as a live LSL MoCap stream, on this machine only."""
+    from ikns.errors import InvalidInput, StreamError
+    from ikns.stream import Faults, LslOutlet, broadcast
+
+    faults = Faults.parse(fault)
+    if not 0 < speed < float("inf"):
+        raise InvalidInput(f"expected a speed above 0, found {speed:g}.")
+    if seed < 0:
+        raise InvalidInput(f"expected a seed of 0 or more, found {seed}.")
+    frames = ikns.read(recording)
+    if len(frames.time) < 2:
+        raise InvalidInput(
+            f"{recording}: expected two frames or more to have a rate, found "
+            f"{len(frames.time)}."
+        )
+    title = recording.stem if name is None else name
+    rate = frames.rate * speed
+    with LslOutlet(frames.labels, rate, name=title, everywhere=everywhere) as outlet:
+        _say(f"lsl:{title} has {len(frames.labels)} markers at {rate:g} frames/s.")
+        if outlet.open_ports:
+            _say("other machines can reach its ports, too.")
+        if not _heard(outlet, wait):
+            raise StreamError(f"lsl:{title}: nobody listened within {wait:g} s.")
+        sent = broadcast(
+            frames, outlet, speed=speed, loop=loop, faults=faults, seed=seed
+        )
+    late = {f"p{p:g}": 1e3 * sent.lateness.percentile(p) for p in (50, 99, 100)}
+    show(
+        {
+            "recording": recording,
+            "stream": title,
+            "rate": rate,
+            "frames": sent.frames,
+            "seconds": sent.seconds,
+            "faults": dict(sent.faults),
+            "sent_late_ms": late,
+        },
+        table(
+            f"lsl:{title}",
+            {"quantity": "s", "value": "g"},
+            [
+                ["frames sent", sent.frames],
+                ["seconds", round(sent.seconds, 1)],
+                *([f"fault: {kind}", n] for kind, n in sorted(sent.faults.items())),
+                *([f"sent late, ms, {p}", round(ms, 3)] for p, ms in late.items()),
+            ],
+        ),
+        as_json=as_json,
+    )
+
+
+def _heard(outlet: ikns.stream.LslOutlet, wait: float) -> bool:
+    """Wait in steps, so that Ctrl-C is heard."""
+    import time
+
+    give_up = time.monotonic() + wait
+    while time.monotonic() < give_up:
+        if outlet.wait_for_listener(min(0.2, wait)):
+            return True
+    return False
+
+
+def _say(sentence: str) -> None:
+    """Tell a person at a terminal how it goes; stdout is for the result."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"{sentence}\n")

@@ -1,0 +1,172 @@
+"""Faults on demand, for tests and desk work: exactly counted, the same for a seed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields, replace
+from itertools import chain, pairwise
+
+import numpy as np
+
+from ikns.errors import InvalidInput
+
+__all__ = ["Faults", "Sent", "inject"]
+
+
+@dataclass(frozen=True)
+class Faults:
+    """How likely each fault is to strike a frame; a frame suffers one at most.
+
+    Parameters
+    ----------
+    drop : float
+        The frame is not sent.
+    late : float
+        The frame is held up for `late_seconds`, and all behind it.
+    repeat : float
+        The frame is sent twice.
+    swap : float
+        The frame is sent after its successor.
+    freeze : float
+        The frame and those within `freeze_seconds` show the markers of the one before.
+    late_seconds, freeze_seconds : float
+    """
+
+    drop: float = 0.0
+    late: float = 0.0
+    repeat: float = 0.0
+    swap: float = 0.0
+    freeze: float = 0.0
+    late_seconds: float = 0.2
+    freeze_seconds: float = 0.5
+
+    KINDS = ("drop", "late", "repeat", "swap", "freeze")
+
+    def __post_init__(self) -> None:
+        """Check that these are probabilities and times."""
+        chances = [getattr(self, kind) for kind in self.KINDS]
+        if not (all(p >= 0 for p in chances) and sum(chances) <= 1):
+            raise InvalidInput(
+                f"expected probabilities from 0 to 1 that add up to 1 at most, found "
+                f"{', '.join(f'{p:g}' for p in chances)}."
+            )
+        for seconds in (self.late_seconds, self.freeze_seconds):
+            if not 0 <= seconds < np.inf:
+                raise InvalidInput(f"expected seconds of 0 or more, found {seconds:g}.")
+
+    @classmethod
+    def parse(cls, text: str) -> Faults:
+        """Read faults as the command line has them.
+
+        >>> Faults.parse("drop=0.01,late=0.002:0.3")
+        Faults(drop=0.01, late=0.002, repeat=0.0, swap=0.0, freeze=0.0, \
+late_seconds=0.3, freeze_seconds=0.5)
+        """
+        known = {field.name for field in fields(cls)}
+        faults: dict[str, float] = {}
+        for part in filter(None, text.split(",")):
+            kind, _, value = part.strip().partition("=")
+            chance, _, seconds = value.partition(":")
+            if kind not in cls.KINDS or (seconds and f"{kind}_seconds" not in known):
+                raise InvalidInput(
+                    f"unknown fault '{part}', expected {', '.join(cls.KINDS)} with a "
+                    "probability, late and freeze also with seconds, such as "
+                    "drop=0.01,late=0.002:0.3."
+                )
+            try:
+                faults[kind] = float(chance)
+                if seconds:
+                    faults[f"{kind}_seconds"] = float(seconds)
+            except ValueError:
+                raise InvalidInput(
+                    f"expected a number in fault '{part}', such as {kind}=0.01."
+                ) from None
+        return replace(cls(), **faults)
+
+    def draw(self, rng: np.random.Generator) -> str | None:
+        """Draw the fault that strikes a frame, None for none."""
+        left = rng.random()
+        for kind in self.KINDS:
+            left -= getattr(self, kind)
+            if left < 0:
+                return kind
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """What is sent.
+
+    Parameters
+    ----------
+    frame : int
+        Whose number and time.
+    content : int
+        Whose markers.
+    hold : float
+        Seconds after it is due.
+    """
+
+    frame: int
+    content: int
+    hold: float = 0.0
+
+
+def inject(
+    frames: Iterable[int],
+    faults: Faults,
+    rate: float,
+    rng: np.random.Generator,
+    tally: Counter[str],
+) -> Iterator[Sent]:
+    """Strike a stream of frames.
+
+    The first and the last frame are spared, for at the ends no receiver could tell a
+    frame that was dropped from one that never was.
+
+    Parameters
+    ----------
+    frames : iterable of int
+        Frame numbers, ascending by one.
+    faults : Faults
+    rate : float
+        Frames per second.
+    rng : numpy.random.Generator
+    tally : Counter
+        Frames struck so far, by kind; for ``swap`` pairs. Counted here.
+
+    Yields
+    ------
+    Sent
+        In the order to be sent.
+    """
+    content = -1
+    frozen = 0
+    skip = False
+    for k, following in pairwise(chain(frames, [None])):
+        assert k is not None
+        if skip:  # sent already, before its predecessor
+            skip = False
+            continue
+        spared = content < 0 or following is None
+        kind = None if spared or frozen else faults.draw(rng)
+        if kind == "freeze":
+            frozen = max(1, round(faults.freeze_seconds * rate))
+        if frozen and not spared:
+            frozen -= 1
+            tally["freeze"] += 1
+            yield Sent(k, content)
+            continue
+        if kind is not None:
+            tally[kind] += 1
+        if kind == "drop":
+            continue
+        if kind == "swap":
+            assert following is not None
+            yield Sent(following, following)
+            skip = True
+        yield Sent(k, k, faults.late_seconds if kind == "late" else 0.0)
+        if kind == "repeat":
+            yield Sent(k, k)
+        content = k

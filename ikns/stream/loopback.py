@@ -1,0 +1,77 @@
+"""Close sockets that listen on every network to all but this machine.
+
+liblsl always listens for data on every network and has no setting for it, so a filter
+of the Linux kernel (a classic BPF program, no privileges needed) drops what does not
+come from 127.0.0.0/8, connection attempts included.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import socket
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+__all__ = ["only_from_this_machine"]
+
+_SO_ATTACH_FILTER = 26
+#: Offset of the IPv4 header, wherever the packet's data start (SKF_NET_OFF).
+_NETWORK = 0xFFF00000
+_ACCEPT, _DROP = 0xFFFFFFFF, 0
+# struct sock_filter: code, jump if true, jump if false, operand.
+_PROGRAM = b"".join(
+    struct.pack("HBBI", *line)
+    for line in (
+        (0x30, 0, 0, _NETWORK + 12),  # load the first byte of the source address
+        (0x15, 0, 1, 127),  # is it 127?
+        (0x06, 0, 0, _ACCEPT),
+        (0x06, 0, 0, _DROP),
+    )
+)
+
+
+@contextmanager
+def only_from_this_machine() -> Iterator[list[int]]:
+    """Filter every IPv4 socket that was opened inside the block.
+
+    Yields
+    ------
+    list of int
+        Filled on leaving: ports that remain open to other machines, because the system
+        knows no such filter.
+    """
+    open_ports: list[int] = []
+    before = _descriptors()
+    yield open_ports
+    if before is None:
+        open_ports.append(0)
+        return
+    for number in (_descriptors() or set()) - before:
+        try:
+            ours = socket.socket(fileno=os.dup(number))
+        except OSError:  # not a socket, or closed in the meantime
+            continue
+        with ours:
+            if ours.family == socket.AF_INET and ours.getsockname()[0] == "0.0.0.0":
+                try:
+                    _filter(ours)
+                except OSError:
+                    open_ports.append(ours.getsockname()[1])
+
+
+def _filter(listening: socket.socket) -> None:
+    program = ctypes.create_string_buffer(_PROGRAM, len(_PROGRAM))
+    lines = len(_PROGRAM) // struct.calcsize("HBBI")
+    # struct sock_fprog: number of lines and a pointer to them.
+    option = struct.pack("HP", lines, ctypes.addressof(program))
+    listening.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, option)
+
+
+def _descriptors() -> set[int] | None:
+    folder = Path("/proc/self/fd")
+    if not folder.is_dir():
+        return None
+    return {int(entry.name) for entry in folder.iterdir()}

@@ -1,0 +1,221 @@
+"""An LSL MoCap stream as a live source.
+
+LSL numbers no frames. Numbers are counted from its time stamps: a step of n nominal
+periods, rounded, is n frames; stamps may err by up to half a period.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+from ikns.errors import StreamError
+from ikns.stream.frame import Event, Frame
+from ikns.stream.lsl_layout import Layout, read_layout
+from ikns.stream.lsl_library import lsl
+
+__all__ = ["LslFeed"]
+
+#: Seconds that one call into liblsl may take, so that Ctrl-C is heard.
+_SLICE = 0.2
+#: Seconds of frames kept for a reader that is busy; more is lost, oldest first.
+_BUFFER = 10
+
+
+@dataclass(frozen=True, eq=False)
+class _Open:
+    inlet: Any
+    layout: Layout
+    rate: float
+    clock_offset: float
+    search: str
+
+
+class LslFeed:
+    """Read one LSL stream, and find it again when it breaks off.
+
+    Parameters
+    ----------
+    stream : str
+        Name of the stream; empty for the only MoCap stream there is.
+    timeout : float
+        Seconds for the stream to answer.
+    this_machine : bool
+        Look on this machine only.
+
+    Raises
+    ------
+    StreamError
+        When nobody serves it, it is no MoCap stream, or it has no rate.
+    """
+
+    speed = 1.0
+
+    def __init__(
+        self, stream: str, *, timeout: float = 5.0, this_machine: bool = False
+    ) -> None:
+        self.name = f"lsl:{stream}"
+        self.events: deque[Event] = deque(maxlen=1000)
+        self._pylsl = lsl(self.name, this_machine=this_machine)
+        self._timeout = timeout
+        opened = self._connect(self._find(stream))
+        self.labels, self.rate = opened.layout.labels, opened.rate
+        self._clock_offset = opened.clock_offset
+        self._open: _Open | None = opened
+        self._search = opened.search
+        self._found = threading.Condition()
+        self._closed = False
+        self._number, self._stamp = 0, math.nan
+
+    @property
+    def device(self) -> dict[str, float]:
+        """``clock_offset``: seconds to add to device times for `time.monotonic`."""
+        return {"clock_offset": self._clock_offset}
+
+    @property
+    def ended(self) -> bool:
+        """Whether it was closed; a stream that broke off may come back."""
+        return self._closed
+
+    def poll(self, timeout: float) -> Frame | None:
+        """Return the next frame, None after `timeout` seconds."""
+        give_up = time.monotonic() + timeout
+        while True:
+            left = max(0.0, give_up - time.monotonic())
+            with self._found:
+                if self._open is None:
+                    self._found.wait(min(left, _SLICE))
+                opened = self._open
+            sample = None
+            if opened is not None:
+                try:
+                    sample, stamp = opened.inlet.pull_sample(min(left, _SLICE))
+                except self._pylsl.util.LostError:
+                    self._lose()
+            if opened is not None and sample is not None:
+                received = time.monotonic()
+                markers = opened.layout.markers(sample)
+                return Frame(self._count(stamp), stamp, received, markers)
+            if self._closed or time.monotonic() >= give_up:
+                return None
+
+    def close(self) -> None:
+        """Leave the stream."""
+        with self._found:
+            self._closed = True
+            self._open = None
+            self._found.notify_all()
+
+    def _count(self, stamp: float) -> int:
+        if not math.isnan(self._stamp):
+            self._number += round((stamp - self._stamp) * self.rate)
+        self._stamp = stamp
+        return self._number
+
+    def _tell(self, text: str) -> None:
+        self.events.append(Event(time.monotonic(), f"{self.name}: {text}"))
+
+    def _find(self, stream: str) -> Any:
+        predicate = "name=" + _quoted(stream) if stream else _TYPE
+        found = self._pylsl.resolve_bypred(predicate, 1, self._timeout)
+        if found:
+            return found[0]
+        there = ", ".join(
+            sorted(f"{info.name()} ({info.type()})" for info in self._streams())
+        )
+        raise StreamError(
+            f"{self.name}: expected an LSL stream {stream or 'of type MoCap'} to "
+            f"answer within {self._timeout:g} s, found {there or 'no stream at all'}."
+        )
+
+    def _streams(self) -> list[Any]:
+        return list(self._pylsl.resolve_streams(min(self._timeout, 1.0)))
+
+    def _connect(self, found: Any) -> _Open:
+        """Open a stream; its frames flow from the end of this call on."""
+        if found.type().casefold() != "mocap":
+            raise StreamError(
+                f"{self.name}: expected an LSL stream of type MoCap, found "
+                f"{found.type() or 'no type'}."
+            )
+        rate = float(found.nominal_srate())
+        if not (math.isfinite(rate) and rate > 0):
+            raise StreamError(
+                f"{self.name}: expected a rate above 0 frames/s, found {rate:g}."
+            )
+        if found.channel_format() not in (
+            self._pylsl.cf_float32,
+            self._pylsl.cf_double64,
+        ):
+            raise StreamError(f"{self.name}: expected channels of float32 or double64.")
+        inlet = self._pylsl.StreamInlet(
+            found, max_buflen=_BUFFER, max_chunklen=1, recover=False, as_numpy=True
+        )
+        try:
+            layout = read_layout(inlet.info(self._timeout).as_xml(), self.name)
+            offset = inlet.time_correction(self._timeout)
+            offset += time.monotonic() - self._pylsl.local_clock()
+            inlet.open_stream(self._timeout)
+        except self._pylsl.util.TimeoutError:
+            raise StreamError(
+                f"{self.name}: expected the stream to answer within "
+                f"{self._timeout:g} s; a firewall may stand in between."
+            ) from None
+        except self._pylsl.util.LostError:
+            raise StreamError(f"{self.name}: broke off while being opened.") from None
+        source_id = found.source_id()
+        search = "source_id=" if source_id else "name="
+        search += _quoted(source_id or found.name())
+        return _Open(inlet, layout, rate, offset, search)
+
+    def _lose(self) -> None:
+        with self._found:
+            self._open = None
+        self._tell("the stream broke off.")
+        threading.Thread(target=self._search_again, daemon=True).start()
+
+    def _search_again(self) -> None:
+        """Look for the stream until it is back with the same markers."""
+        told = ""
+        while not self._closed:
+            for found in self._pylsl.resolve_bypred(self._search, 1, 1.0):
+                try:
+                    opened = self._connect(found)
+                    if (opened.layout.labels, opened.rate) != (self.labels, self.rate):
+                        raise StreamError(
+                            f"{self.name}: came back with other markers or another "
+                            "rate and is not read."
+                        )
+                except StreamError as error:
+                    if str(error) != told:
+                        told = str(error)
+                        self.events.append(Event(time.monotonic(), told))
+                    time.sleep(_SLICE)
+                    continue
+                with self._found:
+                    if not self._closed:
+                        self._open = opened
+                        self._clock_offset = opened.clock_offset
+                        self._tell("the stream is back.")
+                    self._found.notify_all()
+                return
+
+
+# XPath 1.0 knows no lower-case().
+_TYPE = "translate(type,'MOCAP','mocap')='mocap'"
+
+
+def _quoted(text: str) -> str:
+    """Quote for XPath 1.0, which knows no escapes.
+
+    >>> print(_quoted("it's"))
+    "it's"
+    """
+    mark = '"' if "'" in text else "'"
+    if mark in text:
+        raise StreamError(f"expected a name without one of the quotes, found {text}.")
+    return f"{mark}{text}{mark}"

@@ -1,0 +1,113 @@
+"""Which channels of an LSL stream are markers.
+
+The convention is the MoCap meta-data of XDF (https://github.com/sccn/xdf/wiki), as
+written by the vendors' LSL apps: channels of type PositionX, PositionY and PositionZ
+that name their marker, in meters. Channels that name an object are rigid bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import StreamError
+
+__all__ = ["Layout", "marker_channels", "read_layout"]
+
+_UNITS = {
+    **dict.fromkeys(["", "m", "meter", "meters", "metre", "metres"], 1.0),
+    **dict.fromkeys(["mm", "millimeter", "millimeters"], 1e-3),
+    **dict.fromkeys(["millimetre", "millimetres"], 1e-3),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where each marker's coordinates are.
+
+    Parameters
+    ----------
+    labels : tuple of M str
+    columns : (M, 3) integer array
+        Channel of each coordinate.
+    scale : (M, 3) array
+        Meters per unit of the channel.
+    """
+
+    labels: tuple[str, ...]
+    columns: NDArray[np.int64]
+    scale: NDArray[np.float64]
+
+    def markers(self, sample: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Return the markers of one sample, (M, 3) meters."""
+        return sample[self.columns] * self.scale
+
+
+def marker_channels(labels: Iterable[str]) -> Iterator[dict[str, str]]:
+    """Describe three channels for each marker."""
+    for label in labels:
+        for axis in "XYZ":
+            yield {
+                "label": f"{label}_{axis}",
+                "marker": label,
+                "type": f"Position{axis}",
+                "unit": "meters",
+            }
+
+
+def read_layout(xml: str, source: str) -> Layout:
+    """Read a stream's description.
+
+    Parameters
+    ----------
+    xml : str
+        The full stream info, as ``StreamInfo.as_xml`` writes it.
+    source : str
+        Address of the stream, for messages.
+
+    Raises
+    ------
+    StreamError
+        When there are no markers, or one lacks a coordinate or has a strange unit.
+    """
+    places: dict[str, dict[str, tuple[int, float]]] = {}
+    types = []
+    for column, channel in enumerate(ElementTree.fromstring(xml).iter("channel")):
+        kind = channel.findtext("type", "").strip()
+        types.append(kind or "none")
+        axis = kind.casefold().removeprefix("position")
+        if axis not in ("x", "y", "z") or channel.findtext("object", "").strip():
+            continue
+        label = channel.findtext("label", "").strip()
+        marker = channel.findtext("marker", "").strip()
+        marker = marker or label.removesuffix(f"_{axis}").removesuffix(f"_{kind[-1]}")
+        unit = channel.findtext("unit", "").strip()
+        if unit.casefold() not in _UNITS:
+            raise StreamError(
+                f"{source}: expected meters or millimeters, found {unit} for "
+                f"channel {label or column + 1}."
+            )
+        axes = places.setdefault(marker, {})
+        if axis in axes:
+            raise StreamError(
+                f"{source}: expected one {kind} channel for marker {marker}, found two."
+            )
+        axes[axis] = column, _UNITS[unit.casefold()]
+    if not places:
+        found = ", ".join(sorted(set(types))) or "no description of channels"
+        raise StreamError(
+            f"{source}: expected channels of type PositionX, PositionY and PositionZ "
+            f"with marker names, found {found}."
+        )
+    for marker, axes in places.items():
+        if len(axes) < 3:
+            raise StreamError(
+                f"{source}: expected PositionX, PositionY and PositionZ of marker "
+                f"{marker}, found only {', '.join(sorted(axes))}."
+            )
+    table = np.array([[axes[axis] for axis in "xyz"] for axes in places.values()])
+    return Layout(tuple(places), table[..., 0].astype(np.int64), table[..., 1])

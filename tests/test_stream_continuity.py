@@ -1,0 +1,107 @@
+"""Counts agree with a brute-force count, however a stream is torn."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ikns.errors import InvalidInput
+from ikns.stream import Continuity, Frame
+
+PERIOD = 0.01
+
+
+def frame(number: int, delay: float = 0.0, *, content: float | None = None) -> Frame:
+    at = number * PERIOD
+    markers = np.full((2, 3), float(number) if content is None else content)
+    return Frame(number, at, at + delay, markers)
+
+
+def watched(frames: Sequence[Frame], **options: float) -> Continuity:
+    continuity = Continuity(1 / PERIOD, **options)
+    for each in frames:
+        continuity.add(each)
+    return continuity
+
+
+@st.composite
+def torn(draw: st.DrawFn) -> list[int]:
+    """Numbers of a stream: some dropped, some repeated, all shuffled a little."""
+    start = draw(st.integers(-5, 5))
+    kept = draw(st.lists(st.integers(0, 3), min_size=1, max_size=60))
+    numbers = [start + k for k, copies in enumerate(kept) for _ in range(copies)]
+    return draw(st.permutations(numbers)) if draw(st.booleans()) else numbers
+
+
+@given(torn())
+def test_counts_equal_those_of_all_numbers_seen_at_once(numbers: list[int]) -> None:
+    counts = watched([frame(n) for n in numbers]).counts
+    distinct = set(numbers)
+    span = max(distinct) - min(distinct) + 1 if numbers else 0
+    highest, late_comers, seen = -math.inf, 0, set[int]()
+    for n in numbers:
+        late_comers += n not in seen and n < highest
+        highest = max(highest, n)
+        seen.add(n)
+    assert counts.received == len(numbers)
+    assert counts.dropped == span - len(distinct)
+    assert counts.repeated == len(numbers) - len(distinct)
+    assert counts.out_of_order == late_comers
+    assert counts.restarts == 0
+
+
+@given(st.lists(st.floats(-1, 1), min_size=1, max_size=100))
+def test_lateness_is_the_delay_above_the_smallest_so_far(delays: list[float]) -> None:
+    counts = watched([frame(n, d) for n, d in enumerate(delays)], late_after=0.5).counts
+    # The delay is recovered from sums of numbers below 2, hence within a few 1e-16.
+    lateness = np.array(delays) - np.minimum.accumulate(delays)
+    sure = (lateness > 0.5 + 1e-14).sum(), (lateness > 0.5 - 1e-14).sum()
+    assert sure[0] <= counts.late <= sure[1]
+    assert counts.jitter["largest"] == pytest.approx(lateness.max(), abs=1e-14)
+    # Percentiles are upper edges of bins 6 % wide, not below 1 us.
+    median = np.percentile(lateness, 50, method="inverted_cdf")
+    assert counts.jitter["p50"] >= median - 1e-14
+    assert counts.jitter["p50"] <= max(1.06 * median, 1e-6)
+
+
+def test_clocks_that_drift_apart_make_no_frame_late() -> None:
+    # 100 ppm for 300 s is 30 ms, three periods; within the window of 60 s it is 6 ms.
+    there = np.zeros((1, 3))
+    frames = [Frame(n, n * PERIOD, n * PERIOD * 1.0001, there) for n in range(30_000)]
+    counts = watched(frames).counts
+    assert counts.late == 0
+    assert counts.jitter["largest"] < 60 * 1e-4 + 1e-9
+
+
+def test_memory_does_not_grow_with_the_holes() -> None:
+    continuity = watched([frame(n) for n in range(0, 20_000, 2)])
+    assert continuity.counts.dropped == 9_999
+    assert len(continuity._gaps) <= 256
+
+
+def test_a_device_that_counts_anew_starts_a_new_section() -> None:
+    frames = [frame(n) for n in [*range(5000, 5010), *range(10)]]
+    counts = watched(frames).counts
+    assert (counts.restarts, counts.dropped, counts.out_of_order) == (1, 0, 0)
+
+
+def test_same_markers_under_a_new_number_are_frozen_and_unseen_ones_are_not() -> None:
+    frames = [frame(0), frame(1, content=7.0), frame(2, content=7.0), frame(3)]
+    assert watched(frames).counts.frozen == 1
+    unseen = [frame(n, content=math.nan) for n in range(5)]
+    assert watched(unseen).counts.frozen == 0
+
+
+def test_at_no_pace_nothing_is_late() -> None:
+    counts = watched([frame(n, delay=n) for n in range(100)], speed=0).counts
+    assert counts.late == 0
+    assert math.isnan(counts.jitter["p99"])
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, math.nan, math.inf])
+def test_a_stream_must_have_a_rate(rate: float) -> None:
+    with pytest.raises(InvalidInput, match="rate above 0"):
+        Continuity(rate)
