@@ -6,6 +6,7 @@ from ikns.symbolic.kinematics import (
     link_in_thorax,
     markers_in_world,
 )
+from ikns.symbolic.length_fit import LengthFit, fit_lengths
 from ikns.symbolic.results import AvailableRange, Sweep
 from ikns.symbolic.volumes import Capsule, arm_pairs, capsules
 
@@ -13,11 +14,13 @@ __all__ = [
     "AvailableRange",
     "Capsule",
     "HeldHand",
+    "LengthFit",
     "Sweep",
     "arm_pairs",
     "available_range",
     "capsules",
     "chain_jacobian",
+    "fit_lengths",
     "link_in_thorax",
     "longest_sweep",
     "markers_in_world",

@@ -1,0 +1,280 @@
+"""Segment lengths from a static trial and many frames of the exploration together.
+
+A static trial says where markers are, and lengths follow as far as they were put on the
+right places. Frames in which joints turn say where the joints are, wherever the markers
+sit. Minimized, over log sizes s, marker offsets o and the posture of every frame, is
+
+    the cost of :func:`ikns.scaling.scale`                      static trial, priors
+    + sum over F frames and markers |p_m(q_k, s, o) - seen|^2 / marker_sd^2 * N / F
+
+Skin moves with the posture, so errors recur from frame to frame: N says how many frames
+with errors of their own the F are worth. The default of 1 takes them as one; with N = F
+skin that moves by 6 mm makes lengths worse than a static trial alone does.
+
+A length shows only as far as the joints at its ends turn; where they do not, an offset
+of all markers of the segment along it explains the same frames, and the answer stays
+with the static trial and the prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.body import SEGMENTS, relative_sizes
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.marker_ik import MarkerIK
+from ikns.marker_set import MarkerSet
+from ikns.recording import Recording
+from ikns.scaling import (
+    MARKER_SD,
+    POSE_SD,
+    ScalingReport,
+    scale,
+    static_posture,
+)
+from ikns.skeleton import Skeleton
+from ikns.symbolic.length_program import Frames, LengthProgram, Solution
+
+__all__ = ["LengthFit", "fit_lengths"]
+
+Array = NDArray[np.float64]
+
+#: Fewer frames than this are refused.
+MIN_FRAMES = 10
+#: How the spread of the markers is found: solve, measure, solve again, so many times
+#: at most, until it changes by less than this share.
+_ROUNDS, _SETTLED = 3, 0.05
+#: No camera places a marker better than this, m.
+_LEAST_SD = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class LengthFit:
+    """What the joint fit found, beside what the static trial alone gave.
+
+    Parameters
+    ----------
+    lengths, length_sd : dict
+        Joint-to-joint length of each segment and its standard deviation under the
+        assumptions of the fit, m.
+    static_lengths, static_length_sd : dict
+        The same from :func:`ikns.scaling.scale`.
+    marker_sd : float
+        Error of a marker in the moving frames, m per axis: given, or as measured.
+    frames : int
+        Moving frames in use.
+    offsets : dict
+        How far each marker sits from its nominal place, m.
+    solved : bool
+        Whether the optimizer met its tolerance.
+    status : str
+        In the optimizer's own words.
+    iterations : int
+        Of the last solution.
+    """
+
+    lengths: dict[str, float]
+    length_sd: dict[str, float]
+    static_lengths: dict[str, float]
+    static_length_sd: dict[str, float]
+    marker_sd: float
+    frames: int
+    offsets: dict[str, float]
+    solved: bool
+    status: str
+    iterations: int
+
+
+def fit_lengths(
+    generic: Skeleton,
+    static: Recording,
+    recordings: Sequence[Recording],
+    *,
+    marker_set: str | Path | MarkerSet = "oxford24",
+    n_frames: int = 60,
+    independent_frames: float = 1.0,
+    marker_sd: float | None = None,
+    min_duration: float = 1.0,
+) -> tuple[Skeleton, LengthFit]:
+    """Fit the generic skeleton to a static trial and an exploration.
+
+    Parameters
+    ----------
+    generic, static, marker_set, min_duration
+        As :func:`ikns.scaling.scale` takes them.
+    recordings : sequence of Recording
+        The exploration. Taken are frames far apart in joint angles, among those that
+        show most markers.
+    n_frames : int
+        How many frames in all, at least 10.
+    independent_frames : float
+        How many frames with errors of their own all are worth; `n_frames` for markers
+        that do not move over the bone.
+    marker_sd : float, optional
+        Error of a marker in a moving frame, m per axis. Default: as the fit finds it.
+
+    Returns
+    -------
+    skeleton : Skeleton
+        A new skeleton without the static-only markers.
+    report : LengthFit
+
+    Raises
+    ------
+    InvalidInput
+        When `n_frames`, `independent_frames` or `marker_sd` is out of its range.
+    NotEnoughData
+        When the static trial is too short, or fewer than 10 frames are usable.
+    MarkerMismatch
+        When a recording lacks markers.
+    """
+    if n_frames < MIN_FRAMES:
+        raise InvalidInput(f"expected at least {MIN_FRAMES} frames, found {n_frames}.")
+    if marker_sd is not None and not 0 < marker_sd < np.inf:
+        raise InvalidInput(f"expected a marker_sd above 0 m, found {marker_sd:g}.")
+    if not 0 < independent_frames < np.inf:
+        raise InvalidInput(
+            f"expected independent_frames above 0, found {independent_frames:g}."
+        )
+    scaled, before = scale(
+        generic, static, marker_set=marker_set, min_duration=min_duration
+    )
+    dressed, target, _ = static_posture(
+        generic, static, marker_set=marker_set, min_duration=min_duration
+    )
+    worn = dressed.marker_set
+    q, markers = _chosen(scaled, recordings, n_frames)
+    first = MarkerIK(dressed.with_markers(_all_tracked(worn))).solve(target)
+    seen = np.asarray(np.isfinite(markers).all(axis=2))
+    worth = min(independent_frames / len(q), 1.0)
+    pulls = np.r_[1.0, np.full(len(q), worth)] / POSE_SD**2
+
+    tracked = [m for m, marker in enumerate(worn.markers) if not marker.static_only]
+    trust = np.zeros((len(q), len(worn.markers)))
+    trust[:, tracked] = seen * [worn.markers[m].weight for m in tracked]
+    every = np.full((len(q), len(worn.markers), 3), np.nan)
+    every[:, tracked] = markers
+    in_static = np.isfinite(target).all(axis=1) / MARKER_SD**2
+
+    sizes = np.log(list(_sizes(scaled, dressed).values()))
+    offsets = np.zeros((len(worn.markers), 3))
+    nominal = dressed.resized(_named(sizes)).marker_positions
+    offsets[tracked] = scaled.marker_positions - nominal[tracked]
+    program = LengthProgram(dressed, len(q) + 1)
+    sd = marker_sd or _spread(scaled, q, markers)
+    q = np.vstack([first.q, q])
+    for _ in range(_ROUNDS):
+        frames = Frames(
+            q=q,
+            markers=np.concatenate([target[None], every]),
+            weights=np.vstack([in_static, worth * trust / sd**2]),
+            pulls=pulls,
+        )
+        found = program.solve(frames, sizes, offsets)
+        sizes, offsets, q = found.log_sizes, found.offsets, found.q
+        if marker_sd is not None or not found.solved:
+            break
+        # Unknown are 24 numbers a frame and what all frames share.
+        freedom = 3 * seen.sum() - 24 * len(seen) - 3 * len(tracked) - len(sizes)
+        after = float(np.sqrt(np.sum(found.squares[1:][trust > 0]) / max(freedom, 1)))
+        after = max(after, _LEAST_SD)
+        if abs(after - sd) < _SETTLED * sd:
+            break
+        sd = after
+    sized = dressed.resized(_named(sizes))
+    places = sized.marker_positions + offsets
+    skeleton = sized.with_markers(worn.at(places).without_static())
+    return skeleton, _report(skeleton, worn, found, before, sd, len(trust))
+
+
+def _report(
+    skeleton: Skeleton,
+    worn: MarkerSet,
+    found: Solution,
+    before: ScalingReport,
+    marker_sd: float,
+    frames: int,
+) -> LengthFit:
+    lengths, sd = skeleton.segment_lengths, np.sqrt(np.diag(found.covariance))
+    distance = np.linalg.norm(found.offsets, axis=1)
+    return LengthFit(
+        lengths=lengths,
+        length_sd={
+            name: lengths[name] * float(sd[s])
+            for s, name in enumerate(SEGMENTS)
+            if name in lengths
+        },
+        static_lengths=before.lengths,
+        static_length_sd=before.length_sd,
+        marker_sd=marker_sd,
+        frames=frames,
+        offsets=dict(zip(worn.labels, distance.tolist(), strict=True)),
+        solved=found.solved,
+        status=found.status,
+        iterations=found.iterations,
+    )
+
+
+def _chosen(
+    skeleton: Skeleton, recordings: Sequence[Recording], n: int
+) -> tuple[Array, Array]:
+    """Postures (F, nq) far apart and their markers (F, M, 3) m, as cameras saw them."""
+    solver, worn = MarkerIK(skeleton), skeleton.marker_set
+    q, markers = [], []
+    for recording in recordings:
+        motion = solver.track(recording)
+        good = motion.converged & np.isfinite(motion.q).all(axis=1)
+        q.append(motion.q[good])
+        markers.append(worn.pick(recording.labels, recording.markers)[good])
+    names = ", ".join(recording.source for recording in recordings) or "no recording"
+    q_all = np.concatenate(q) if q else np.empty((0, 25))
+    if len(q_all) < MIN_FRAMES:
+        raise NotEnoughData(
+            f"{names}: expected at least {MIN_FRAMES} frames with known joints, found "
+            f"{len(q_all)}."
+        )
+    seen = np.concatenate(markers)
+    count = np.isfinite(seen).all(axis=2).sum(axis=1)
+    # As many markers as enough frames show.
+    enough = np.sort(count)[::-1][min(n, len(count)) - 1]
+    rows = np.flatnonzero(count >= enough)
+    rows = rows[_far_apart(q_all[rows, 7:], n)]
+    return q_all[rows], seen[rows]
+
+
+def _far_apart(points: Array, n: int) -> NDArray[np.int64]:
+    """Rows each farthest from those before it, the one nearest the mean first."""
+    at = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmin())]
+    nearest = np.linalg.norm(points - points[at[0]], axis=1)
+    while len(at) < min(n, len(points)):
+        at.append(int(nearest.argmax()))
+        nearest = np.minimum(nearest, np.linalg.norm(points - points[at[-1]], axis=1))
+    return np.array(at)
+
+
+def _spread(skeleton: Skeleton, q: Array, markers: Array) -> float:
+    """Error of a marker around the scaled body, m per axis."""
+    model = np.stack([skeleton.markers_in_world(row) for row in q])
+    squares = np.sum((model - markers) ** 2, axis=2)
+    known = np.isfinite(squares)
+    freedom = 3 * known.sum() - 24 * len(q)
+    return max(float(np.sqrt(np.sum(squares[known]) / max(freedom, 1))), _LEAST_SD)
+
+
+def _sizes(skeleton: Skeleton, dressed: Skeleton) -> dict[str, float]:
+    sizes = relative_sizes(skeleton.urdf, dressed.urdf)
+    return {name: sizes[name] for name in SEGMENTS}
+
+
+def _named(log_sizes: Array) -> dict[str, float]:
+    return dict(zip(SEGMENTS, np.exp(log_sizes).tolist(), strict=True))
+
+
+def _all_tracked(worn: MarkerSet) -> MarkerSet:
+    markers = tuple(replace(marker, static_only=False) for marker in worn.markers)
+    return replace(worn, markers=markers)
