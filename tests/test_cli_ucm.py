@@ -173,11 +173,15 @@ def test_input_that_cannot_be_split_is_refused_in_one_sentence(
     sentence = refused(command([*reaches[:8], still], files))
     assert "still.c3d" in sentence
     assert "faster than 0.05 m/s" in sentence
-    same = [reaches[0]] * 8
+    assert "each recording once" in refused(command([*reaches, reaches[0]], files))
+    same = [tmp_path / f"same{i}.c3d" for i in range(8)]
+    for path in same:
+        path.write_bytes(reaches[0].read_bytes())
     assert "constant" in refused(command(same, files))
     assert "near a PCA point" in refused(command([still], files))
     assert "ending .png, .svg, .pdf" in refused(
         command(reaches, files, "--figure", tmp_path / "split.jpg")
     )
+    assert "onset-speed" in refused(command(reaches, files, "--onset-speed", "-1"))
     nowhere = tmp_path / "nowhere" / "split.png"
     assert "existing folder" in refused(command(reaches, files, "--figure", nowhere))

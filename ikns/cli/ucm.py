@@ -13,6 +13,7 @@ from ikns.cli.options import AsJson, Force, SubjectFolder
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.ucm_designs import over_points, over_time
+from ikns.errors import InvalidInput
 
 __all__ = ["ucm"]
 
@@ -33,8 +34,9 @@ def ucm(
     onset_speed: Annotated[
         float,
         typer.Option(
+            min=0.0,
             help="Hand speed (m/s) between whose first and last crossing a repetition "
-            "lies; with a single recording the hand is still below it."
+            "lies; with a single recording the hand is still below it.",
         ),
     ] = 0.05,
     surrogates: Annotated[
@@ -55,6 +57,11 @@ def ucm(
     from ikns.calibration import track_chain
 
     refuse_picture(figure, force=force)
+    if len({path.resolve() for path in recordings}) < len(recordings):
+        raise InvalidInput(
+            "expected each recording once, as a repetition counts once, found "
+            f"{len(recordings)} names of fewer files."
+        )
     calibrated = ikns.Subject.load(subject)
     with progress() as report:
         motions = [
