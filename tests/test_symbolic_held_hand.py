@@ -9,9 +9,16 @@ from scipy.spatial.transform import Rotation
 
 from ikns.errors import InvalidInput
 from ikns.motion import chain_joints
+from ikns.nullspace_map import NullSpaceMap
 from ikns.simulation.arm import Arm, self_motion
 from ikns.skeleton import Robot, Skeleton
-from ikns.symbolic import HeldHand, available_range, capsules, longest_sweep
+from ikns.symbolic import (
+    HeldHand,
+    available_control,
+    available_range,
+    capsules,
+    longest_sweep,
+)
 from ikns.symbolic.volumes import Capsule, arm_pairs
 
 #: The optimizer keeps the hand to 1e-9 m and rad; with a joint at its limit the others
@@ -271,6 +278,32 @@ def test_more_freedom_gives_a_range_at_least_as_wide(skeleton):
         at = q_at(skeleton, q, posture, "right_arm_clavicle")
         places = skeleton.link_in_thorax(np.stack([at, q]), "right_knuckle")[0]
         np.testing.assert_allclose(places[0], places[1], atol=2e-9)
+
+
+def test_the_range_of_c_is_that_of_the_direction_in_units_of_the_map(
+    skeleton, limits_alone
+):
+    q = angles(skeleton, POSTURES[0])
+    x = q[columns(skeleton)]
+    Z = skeleton.null_spaces(q, "right_arm")[0][0]
+    place = skeleton.link_in_thorax(q, "right_knuckle")[0]
+    m, M = Z @ x - 0.3, Z @ x + 0.2
+    learned = NullSpaceMap.from_arrays([place], [Z], [m], [M])
+    found = available_control(limits_alone, learned, q)
+    along = limits_alone.range(q, Z)
+    assert found.now == pytest.approx(0.6)
+    for end, c in ((along.lower, found.lower), (along.upper, found.upper)):
+        assert c == pytest.approx((end - m) / 0.5)
+    assert found.share == pytest.approx(0.5 / (along.upper - along.lower))
+    for posture, c in zip(
+        found.joints.postures, (found.lower, found.upper), strict=True
+    ):
+        assert learned.control_signal(posture, place) == pytest.approx(c)
+    empty = NullSpaceMap.from_arrays([place], [Z], [m], [m])
+    with pytest.raises(InvalidInput, match="no range at the hand's place"):
+        available_control(limits_alone, empty, q)
+    with pytest.raises(InvalidInput, match="freedom from 0 to 0, found 1"):
+        available_control(limits_alone, learned, q, dof=1)
 
 
 def test_the_best_of_random_postures_is_never_better(skeleton):

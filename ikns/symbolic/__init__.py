@@ -1,5 +1,6 @@
 """A body's kinematics as CasADi expressions, and what optimizers find with them."""
 
+from ikns.symbolic.control_range import ControlRange, available_control
 from ikns.symbolic.held_hand import HeldHand, available_range, longest_sweep
 from ikns.symbolic.kinematics import (
     chain_jacobian,
@@ -13,10 +14,12 @@ from ikns.symbolic.volumes import Capsule, arm_pairs, capsules
 __all__ = [
     "AvailableRange",
     "Capsule",
+    "ControlRange",
     "HeldHand",
     "LengthFit",
     "Sweep",
     "arm_pairs",
+    "available_control",
     "available_range",
     "capsules",
     "chain_jacobian",

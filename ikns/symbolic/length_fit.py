@@ -65,7 +65,8 @@ class LengthFit:
     static_lengths, static_length_sd : dict
         The same from :func:`ikns.scaling.scale`.
     marker_sd : float
-        Error of a marker in the moving frames, m per axis: given, or as measured.
+        Error of a marker of weight 1 in the moving frames, m per axis: given, or as
+        measured.
     frames : int
         Moving frames in use.
     offsets : dict
@@ -116,7 +117,8 @@ def fit_lengths(
         How many frames with errors of their own all are worth; `n_frames` for markers
         that do not move over the bone.
     marker_sd : float, optional
-        Error of a marker in a moving frame, m per axis. Default: as the fit finds it.
+        Error of a marker of weight 1 in a moving frame, m per axis. Default: as the fit
+        finds it.
 
     Returns
     -------
@@ -181,7 +183,7 @@ def fit_lengths(
             break
         # Unknown are 24 numbers a frame and what all frames share.
         freedom = 3 * seen.sum() - 24 * len(seen) - 3 * len(tracked) - len(sizes)
-        after = float(np.sqrt(np.sum(found.squares[1:][trust > 0]) / max(freedom, 1)))
+        after = float(np.sqrt(np.sum(trust * found.squares[1:]) / max(freedom, 1)))
         after = max(after, _LEAST_SD)
         if abs(after - sd) < _SETTLED * sd:
             break
@@ -260,7 +262,8 @@ def _far_apart(points: Array, n: int) -> NDArray[np.int64]:
 def _spread(skeleton: Skeleton, q: Array, markers: Array) -> float:
     """Error of a marker around the scaled body, m per axis."""
     model = np.stack([skeleton.markers_in_world(row) for row in q])
-    squares = np.sum((model - markers) ** 2, axis=2)
+    weight = [marker.weight for marker in skeleton.marker_set.markers]
+    squares = weight * np.sum((model - markers) ** 2, axis=2)
     known = np.isfinite(squares)
     freedom = 3 * known.sum() - 24 * len(q)
     return max(float(np.sqrt(np.sum(squares[known]) / max(freedom, 1))), _LEAST_SD)
