@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["garrote", "null_rate"]
+from ikns.errors import InvalidInput
+
+__all__ = ["checked_metric", "garrote", "null_rate"]
 
 Array = NDArray[np.float64]
 
@@ -84,3 +86,21 @@ def garrote(values: Array, least: Array | float) -> Array:
     beyond = np.abs(values) > least
     share = np.divide(least, values, out=np.ones_like(values), where=beyond)
     return np.asarray(values * (1 - share**2))
+
+
+def checked_metric(metric: ArrayLike | None, n: int) -> Array | None:
+    """Return a metric of n joints as a matrix, or say what is wrong with it."""
+    if metric is None:
+        return None
+    W = np.array(metric, dtype=np.float64)
+    W = np.diag(W) if W.ndim == 1 else W
+    if (
+        W.shape != (n, n)
+        or not np.isfinite(W).all()
+        or not np.allclose(W, W.T)
+        or np.linalg.eigvalsh(W)[0] <= 0
+    ):
+        raise InvalidInput(
+            f"expected a symmetric positive metric of {n} joints, found {W.shape}."
+        )
+    return W

@@ -25,14 +25,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns._kernels.null_space import write_bases
 from ikns.control.local_map import LocalMap
-from ikns.control.null_rate import garrote, null_rate
-from ikns.errors import InvalidInput, NotEnoughData
+from ikns.control.null_rate import checked_metric, garrote, null_rate
+from ikns.errors import InvalidInput
 from ikns.motion import Motion, chain_joints
 from ikns.nullspace_map import NullSpaceMap
 from ikns.skeleton import Skeleton
 from ikns.subspace import null_spaces
 
-__all__ = ["RateControl", "carried"]
+__all__ = ["RateControl", "samples_of"]
 
 Array = NDArray[np.float64]
 
@@ -57,8 +57,8 @@ class RateControl:
         W of :func:`ikns.control.null_rate`, or its diagonal. Default: the identity.
     carry : float or (d,) array
         How much c a reach carries along with it, per m of the hand's way; see
-        :func:`carried`. Defaults were chosen on virtual subjects that no result of
-        ``benchmarks/rate_mode.py`` is from.
+        :func:`ikns.control.carried`. Defaults were chosen on virtual subjects that no
+        result of ``benchmarks/rate_mode.py`` is from.
     travel : float
         A small offset to the position mode shrinks to 1/e while c is moved by this
         much. The correction never exceeds the motion: c at most stops or goes twice as
@@ -108,7 +108,7 @@ class RateControl:
         _, d, n = null_space_map.directions_.shape
         joints = chain_joints(chain)
         self.null_space_map, self.skeleton, self.chain = null_space_map, skeleton, chain
-        self.task, self.metric = task, _checked_metric(metric, n)
+        self.task, self.metric = task, checked_metric(metric, n)
         self.carry = np.asarray(carry, dtype=np.float64)
         self.travel, self.tau, self.max_hand_speed = travel, tau, max_hand_speed
         self.limits = (-np.inf, np.inf) if limits is None else limits
@@ -230,18 +230,12 @@ class RateControl:
         position = (Z @ angles - low) / width
         if self.skeleton is None and self.metric is None:  # Z P = Z
             return Z @ velocity / width, position
-        basis = Z if self.skeleton is None else self._null_space(given)
+        basis = Z
+        if self.skeleton is not None:
+            basis = _null_space(
+                self.skeleton.chain_jacobian(given, self.chain, task=self.task)
+            )
         return null_rate(Z, width, basis, velocity, metric=self.metric), position
-
-    def _null_space(self, q: Array) -> Array:
-        """Orthonormal rows (r, n)."""
-        assert self.skeleton is not None
-        J = self.skeleton.chain_jacobian(q, self.chain, task=self.task)
-        k, n = J.shape
-        basis, rank = np.empty((1, max(n - k, 0), n)), np.empty(1, dtype=np.int64)
-        write_bases(J[None], 1e-9, False, basis, rank)
-        # An arm stretched out has more.
-        return basis[0] if rank[0] == min(k, n) else null_spaces(J)[0]
 
     def _within(self, c: Array) -> Array:
         return np.minimum(np.maximum(c, self.limits[0]), self.limits[1])
@@ -257,7 +251,7 @@ class RateControl:
         self.reset()
         steps = np.diff(motion.time, prepend=motion.time[:1])
         samples = zip(
-            *_samples(self, motion), steps, motion.hand_speed(self.chain), strict=True
+            *samples_of(self, motion), steps, motion.hand_speed(self.chain), strict=True
         )
         c = np.array(
             [self.step(q, v, x, dt, hand_speed=s) for q, v, x, dt, s in samples]
@@ -265,76 +259,17 @@ class RateControl:
         return c[:, 0] if c.shape[1] == 1 else c
 
 
-def carried(control: RateControl, motion: Motion, *, quantile: float = 0.9) -> Array:
-    """How much c the reaches of a motion carry along, per m of the hand's way.
-
-    The null rate of c over the hand's speed while the hand travels: the value that
-    holds for the share `quantile` of the way. With it as ``RateControl(carry=...)``, c
-    stays on that share of such reaches. It is also how much of a deliberate
-    self-motion a reach swallows.
-
-    Parameters
-    ----------
-    control : RateControl
-        Its `carry` is not used.
-    motion : Motion
-        Reaches of somebody who does not mean to move c, such as those between the
-        points of a calibration.
-    quantile : float
-        In [0, 1].
-
-    Returns
-    -------
-    (d,) array
-        1/m.
-
-    Raises
-    ------
-    NotEnoughData
-        When the hand never travels in sight.
-    """
-    if not 0 <= quantile <= 1:
-        raise InvalidInput(f"expected a quantile from 0 to 1, found {quantile}.")
-    speed = motion.hand_speed(control.chain)
-    rows = np.flatnonzero(speed >= control.max_hand_speed)
-    samples = zip(*(array[rows] for array in _samples(control, motion)), strict=True)
-    d = control.c.size
-    rates = np.reshape([control.rate(*sample)[0] for sample in samples], (-1, d))
-    known = np.isfinite(rates).all(axis=1)
-    if not known.any():
-        raise NotEnoughData(
-            f"expected samples with the hand faster than {control.max_hand_speed:g} "
-            f"m/s and every joint known, found none of {len(speed)}."
-        )
-    way = speed[rows][known]
-    ratios = np.abs(rates[known]) / way[:, None]
-    found = np.empty(d)
-    for k, ratio in enumerate(ratios.T):
-        order = np.argsort(ratio)
-        share = np.cumsum(way[order]) / way.sum()
-        # Rounding may leave the last share below 1.
-        found[k] = ratio[order][min(np.searchsorted(share, quantile), len(order) - 1)]
-    return found
-
-
-def _samples(control: RateControl, motion: Motion) -> tuple[Array, Array, Array]:
+def samples_of(control: RateControl, motion: Motion) -> tuple[Array, Array, Array]:
+    """Return what :meth:`RateControl.step` takes as q, v and x, a row a sample."""
     chain = control.chain
     q = motion.chain_angles(chain) if control.skeleton is None else motion.q
     return q, motion.chain_velocities(chain), motion.place(chain)
 
 
-def _checked_metric(metric: ArrayLike | None, n: int) -> Array | None:
-    if metric is None:
-        return None
-    W = np.array(metric, dtype=np.float64)
-    W = np.diag(W) if W.ndim == 1 else W
-    if (
-        W.shape != (n, n)
-        or not np.isfinite(W).all()
-        or not np.allclose(W, W.T)
-        or np.linalg.eigvalsh(W)[0] <= 0
-    ):
-        raise InvalidInput(
-            f"expected a symmetric positive metric of {n} joints, found {W.shape}."
-        )
-    return W
+def _null_space(J: Array) -> Array:
+    """As :func:`ikns.subspace.null_space`, without what one live sample needs not."""
+    k, n = J.shape
+    basis, rank = np.empty((1, max(n - k, 0), n)), np.empty(1, dtype=np.int64)
+    write_bases(J[None], 1e-9, False, basis, rank)
+    # An arm stretched out has more.
+    return basis[0] if rank[0] == min(k, n) else null_spaces(J)[0]
