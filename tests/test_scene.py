@@ -421,3 +421,20 @@ def test_the_camera_is_in_front_on_the_side_of_the_arm_and_sees_the_points() -> 
 def test_an_unknown_point_is_refused() -> None:
     with pytest.raises(InvalidInput, match="from 1 to 10, found 11"):
         made(point=10)
+
+
+def test_a_map_from_a_file_tells_that_the_posture_is_assumed() -> None:
+    body, learned = person()
+    assert "assumed" not in made().caption  # fitted just now, it knows the posture
+    arrays = learned.centers_, learned.directions_, learned.lower_, learned.upper_
+    read = NullSpaceMap.from_arrays(*arrays)
+    assert "assumed" in map_scene(body, read, CHAIN, simulated=True).caption
+
+
+def test_three_points_have_no_volume_and_none_in_the_legend() -> None:
+    body, learned = person()
+    arrays = learned.centers_, learned.directions_, learned.lower_, learned.upper_
+    few = NullSpaceMap.from_arrays(*(values[:3] for values in arrays))
+    scene = map_scene(body, few, CHAIN, simulated=True)
+    assert all("volume" not in layer.name for layer in scene.layers)
+    assert not any("volume" in command.get("path", "") for command in scene.commands)

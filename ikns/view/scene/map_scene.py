@@ -6,15 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.colors import to_hex
+from numpy.typing import NDArray
 
 from ikns.errors import InvalidInput
+from ikns.motion import chain_sides
 from ikns.nullspace_map import NullSpaceMap
 from ikns.skeleton import Skeleton
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, property_command, root_commands
 from ikns.view.scene.places import point_commands, volume_commands
 from ikns.view.scene.playback import animation_command
-from ikns.view.scene.postures import posture_at_point
+from ikns.view.scene.postures import posture_at_point, visited_posture
 from ikns.view.scene.scene import Layer, Scene, camera_and_target
 from ikns.view.scene.swivel import Swivel, swivel_commands, swivel_tracks
 from ikns.view.style import INK, VOLUME, point_color
@@ -64,7 +66,9 @@ def map_scene(
         When there is no such point.
     """
     chosen = chosen_point(learned, point)
-    q = posture_at_point(skeleton, learned, chain, chosen)
+    visited = visited_posture(skeleton, learned, chain, chosen)
+    q = posture_at_point(skeleton, learned, chain, chosen, start=visited)
+    two = len(chain_sides(chain)) > 1
     swivel = Swivel.at(skeleton, learned, chain, chosen, q)
     tracks = swivel_tracks(skeleton, swivel, chain)
     commands = [
@@ -79,8 +83,11 @@ def map_scene(
         commands.append(animation_command(swivel.times, tracks))
     return Scene(
         title,
-        f"Arm at PCA point {chosen + 1} with the hand held: the Jacobian's self-motion "
-        "(body) beside the learned direction Z (ghosts).",
+        f"{'Arms' if two else 'Arm'} at PCA point {chosen + 1} with the "
+        f"{'hands' if two else 'hand'} held: the Jacobian's self-motion "
+        "(body) beside the learned direction Z (ghosts)."
+        # A subject folder keeps where the hand was, but not how the arm stood.
+        + ("" if visited is not None else " The posture is assumed."),
         simulated,
         commands + hidden(layers),
         layers,
@@ -105,10 +112,9 @@ def chosen_point(learned: NullSpaceMap, point: int | None) -> int:
 
 def map_commands(learned: NullSpaceMap) -> list[Command]:
     """Draw the PCA points of a map and the volume between them."""
-    facets = getattr(learned.interpolator_, "hull_facets", None)
     return [
         *point_commands(learned.centers_),
-        *volume_commands(learned.centers_, facets),
+        *volume_commands(learned.centers_, _facets(learned)),
     ]
 
 
@@ -120,13 +126,15 @@ def map_layers(
     worn = tuple(f"{ROOT}/body/{link}/markers" for link in links)
     ghost = to_hex(point_color(point))
     where = f" at point {point + 1}" if playing else ""
-    return [
+    layers = [
         Layer("markers of the model", worn, "#4A4F57", shown=False),
         Layer("PCA points", (f"{ROOT}/points",), _MANY),
-        Layer("interpolation volume", (f"{ROOT}/volume",), VOLUME),
         Layer(f"along learned Z{where}", (f"{ROOT}/ghosts",), ghost, not playing),
         Layer(f"self-motion (Jacobian){where}", (f"{ROOT}/sweep",), INK, not playing),
     ]
+    if len(_facets(learned)):
+        layers.insert(2, Layer("interpolation volume", (f"{ROOT}/volume",), VOLUME))
+    return layers
 
 
 def hidden(layers: Sequence[Layer]) -> list[Command]:
@@ -137,3 +145,9 @@ def hidden(layers: Sequence[Layer]) -> list[Command]:
         if not layer.shown
         for path in layer.paths
     ]
+
+
+def _facets(learned: NullSpaceMap) -> NDArray[np.int64]:
+    """Triangles of the volume as rows of the points, (F, 3); none around 1 to 3."""
+    none = np.zeros((0, 3), dtype=np.int64)
+    return np.asarray(getattr(learned.interpolator_, "hull_facets", none))

@@ -25,6 +25,11 @@ for (const command of scene.commands) viewer.handle_command(command);
 viewer.camera.fov = scene.fov;
 viewer.camera.position.set(...scene.camera);
 viewer.controls.target.set(...scene.target);
+if (!picture) {
+  // Room for the player below.
+  viewer.controls.target.y -= 0.04;
+  viewer.camera.position.sub(viewer.controls.target).multiplyScalar(1.12).add(viewer.controls.target);
+}
 viewer.controls.update();
 
 for (const layer of scene.layers) {

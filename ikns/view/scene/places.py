@@ -52,11 +52,9 @@ def point_commands(centers: Array) -> list[Command]:
     return commands
 
 
-def volume_commands(
-    centers: Array, facets: NDArray[np.integer[Any]] | None
-) -> list[Command]:
+def volume_commands(centers: Array, facets: NDArray[np.integer[Any]]) -> list[Command]:
     """Draw the interpolation volume ``/ikns/volume``; nothing without facets (F, 3)."""
-    if facets is None or not len(facets):
+    if not len(facets):
         return []
     edges = np.sort(facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     ends = centers[np.unique(edges, axis=0)]

@@ -14,7 +14,7 @@ from ikns.nullspace_map import NullSpaceMap
 from ikns.skeleton import Skeleton
 from ikns.subspace import null_projector
 
-__all__ = ["posture_at_point", "postures_along", "self_motion"]
+__all__ = ["posture_at_point", "postures_along", "self_motion", "visited_posture"]
 
 Array = NDArray[np.float64]
 
@@ -83,6 +83,20 @@ def posture_at_point(
         )
         if np.abs(step).max() < 1e-8:
             break
+    return q
+
+
+def visited_posture(
+    skeleton: Skeleton, learned: NullSpaceMap, chain: str, point: int
+) -> Array | None:
+    """Mean posture at a PCA point, (18,) rad; None for a map that does not know it.
+
+    Only a map that was fitted does, not one from a file.
+    """
+    if not hasattr(learned, "cluster_means_"):
+        return None
+    q = _at_ease(skeleton)
+    q[_columns(skeleton, chain)] = learned.cluster_means_[point]
     return q
 
 
