@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from example_robot_data import robots_loader
 from scipy.optimize import brentq, minimize
 from scipy.spatial.transform import Rotation
 
@@ -382,6 +383,21 @@ def test_a_robot_of_turning_and_sliding_joints_has_a_range_too():
     assert found.upper == pytest.approx(2, abs=END)
 
 
+def test_a_robot_of_seven_joints_sweeps_to_its_limits():
+    robot = Robot.load(robots_loader.PandaLoader().df_path, "panda_hand")
+    q = np.array([0, 0.3, 0, -1.8, 0, 2.1, 0.5])
+    found = longest_sweep(robot, q)
+    assert found.solved == (True, True)
+    hold = robot.pose(q)
+    for posture in found.postures:
+        position, rotation = robot.pose(posture)
+        np.testing.assert_allclose(position, hold[0], atol=2e-9)
+        np.testing.assert_allclose(rotation, hold[1], atol=2e-9)
+    for posture, stops in zip(found.postures[[0, -1]], found.stops, strict=True):
+        assert stops == ("panda_joint2 at its upper limit",)
+        assert posture[1] == pytest.approx(robot.upper[1], abs=END)
+
+
 def test_a_robot_without_limits_comes_back_to_where_it_began():
     robot = Robot(THREE_BARS, "tip")
     found = longest_sweep(robot, np.array([0.3, 0.9, 1.6]), task="position")
@@ -396,9 +412,12 @@ def test_bad_postures_are_refused_with_one_sentence(skeleton, limits_alone):
     beyond = q.copy()
     beyond[columns(skeleton)[5]] = np.radians(95)
     with pytest.raises(
-        InvalidInput, match=r"right_wrist_flexion at 95\.0 deg, its range being -80\.0"
+        InvalidInput, match=r"right_wrist_flexion at 95 deg, its range being -80 to 90"
     ):
         limits_alone.sweep(beyond)
+    robot = Robot(PLANAR, "tip")
+    with pytest.raises(InvalidInput, match=r"slide at 3 m, its range being 0\.1 to 2"):
+        available_range(robot, [0, 0, 1, 3], None, np.eye(4)[0], task="position")
     for bad in (np.full(18, np.nan), np.zeros((2, 18)), np.zeros(7)):
         with pytest.raises(InvalidInput, match="expected"):
             limits_alone.sweep(bad)

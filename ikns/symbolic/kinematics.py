@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from ikns._kernels.tree import FREE_FLYER, PRISMATIC, Tree
 from ikns.body import SEGMENTS
 from ikns.errors import InvalidInput
-from ikns.motion import SIDES, chain_joints, chain_sides
+from ikns.motion import chain_joints, chain_sides
 from ikns.skeleton import Skeleton
 from ikns.skeleton.markers import part_along
 
 __all__ = [
     "chain_jacobian",
     "frame",
-    "hands_in_thorax",
     "joint_frames",
     "link_in_thorax",
     "markers_in_world",
@@ -122,15 +121,6 @@ def link_in_thorax(skeleton: Skeleton, link: str) -> ca.Function:
     R, p = frame(frames[joint], rotation, translation)
     names = ["angles"], ["position", "rotation"]
     return ca.Function("link_in_thorax", [angles], [p, R], *names)
-
-
-def hands_in_thorax(skeleton: Skeleton) -> ca.Function:
-    """Return the function from joint angles (18,) rad to both knuckles, (2, 3) m."""
-    angles = ca.SX.sym("angles", len(skeleton.joint_names))
-    frames = joint_frames(skeleton.tree, root_at_origin(angles))
-    ends = [skeleton.tree_link(f"{side}_knuckle") for side in SIDES]
-    places = ca.horzcat(*(frame(frames[j], R, p)[1] for j, R, p in ends)).T
-    return ca.Function("hands_in_thorax", [angles], [places], ["angles"], ["places"])
 
 
 def chain_jacobian(

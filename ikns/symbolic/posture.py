@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns._kernels.tree import PRISMATIC
 from ikns.errors import InvalidInput
 from ikns.symbolic.chain import Chain, Held
 
@@ -82,11 +83,12 @@ def start_of(chain: Chain, held: Held, q: ArrayLike) -> Start:
     beyond = np.maximum(chain.lower - x, x - chain.upper)
     worst = int(np.argmax(beyond))
     if beyond[worst] > _ROUNDING:
+        slides = chain.tree.kind[chain.columns[worst] + 1] == PRISMATIC
+        unit, scale = ("m", 1.0) if slides else ("deg", np.degrees(1.0))
+        at, low, high = (scale * float(v[worst]) for v in (x, chain.lower, chain.upper))
         raise InvalidInput(
-            "expected a posture within the joint limits, found "
-            f"{chain.names[worst]} at {np.degrees(x[worst]):.1f} deg, its range being "
-            f"{np.degrees(chain.lower[worst]):.1f} to "
-            f"{np.degrees(chain.upper[worst]):.1f} deg."
+            f"expected a posture within the joint limits, found {chain.names[worst]} "
+            f"at {at:.4g} {unit}, its range being {low:.4g} to {high:.4g} {unit}."
         )
     x = np.clip(x, chain.lower, chain.upper)
     room = held.clearance(x, angles).full().ravel()
