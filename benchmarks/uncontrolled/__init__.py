@@ -1,0 +1,1 @@
+"""Reaches for the uncontrolled manifold: of real people, and simulated."""
