@@ -3,51 +3,229 @@
 from __future__ import annotations
 
 import warnings
-from typing import Annotated, Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, RecordingFile, SubjectFolder
-from ikns.cli.output import notes, progress, show, table
-from ikns.errors import NotEnoughData, naming
+from ikns.cli.comparison_tables import (
+    HELD,
+    LEGEND,
+    crosstalk_json,
+    crosstalk_sentence,
+    findings_json,
+    leak_sentence,
+    point_table,
+    pooled_table,
+)
+from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
+from ikns.cli.output import notes, progress, refuse_overwriting, show, table
+from ikns.errors import InvalidInput, NotEnoughData, naming
+
+if TYPE_CHECKING:
+    from ikns.compare import NullSpaceComparison
 
 __all__ = ["compare", "comparison_rows", "comparison_table"]
+
+_CLAVICLE = "_clavicle"
+_PICTURES = (".png", ".svg")
+
+Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
 
 def compare(
     recording: RecordingFile,
     subject: SubjectFolder,
     task: Annotated[
-        Literal["pose", "position"],
+        Literal["both", "pose", "position"],
         typer.Option(
             help="What the hand holds: position and orientation, or position."
         ),
-    ] = "pose",
+    ] = "both",
+    chain: Annotated[
+        Literal["own", "both"],
+        typer.Option(
+            help="Joints: those of the map, or also the arm with (without) the "
+            "clavicle, learned again."
+        ),
+    ] = "both",
+    coordinates: Annotated[
+        Literal["internal", "isb", "rotation_vector", "all"],
+        typer.Option(help="Of the shoulder; learned again where not internal."),
+    ] = "internal",
+    reaches: Annotated[
+        Path | None, typer.Option(help="Recording of natural reaches, for crosstalk.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Picture to write, .png or .svg.")
+    ] = None,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="Say so in tables and picture.")
+    ] = False,
+    intervals: Annotated[
+        int, typer.Option(help="Resamples for the 95 % intervals; 0 for none.", min=0)
+    ] = 400,
+    seed: Annotated[int, typer.Option(help="Of the resamples.", min=0)] = 0,
+    force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compare learned and analytic directions at every PCA point."""
-    from ikns.calibration import track_chain
+    """Compare learned and analytic directions at every PCA point.
 
+    Angles between them, with what chance would give; the share of joint variance inside
+    the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
+    line along Z leads the hand; how far the null space bends; and crosstalk.
+    """
+    from ikns.calibration import track_chain
+    from ikns.compare import COORDINATES, motion_crosstalk
+
+    if figure is not None:
+        if figure.suffix not in _PICTURES:
+            raise InvalidInput(
+                f"{figure}: expected a picture's name that ends in "
+                f"{' or '.join(_PICTURES)}."
+            )
+        refuse_overwriting(figure, force=force)
     calibrated = ikns.Subject.load(subject)
-    frames = ikns.read(recording)
+    learned, own = calibrated.null_space_map, calibrated.chain
     with progress() as report:
         motion = track_chain(
-            calibrated.skeleton, frames, calibrated.chain, progress=report
+            calibrated.skeleton, ikns.read(recording), own, progress=report
         )
-    rows, warned = comparison_rows(calibrated, motion, source=str(recording), task=task)
+        reaching = motion
+        if reaches is not None:
+            reaching = track_chain(
+                calibrated.skeleton, ikns.read(reaches), own, progress=report
+            )
+    first: Literal["pose", "position"] = "position" if task == "position" else "pose"
+    rows, warned = comparison_rows(
+        calibrated, motion, source=str(recording), task=first
+    )
+    options = {"resamples": intervals, "seed": seed}
+    found, untold = _findings(
+        calibrated,
+        motion,
+        source=str(recording),
+        tasks=("pose", "position") if task == "both" else (first,),
+        chains=(own, *(_other(own) if chain == "both" else ())),
+        coordinates=COORDINATES if coordinates == "all" else (coordinates,),
+        options=options,
+    )
+    warned += untold
+    across = None
+    with naming(str(reaches or recording)):
+        try:
+            across = motion_crosstalk(learned, reaching, chain=own, **options)
+        except NotEnoughData as error:
+            if reaches is not None:
+                raise
+            warned.append(f"no crosstalk: {error}")
+    plain = [
+        each for each in found if each[0][0] == own and each[0][2] == found[0][0][2]
+    ]
+    if figure is not None:
+        _draw(figure, plain, across, simulated=simulated)
+    title = f"{'Simulated, ' if simulated else ''}{recording}"
+    brackets = "; in brackets 95 % intervals" if intervals else ""
     show(
         {
             "recording": recording,
-            "chain": calibrated.chain,
+            "reaches": reaches,
+            "simulated": simulated,
+            "chain": own,
             "task": task,
+            "settings": options | {"level": 0.95},
             "points": rows,
+            "comparisons": [
+                findings_json(each, chain=names[0], task=names[1], coordinates=names[2])
+                for names, each in found
+            ],
+            "crosstalk": None
+            if across is None
+            else crosstalk_json(across, recording=reaches or recording),
+            "figure": figure,
             "warnings": warned,
         },
-        comparison_table(rows, f"{recording}: learned against analytic, {task} held"),
+        *(
+            point_table(each, f"{title}: {own}, hand {HELD[names[1]]} held")
+            for names, each in plain
+        ),
+        pooled_table(found, f"All points together (root mean squares){brackets}"),
+        leak_sentence(plain[0][1]),
+        *([] if across is None else [crosstalk_sentence(across)]),
+        LEGEND,
+        *([] if figure is None else [f"Wrote {figure}"]),
         *notes(warned),
         as_json=as_json,
     )
+
+
+def _other(chain: str) -> tuple[str, ...]:
+    """Return the same arm with the clavicle, or without where the chain has it."""
+    from ikns.motion import CHAINS
+
+    other = (
+        chain.removesuffix(_CLAVICLE)
+        if chain.endswith(_CLAVICLE)
+        else chain + _CLAVICLE
+    )
+    return (other,) if other in CHAINS else ()
+
+
+def _findings(
+    subject: ikns.Subject,
+    motion: ikns.Motion,
+    *,
+    source: str,
+    tasks: tuple[Literal["pose", "position"], ...],
+    chains: tuple[str, ...],
+    coordinates: tuple[str, ...],
+    options: dict[str, Any],
+) -> tuple[list[Named], list[str]]:
+    """Compare in every combination; tell of other chains that cannot be compared."""
+    from ikns.compare import compare_motion
+
+    found: list[Named] = []
+    untold: list[str] = []
+    for chain in chains:
+        for task in tasks:
+            for name in coordinates:
+                try:
+                    with naming(source):
+                        each = compare_motion(
+                            subject.null_space_map,
+                            subject.skeleton,
+                            motion,
+                            chain=subject.chain,
+                            analyzed=chain,
+                            task=task,
+                            coordinates=name,
+                            **options,
+                        )
+                except NotEnoughData as error:
+                    if chain == subject.chain:
+                        raise
+                    untold.append(f"{chain} left out: {error}")
+                    break
+                found.append(((chain, task, name), each))
+            else:
+                continue
+            break
+    return found, untold
+
+
+def _draw(path: Path, found: list[Named], across: Any, *, simulated: bool) -> None:
+    """Write the figure; it appears whole or not at all."""
+    from ikns.cli.output import write_bytes
+    from ikns.view.comparison import comparison_figure
+    from ikns.view.render import png, svg
+
+    drawn = comparison_figure(
+        {f"hand {HELD[names[1]]} held": each for names, each in found},
+        simulated=simulated,
+        crosstalk=across,
+    )
+    write_bytes(path, svg(drawn) if path.suffix == ".svg" else png(drawn))
 
 
 def comparison_rows(

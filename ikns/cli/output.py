@@ -24,9 +24,13 @@ __all__ = [
     "refuse_overwriting",
     "show",
     "table",
+    "write_bytes",
     "write_csv",
     "write_text",
 ]
+
+#: Columns of a table where nobody says how many there are.
+_WIDTH = 100
 
 
 def json_text(value: Any) -> str:
@@ -63,7 +67,9 @@ def show(result: Mapping[str, Any], *parts: Any, as_json: bool) -> None:
         return
     from rich.console import Console
 
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    # A file or a pipe has no width; tables are made for this one.
+    width = None if sys.stdout.isatty() else _WIDTH
+    console = Console(highlight=False, markup=False, soft_wrap=True, width=width)
     for part in parts:
         console.print(part)
 
@@ -157,9 +163,14 @@ def refuse_overwriting(path: Path, *, force: bool) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a file that appears whole or not at all."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file that appears whole or not at all."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        part.write_text(text, encoding="utf-8", newline="")
+        part.write_bytes(content)
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)

@@ -1,0 +1,245 @@
+"""What ``ikns compare`` found, as JSON and as tables for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from ikns.cli.output import table
+
+if TYPE_CHECKING:
+    from ikns.compare import Crosstalk, NullSpaceComparison
+
+__all__ = [
+    "HELD",
+    "LEGEND",
+    "crosstalk_json",
+    "crosstalk_sentence",
+    "findings_json",
+    "leak_sentence",
+    "point_table",
+    "pooled_table",
+]
+
+#: Names in words.
+HELD = {"pose": "position and orientation", "position": "position"}
+SHOULDER = {"internal": "internal", "isb": "ISB", "rotation_vector": "vector"}
+
+
+def findings_json(found: NullSpaceComparison, **about: Any) -> dict[str, Any]:
+    """Return all numbers of a comparison; angles in deg, everything else in SI."""
+    import numpy as np
+
+    def degrees(values: Any) -> Any:
+        return np.degrees(values).tolist()
+
+    points = [
+        {
+            "point": int(found.points[i]) + 1,
+            "samples": int(found.counts[i]),
+            "angles_deg": degrees(found.angles[i]),
+            "angle_interval_deg": degrees(found.angle_interval[i]),
+            "mean_posture_angles_deg": degrees(found.mean_posture_angles[i]),
+            "mean_posture_interval_deg": degrees(found.mean_posture_interval[i]),
+            "concentration": found.concentration[i],
+            "inside": found.inside[i],
+            "inside_interval": found.inside_interval[i],
+            "inside_mean_posture": found.inside_mean_posture[i],
+            "inside_chance_median_and_95": found.inside_chance[i],
+            "leak_m": found.leak[i],
+            "leak_interval_m": found.leak_interval[i],
+            "turn_deg": degrees(found.turn[i]),
+            "turn_interval_deg": degrees(found.turn_interval[i]),
+            "kinematic_leak_m": found.kinematic_leak[i],
+            "kinematic_turn_deg": degrees(found.kinematic_turn[i]),
+            "curvature_deg": degrees(found.curvature[i]),
+            "straight_leak_m": found.straight_leak[i],
+            "straight_turn_deg": degrees(found.straight_turn[i]),
+            "agreement": found.agreement[i],
+            "agreement_interval": found.agreement_interval[i],
+            "direction": found.directions[i],
+            "null_directions": found.null_directions[i],
+        }
+        for i in range(len(found.points))
+    ]
+    pooled: dict[str, Any] = {}
+    for name, values in found.pooled.items():
+        angle = name.endswith(("angle", "turn", "curvature"))
+        unit = "_deg" if angle else "_m" if name.endswith("leak") else ""
+        value, low, high = degrees(values) if angle else values
+        pooled[name + unit] = {"value": value, "interval": [low, high]}
+    return about | {
+        "null_space_dimensions": found.null_dim,
+        "chance_angles_deg": {
+            "one_in_twenty_below": degrees(found.chance_angles[0]),
+            "median": degrees(found.chance_angles[1]),
+        },
+        "points": points,
+        "pooled": pooled,
+    }
+
+
+def crosstalk_json(found: Crosstalk, **about: Any) -> dict[str, Any]:
+    """Return all numbers of the reaches."""
+    return about | {
+        "reaches": len(found.change),
+        "mean_change": found.mean_change,
+        "mean_change_interval": found.mean_change_interval,
+        "per_meter": found.per_meter,
+        "per_meter_interval": found.per_meter_interval,
+        "largest_excursion": found.largest,
+        "changes": found.change,
+        "distances_m": found.distance,
+        "excursions": found.excursion,
+    }
+
+
+def point_table(found: NullSpaceComparison, title: str) -> Any:
+    """Return one row a PCA point, 80 columns wide."""
+    import numpy as np
+
+    rows = [
+        [
+            int(found.points[i]) + 1,
+            int(found.counts[i]),
+            _with_ends(found.angles[i, -1], found.angle_interval[i], np.degrees),
+            float(np.degrees(found.mean_posture_angles[i, -1])),
+            _with_ends(found.inside[i], found.inside_interval[i], _percent),
+            _with_ends(*_worst(found.leak[i], found.leak_interval[i]), _milli),
+            float(np.degrees(found.turn[i].max())),
+            float(1000 * found.straight_leak[i]),
+            float(np.degrees(found.curvature[i])),
+        ]
+        for i in range(len(found.points))
+    ]
+    return table(
+        title,
+        {
+            "point": "d",
+            "still": "d",
+            "angle\ndeg": "s",
+            "at mean\nposture": ".1f",
+            "inside\n%": "s",
+            "leak\nmm/c": "s",
+            "turn\ndeg/c": ".1f",
+            "ends\nmm": ".1f",
+            "bend\ndeg": ".0f",
+        },
+        rows,
+    )
+
+
+def pooled_table(
+    findings: Iterable[tuple[Sequence[str], NullSpaceComparison]], title: str
+) -> Any:
+    """Return one row a chain, task and set of coordinates; all points together."""
+    import numpy as np
+
+    rows = []
+    for (_, task, coordinates), found in findings:
+        pooled = found.pooled
+
+        def cell(name: str, unit: Any, own: Any = pooled) -> str:
+            value, *ends = own[name]
+            return _with_ends(value, ends, unit)
+
+        rows.append(
+            [
+                found.directions.shape[2],
+                task,
+                SHOULDER[coordinates],
+                cell("angle", np.degrees),
+                float(np.degrees(found.chance_angles[0])),
+                cell("inside", _percent),
+                100 * float(np.mean(found.inside_chance[:, 1])),
+                1000 * pooled["leak"][0],
+                1000 * pooled["straight_leak"][0],
+            ]
+        )
+    return table(
+        title,
+        {
+            "joints": "d",
+            "held": "s",
+            "shoulder": "s",
+            "angle\ndeg": "s",
+            "chance\nbelow": ".0f",
+            "inside\n%": "s",
+            "chance\nabove": ".0f",
+            "leak\nmm/c": ".1f",
+            "ends\nmm": ".1f",
+        },
+        rows,
+    )
+
+
+#: What the columns of both tables mean.
+LEGEND = (
+    "angle: largest between learned and analytic directions, averaged over the visited "
+    "postures.  inside: joint variance inside the null space.  leak, turn: hand's way "
+    "while c goes from 0 to 1.  ends: how far the hand is off where straight Z ends.  "
+    "bend: turn of the null space over the range.  chance: one random subspace in "
+    "twenty is below (above).  Noise makes angles and ways longer; intervals allow for "
+    "that, so one may end below its value."
+)
+
+
+def leak_sentence(found: NullSpaceComparison) -> str:
+    """Say how the hand moves with c, all points together."""
+    import numpy as np
+
+    leak, turn = (
+        _with_ends(found.pooled[name][0], found.pooled[name][1:], unit)
+        for name, unit in (("leak", _milli), ("turn", np.degrees))
+    )
+    return f"While c goes from 0 to 1 the hand goes {leak} mm and turns {turn} deg."
+
+
+def crosstalk_sentence(found: Crosstalk) -> str:
+    """Say what reaches do to c."""
+    reaches = f"{len(found.change)} reaches" if len(found.change) > 1 else "1 reach"
+    mean = _with_ends(found.mean_change, found.mean_change_interval, float)
+    rate = _with_ends(found.per_meter, found.per_meter_interval, float)
+    return (
+        f"Crosstalk on {reaches}: c changes by {mean} a reach, {rate} a meter; at most "
+        f"it goes {found.largest:.2f} away."
+    )
+
+
+def _with_ends(value: Any, ends: Any, unit: Any) -> str:
+    """Write a value and its interval, such as ``3.1 (0-4.4)``."""
+    shown = float(unit(value))
+    if math.isnan(shown):
+        return "-"
+    low, high = (float(unit(end)) for end in ends)
+    text = _short(shown)
+    if math.isnan(low) or math.isnan(high):
+        return text
+    return f"{text} ({_short(low)}-{_short(high)})"
+
+
+def _short(value: float) -> str:
+    """Write a number with two or three digits.
+
+    >>> [_short(x) for x in (0.0, 0.123, 4.56, 45.6, 99.94)]
+    ['0', '0.12', '4.6', '46', '99.9']
+    """
+    if value == 0:
+        return "0"
+    if 99 < value < 99.95:  # shares near 100 %
+        return f"{value:.1f}"
+    return f"{value:.2f}" if value < 1 else f"{value:.{1 if value < 9.95 else 0}f}"
+
+
+def _worst(values: Any, intervals: Any) -> tuple[Any, Any]:
+    worst = int(values.argmax()) if not math.isnan(values.max()) else 0
+    return values[worst], intervals[worst]
+
+
+def _percent(share: Any) -> Any:
+    return 100 * share
+
+
+def _milli(meters: Any) -> Any:
+    return 1000 * meters
