@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from urllib.parse import parse_qsl
 
-from ikns.errors import InvalidInput, MarkerMismatch, naming
+from ikns.errors import IknsError, InvalidInput, MarkerMismatch
 from ikns.files import read
 from ikns.marker_set import MarkerSet
+from ikns.stream import qualisys, vicon
 from ikns.stream.frame import Feed
 from ikns.stream.lsl_feed import LslFeed
-from ikns.stream.qualisys import QualisysFeed
 from ikns.stream.replay import Replay
 from ikns.stream.source import Source
-from ikns.stream.vicon import ViconFeed
 
 __all__ = ["open_source"]
 
@@ -73,15 +72,19 @@ def open_source(
             )
     if not place and scheme != "lsl":
         raise InvalidInput(f"{address}: expected {_KNOWN}.")
-    with naming(place if scheme == "replay" else f"{scheme}:{place}"):
+    try:
         feed = open_feed(place, options)
-        source = Source(feed, patience=patience, late_after=late_after)
-        try:
-            if needs is not None:
-                _check_labels(source, needs.without_static())
-        except BaseException:
-            source.close()
+    except IknsError as error:
+        if str(error).startswith(tuple(filter(None, (f"{scheme}:", place)))):
             raise
+        raise type(error)(f"{address}: {error}") from None
+    source = Source(feed, patience=patience, late_after=late_after)
+    try:
+        if needs is not None:
+            _check_labels(source, needs.without_static())
+    except BaseException:
+        source.close()
+        raise
     return source
 
 
@@ -118,11 +121,11 @@ def _lsl(stream: str, options: Options) -> Feed:
 
 
 def _qualisys(host: str, options: Options) -> Feed:
-    return QualisysFeed(*_host(host, 22223), timeout=_timeout(options))
+    return qualisys.QualisysFeed(*_host(host, qualisys.PORT), timeout=_timeout(options))
 
 
 def _vicon(host: str, options: Options) -> Feed:
-    return ViconFeed(*_host(host, 801), timeout=_timeout(options))
+    return vicon.ViconFeed(*_host(host, vicon.PORT), timeout=_timeout(options))
 
 
 _KINDS: dict[str, tuple[Callable[[str, Options], Feed], tuple[str, ...]]] = {

@@ -23,8 +23,12 @@ from ikns.stream.frame import Event, Frame
 from ikns.stream.inbox import Inbox
 from ikns.stream.optional import bring_in
 
-__all__ = ["QualisysFeed"]
+__all__ = ["PORT", "QualisysFeed"]
 
+#: Where QTM listens for clients that read little-endian numbers.
+PORT = 22223
+
+_VERSION = "1.25"  # of the protocol, as qtm-rt asks for by default
 _AGAIN = 0.5  # seconds between attempts to connect
 _INBOX = 1000  # frames
 
@@ -36,7 +40,6 @@ class QualisysFeed:
     ----------
     host : str
     port : int
-        QTM's little-endian port.
     timeout : float
         Seconds for QTM to answer and to send a first frame.
 
@@ -55,8 +58,8 @@ class QualisysFeed:
 
     speed = 1.0
 
-    def __init__(self, host: str, port: int = 22223, *, timeout: float = 5.0) -> None:
-        self.name = f"qualisys:{host}"
+    def __init__(self, host: str, port: int = PORT, *, timeout: float = 5.0) -> None:
+        self.name = f"qualisys:{host}" + (f":{port}" if port != PORT else "")
         self._qtm = bring_in(
             "qtm_rt", needed_by=self.name, remedy="pip install 'ikns[qualisys]'"
         )
@@ -158,20 +161,7 @@ class QualisysFeed:
 
     async def _connect(self) -> Any:
         """Connect and let frames flow."""
-        try:
-            connection = await asyncio.wait_for(
-                self._qtm.connect(
-                    self._host,
-                    self._port,
-                    on_disconnect=lambda error: self._wake.set(),
-                    timeout=self._timeout,
-                ),
-                self._timeout,
-            )
-        except TimeoutError:
-            raise StreamError(self._no_answer()) from None
-        if connection is None:  # refused, no such host, or a QTM that is too old
-            raise StreamError(self._no_answer())
+        connection = await self._call()
         try:
             settings = await connection.get_parameters(["general", "3d"])
             labels, rate = _read_settings(settings, self.name)
@@ -195,6 +185,31 @@ class QualisysFeed:
             connection.disconnect()
             raise
         return connection
+
+    async def _call(self) -> Any:
+        """Connect as ``qtm_rt.connect`` does, which forgets a socket on a time-out."""
+        made: list[Any] = []  # known even when the rest fails
+
+        def protocol() -> Any:
+            made.append(
+                self._qtm.protocol.QTMProtocol(
+                    on_disconnect=lambda error: self._wake.set()
+                )
+            )
+            return made[0]
+
+        try:
+            async with asyncio.timeout(self._timeout):
+                loop = asyncio.get_running_loop()
+                await loop.create_connection(protocol, self._host, self._port)
+                await made[0].set_version(_VERSION)
+        except (OSError, self._qtm.QRTCommandException) as error:
+            if made and made[0].transport is not None:
+                made[0].transport.close()
+            if isinstance(error, OSError):  # refused, no such host, or a time-out
+                raise StreamError(self._no_answer()) from None
+            raise StreamError(f"{self.name}: QTM answered {error}.") from None
+        return self._qtm.QRTConnection(made[0], timeout=self._timeout)
 
     def _take(self, packet: Any) -> None:
         received = time.monotonic()

@@ -20,7 +20,10 @@ from ikns.stream.frame import Event, Frame
 from ikns.stream.inbox import Inbox
 from ikns.stream.optional import bring_in
 
-__all__ = ["ViconFeed"]
+__all__ = ["PORT", "ViconFeed"]
+
+#: Where Vicon's programs serve the DataStream.
+PORT = 801
 
 _REMEDY = (
     "install Vicon's DataStream SDK from vicon.com, then pip install the folder "
@@ -58,8 +61,8 @@ class ViconFeed:
 
     speed = 1.0
 
-    def __init__(self, host: str, port: int = 801, *, timeout: float = 5.0) -> None:
-        self.name = f"vicon:{host}"
+    def __init__(self, host: str, port: int = PORT, *, timeout: float = 5.0) -> None:
+        self.name = f"vicon:{host}" + (f":{port}" if port != PORT else "")
         self._sdk = bring_in(
             "vicon_dssdk.ViconDataStream", needed_by=self.name, remedy=_REMEDY
         )
