@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from ikns.calibration import track_chain
 from ikns.errors import InvalidInput, NotEnoughData
+from ikns.files import read
 from ikns.motion import Motion
 from ikns.recording import Recording
 from ikns.skeleton import Skeleton
@@ -224,6 +225,38 @@ def test_the_sweep_goes_there_and_back_with_a_ghost_of_the_same_c() -> None:
     row = int(np.argmin(np.abs(made.times - made.start)))
     np.testing.assert_allclose(ghost[row], hand[row], atol=1e-6)
     assert len(person.null_space_map.centers_) == 10
+
+
+def test_the_camera_sees_the_hand_wherever_it_goes() -> None:
+    made = scene()
+    places = motion().hand_in_thorax[:, 0]
+    to = places[np.isfinite(places).all(axis=1)] - made.camera
+    way = made.target - made.camera
+    cosine = to @ way / np.linalg.norm(to, axis=1) / np.linalg.norm(way)
+    assert np.degrees(np.arccos(cosine)).max() < 14  # half the angle of view
+
+
+@pytest.mark.parametrize(
+    ("name", "marker_set"),
+    [
+        ("ue_adl/ADL001/ADL001AR1.csv", "ue_adl"),
+        ("plugin_gait/Movement_trial.c3d", "plug_in_gait"),
+    ],
+)
+def test_a_real_recording_plays(data: Path, name: str, marker_set: str) -> None:
+    body = Skeleton.load(marker_set=marker_set)
+    trial = read(data / name)
+    tracked = track_chain(body, trial, CHAIN)
+    learned = small_person.subject().null_space_map
+    made = recording_scene(body, learned, CHAIN, tracked, trial, simulated=False)
+    assert 25 < 1 / np.median(np.diff(made.times)) < 40
+    found = curves(made)
+    worn = {marker.label for marker in body.marker_set.markers}
+    seen = {path.rsplit("/", 1)[1] for path in found if "/seen/" in path}
+    assert len(seen) > 10
+    assert seen <= worn
+    for tracks in found.values():
+        assert all(np.isfinite(values).all() for values in tracks.values())
 
 
 def test_a_motion_of_another_recording_is_refused() -> None:

@@ -124,7 +124,7 @@ def recording_scene(
         simulated,
         commands + hidden(layers),
         layers,
-        *camera_and_target(skeleton, learned, chain, q),
+        *camera_and_target(skeleton, learned, chain, motion.q[kept]),
         times=times,
         c=c[kept],
         start=float(motion.time[first] - motion.time[kept[0]]),

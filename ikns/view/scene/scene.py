@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 FIELD_OF_VIEW = 28.0
 #: From the front, above and the side of the arm, in the thorax frame.
 _FROM = np.array([0.80, 0.30, 0.52])
+#: Top of the head and foot of the trunk, for the size of the picture, m.
+_TRUNK = ((-0.03, 0.32, 0.0), (-0.06, -0.23, 0.0))
 
 
 @dataclass(frozen=True)
@@ -82,14 +84,30 @@ class Scene:
 def camera_and_target(
     skeleton: Skeleton, learned: NullSpaceMap, chain: str, q: Array
 ) -> tuple[Array, Array]:
-    """Camera and target that show the trunk, the arms of a chain and the points."""
+    """Where to look from and to, so that trunk, acting arms and points are in sight.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    learned : NullSpaceMap
+    chain : str
+        Joints of the map.
+    q : (..., 18 or 25) array
+        Every posture that is shown; unknown ones (NaN) do not count.
+
+    Returns
+    -------
+    camera, target : (3,) array
+        m in the thorax frame.
+    """
     sides = chain_sides(chain)
-    shown = [learned.centers_, [[-0.03, 0.32, 0.0], [-0.06, -0.23, 0.0]]]
+    shown = [learned.centers_, np.array(_TRUNK)]
     for side in SIDES:
         links = ("upper_arm", "forearm", "hand", "knuckle") if side in sides else ()
         for link in ("upper_arm", *links):
-            shown.append([skeleton.link_in_thorax(q, f"{side}_{link}")[0]])
-    places = np.concatenate([np.asarray(part) for part in shown])
+            place = skeleton.link_in_thorax(q, f"{side}_{link}")[0].reshape(-1, 3)
+            shown.append(place[np.all(np.isfinite(place), axis=1)])
+    places = np.concatenate(shown)
     target = (places.min(axis=0) + places.max(axis=0)) / 2
     radius = float(np.linalg.norm(places - target, axis=1).max())
     way = _FROM * [1.0, 1.0, 1.0 if "right" in sides else -1.0]
