@@ -14,7 +14,10 @@ from ikns.cli.compare import compare
 from ikns.cli.control import control
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
+from ikns.cli.replay import replay
+from ikns.cli.run import run
 from ikns.cli.scale import scale
+from ikns.cli.servo import servo
 from ikns.cli.stream import stream
 from ikns.cli.ucm import ucm
 from ikns.cli.view import view
@@ -27,7 +30,20 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
 )
-for command in (demo, scale, calibrate, ik, control, compare, ucm, view, stream):
+for command in (
+    demo,
+    scale,
+    calibrate,
+    ik,
+    control,
+    compare,
+    ucm,
+    view,
+    run,
+    replay,
+    stream,
+    servo,
+):
     app.command()(command)
 
 

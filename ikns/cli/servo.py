@@ -1,0 +1,136 @@
+"""``ikns servo``: a simulated Dynamixel servo on a pseudo-terminal, for desk work."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ikns.cli.options import AsJson
+from ikns.cli.output import json_text
+from ikns.errors import InvalidInput
+
+__all__ = ["servo"]
+
+_KEYS = {
+    "s": "silence",
+    "m": "mute",
+    "d": "delay",
+    "c": "crc",
+    "i": "id",
+    "a": "alert",
+    "o": "overheat",
+    "p": "power",
+    "u": "unplug",
+}
+#: A port that was pulled out by key comes back after so long, seconds.
+_AWAY = 3.0
+
+
+def servo(
+    model: Annotated[
+        str, typer.Option(help="xl430, xm430, mx28 or ax12 (Protocol 1.0).")
+    ] = "xl430",
+    id: Annotated[int, typer.Option(help="Its number on the bus.")] = 1,
+    baud: Annotated[int, typer.Option(help="Bits per second.")] = 57600,
+    link: Annotated[
+        Path | None, typer.Option(help="Symbolic link to make to its port.")
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="KIND[=VALUE]@START[+DURATION], s; may be repeated."),
+    ] = None,
+    obstacle: Annotated[
+        float | None, typer.Option(help="Position that it cannot pass, ticks.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Seconds until it ends by itself.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate a Dynamixel servo on a port of its own, and break it on demand.
+
+    Faults: silence, mute, delay, crc, id, alert, overheat, power, unplug. On a
+    terminal their first letters start them, r repairs and q quits.
+    """
+    import math
+
+    from ikns.finger.servo import FAULTS, Servo, Wire, parse_fault
+
+    if duration is not None and not 0 <= duration < math.inf:
+        raise InvalidInput(f"the duration must be a number of seconds, not {duration}.")
+    faults = [parse_fault(text) for text in fault or ()]
+    made = Servo(model, id=id, baud=baud)
+    if obstacle is not None:
+        middle = made.motor.position
+        ends = (-math.inf, obstacle) if obstacle > middle else (obstacle, math.inf)
+        made.motor.obstacles = ends
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
+    with (
+        contextlib.suppress(KeyboardInterrupt),  # the usual way to end it
+        Wire(made, link=link, faults=faults) as wire,
+        _keys() as key,
+    ):
+        about = {"port": wire.port, "model": model, "id": id, "baud": baud}
+        if as_json:
+            sys.stdout.write(json_text({**about, "simulated": True}))
+        else:
+            sys.stdout.write(
+                f"{wire.port}: simulated {model}, id {id}, {baud} baud; try "
+                f"--finger 'dynamixel:{wire.port}?id={id}&baud={baud}&model={model}'\n"
+            )
+            if sys.stdin.isatty():
+                letters = ", ".join(f"{k} {v}" for k, v in _KEYS.items())
+                sys.stdout.write(f"Keys: {letters}, r repair, q quit\n")
+        sys.stdout.flush()
+        seen = 0
+        while duration is None or wire.elapsed < duration:
+            pressed = key()
+            if pressed == "q":
+                break
+            if pressed == "r":
+                wire.mend()
+            elif pressed in _KEYS:
+                lasts = _AWAY if pressed == "u" else math.inf
+                wire.inject(_KEYS[pressed], lasts)
+                sys.stderr.write(f"{wire.elapsed:8.2f} s  {FAULTS[_KEYS[pressed]]}\n")
+            events = list(made.events)
+            for at, text in events[seen:]:
+                sys.stderr.write(f"{at - (time.monotonic() - wire.elapsed):8.2f} s  ")
+                sys.stderr.write(f"{text} at {made.motor.position:.0f}\n")
+            seen = len(events)
+
+
+@contextlib.contextmanager
+def _keys() -> Iterator[Callable[[], str]]:
+    """Keys as they are pressed, where there is a keyboard; waits a little."""
+    if not sys.stdin.isatty():
+
+        def no_key() -> str:
+            time.sleep(0.05)
+            return ""
+
+        yield no_key
+        return
+    import termios
+    import tty
+
+    number = sys.stdin.fileno()
+    before = termios.tcgetattr(number)
+
+    def key() -> str:
+        ready = select.select([number], [], [], 0.05)[0]
+        return sys.stdin.read(1) if ready else ""
+
+    try:
+        tty.setcbreak(number)
+        yield key
+    finally:
+        termios.tcsetattr(number, termios.TCSADRAIN, before)

@@ -1,0 +1,31 @@
+"""Wearable fingers: simulated and real, safe below any controller.
+
+Research software, not a medical device. Limits, time-outs and safe states of every
+finger: :class:`Safety`; what every finger promises: :class:`Finger`, tested by
+:func:`check_finger`.
+"""
+
+from ikns.finger.check import FingerReport, check_finger
+from ikns.finger.dynamixel import DynamixelFinger
+from ikns.finger.errors import FingerError
+from ikns.finger.guard import Safety
+from ikns.finger.limiter import Limiter, Limits
+from ikns.finger.opening import open_finger
+from ikns.finger.simulated import SimulatedFinger
+from ikns.finger.state import MODES, SAFE_STATES, Finger, FingerState
+
+__all__ = [
+    "MODES",
+    "SAFE_STATES",
+    "DynamixelFinger",
+    "Finger",
+    "FingerError",
+    "FingerReport",
+    "FingerState",
+    "Limiter",
+    "Limits",
+    "Safety",
+    "SimulatedFinger",
+    "check_finger",
+    "open_finger",
+]

@@ -1,0 +1,344 @@
+"""What is said to a servo, and in which order, so that it never moves unasked."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import threading
+import time
+from dataclasses import dataclass
+
+from ikns.finger.bus import Bus, NoAnswer, Refused, Unplugged
+from ikns.finger.errors import FingerError
+from ikns.finger.guard import Guard
+from ikns.finger.limiter import Limits
+from ikns.finger.models import Model
+from ikns.finger.state import FingerState
+
+__all__ = ["Drive", "Plan"]
+
+#: The servo's own profile stays out of the way of the limiter's by this factor.
+_PROFILE_MARGIN = 1.5
+_WATCHDOG_UNIT = 0.02
+#: Seconds between looks at whether torque is still on, and between tries to reopen.
+_LOOK, _REOPEN = 0.1, 0.2
+_POSITION_MODE, _CURRENT_POSITION_MODE = 3, 5
+_ANSWER_ALL = 2
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How flexion becomes ticks, and how hard and fast the servo may push.
+
+    Parameters
+    ----------
+    open_ticks, closed_ticks : int
+    effort : float
+        Share of full effort.
+    watchdog : float
+        Seconds.
+    limits : Limits
+    """
+
+    open_ticks: int
+    closed_ticks: int
+    effort: float
+    watchdog: float
+    limits: Limits
+
+    @property
+    def span(self) -> int:
+        """Ticks from open to closed, signed."""
+        return self.closed_ticks - self.open_ticks
+
+    def ticks(self, flexion: float) -> int:
+        """Position of a flexion."""
+        return round(self.open_ticks + flexion * self.span)
+
+    def flexion(self, ticks: float) -> float:
+        """Flexion at a position."""
+        return (ticks - self.open_ticks) / self.span
+
+    def sent(self, flexion: float) -> float:
+        """Flexion as the servo is told, in whole ticks; NaN stays NaN."""
+        return flexion if math.isnan(flexion) else self.flexion(self.ticks(flexion))
+
+    def kept(self, model: Model) -> dict[str, int]:
+        """Return what has to be in the servo's permanent memory.
+
+        With current-based position control a servo limits its current, but heeds no
+        position limits; then only the limiter does.
+        """
+        ends = sorted(map(self.ticks, (self.limits.lower, self.limits.upper)))
+        values = {"min_position_limit": ends[0], "max_position_limit": ends[1]}
+        if model.protocol == 2:
+            # Forward, profiles by velocity, and no torque by goal alone.
+            values["drive_mode"] = 0
+            values["operating_mode"] = _POSITION_MODE
+        if "current_limit" in model:
+            values["operating_mode"] = _CURRENT_POSITION_MODE
+            values["current_limit"] = self._share(model, "current_limit")
+        else:
+            values["pwm_limit"] = self._share(model, "pwm_limit")
+        # Let it switch off by itself when overheated, shocked or overloaded.
+        values["shutdown"] = model["shutdown"].initial
+        return values
+
+    def volatile(self, model: Model) -> dict[str, int]:
+        """Return what has to be in its memory while it runs."""
+        speed = self.limits.rate * abs(self.span) * _PROFILE_MARGIN
+        values = {
+            "profile_velocity": _whole(model, "profile_velocity", speed),
+        }
+        if model.protocol == 2:
+            values["status_return_level"] = _ANSWER_ALL
+        if "profile_acceleration" in model:
+            change = self.limits.acceleration * abs(self.span) * _PROFILE_MARGIN
+            values["profile_acceleration"] = _whole(
+                model, "profile_acceleration", change
+            )
+        if "current_limit" in model:
+            values["goal_current"] = self._share(model, "current_limit")
+        else:
+            values["goal_pwm"] = self._share(model, "pwm_limit")
+        return values
+
+    def _share(self, model: Model, name: str) -> int:
+        return max(round(self.effort * model[name].upper), 1)
+
+
+def _whole(model: Model, name: str, value: float) -> int:
+    """Round up to a register's unit; its zero would mean no limit at all."""
+    velocity = name == "profile_velocity"
+    unit = model.velocity_unit if velocity else model.acceleration_unit
+    top = min(model[name].upper, 1023 if model.protocol == 1 else model[name].upper)
+    return min(max(math.ceil(value / unit), 1), top)
+
+
+class Drive:
+    """Carries out what a guard decides.
+
+    Parameters
+    ----------
+    bus : Bus
+        Used by one thread at a time.
+    plan : Plan
+    guard : Guard
+    lock : lock
+        Held while guard or results are touched, never while the bus is in use.
+
+    Attributes
+    ----------
+    known : FingerState
+        The last that was measured.
+    alert : str
+        Complaint while no reason of the guard says more.
+    """
+
+    def __init__(
+        self, bus: Bus, plan: Plan, guard: Guard, lock: threading.RLock
+    ) -> None:
+        self._bus, self._plan, self._guard, self._lock = bus, plan, guard, lock
+        self.known = FingerState()
+        self.alert = ""
+        self._torque = False  # as far as is known
+        self._told: int | None = None
+        self._answered = self._looked = self._tried = -math.inf
+
+    def set_up(self) -> None:
+        """Write limits, with torque off; permanent memory only where it differs."""
+        bus, model, plan = self._bus, self._bus.model, self._plan
+        with contextlib.suppress(NoAnswer):  # it may be set up to say nothing
+            if bus.read("status_return_level") != _ANSWER_ALL:
+                bus.write("status_return_level", _ANSWER_ALL)
+        if complaint := bus.alerts():
+            raise FingerError(
+                f"{bus.port}: servo {bus.id} reports {complaint}; let it rest and "
+                "switch its power off and on."
+            )
+        bus.write("torque_enable", 0)
+        if bus.read("torque_enable"):
+            raise FingerError(f"{bus.port}: servo {bus.id} does not let go of torque.")
+        if "bus_watchdog" in model:
+            bus.write("bus_watchdog", 0)
+        for values in (plan.kept(model), plan.volatile(model)):
+            for name, value in values.items():
+                if bus.read(name) != value:
+                    bus.write(name, value)
+                    if bus.read(name) != value:
+                        raise FingerError(
+                            f"{bus.port}: servo {bus.id} does not keep {name} {value}."
+                        )
+
+    def arm(self) -> None:
+        """Switch torque on with the present position as the goal."""
+        bus = self._bus
+        values = self._measure()
+        with self._lock:
+            self._guard.start(time.monotonic(), values.flexion)
+            self.alert = ""
+        self._switch_on()
+        bus.read("torque_enable")
+
+    def turn(self) -> None:
+        """Say and ask once; whatever goes wrong becomes the guard's decision."""
+        now = time.monotonic()
+        with self._lock:
+            self._guard.tick(now)
+            torque, goal = self._guard.torque, self._guard.goal
+        try:
+            self._say(torque, goal)
+            self._ask()
+        except Unplugged as error:
+            self._fail(str(error))
+            self._reopen()
+        except NoAnswer:
+            if time.monotonic() - self._answered > self._guard.safety.silence_timeout:
+                silent = self._guard.safety.silence_timeout
+                self._fail(f"no answer from the servo for {silent:g} s")
+        except FingerError as error:
+            self._fail(str(error))
+
+    def let_go(self, timeout: float) -> bool:
+        """Switch torque off; return whether the servo confirmed it in time."""
+        with self._lock:
+            self._guard.relax()
+        give_up = time.monotonic() + timeout
+        while True:
+            try:
+                self._switch_off()
+            except Unplugged:
+                self._reopen()
+                time.sleep(0.01)
+            except FingerError:
+                pass
+            else:
+                return True
+            if time.monotonic() > give_up:
+                return False
+
+    def _say(self, torque: bool, goal: float) -> None:
+        if not torque:
+            if self._torque:
+                self._switch_off()
+            return
+        if not self._torque:  # it has been away, or has stopped by itself
+            values = self._measure()
+            with self._lock:
+                self._guard.hold_at(time.monotonic(), values.flexion)
+            self._switch_on()
+            return
+        ticks = self._plan.ticks(goal)
+        if ticks != self._told:
+            self._tell(ticks)
+
+    def _tell(self, ticks: int) -> None:
+        try:
+            self._bus.write("goal_position", ticks)
+        except Refused:
+            if not self._watchdog_tripped():
+                raise
+            self._torque = False  # it stands still; taken up again from there
+            self._fail(f"the servo heard nothing for {self._plan.watchdog:g} s")
+            return
+        self._told = ticks
+
+    def _watchdog_tripped(self) -> bool:
+        return (
+            "bus_watchdog" in self._bus.model and self._bus.read("bus_watchdog") == -1
+        )
+
+    def _switch_on(self) -> None:
+        """Never with an old goal, and never before the watchdog's error is cleared."""
+        bus = self._bus
+        with self._lock:
+            goal = self._guard.goal
+        if math.isnan(goal):
+            return
+        watchdog = "bus_watchdog" in bus.model
+        self._switch_off()
+        for name, value in self._plan.volatile(bus.model).items():
+            bus.write(name, value)
+        # A goal alone switches an AX-12 on, so it comes last but for torque itself.
+        self._torque = True
+        self._told = self._plan.ticks(goal)
+        bus.write("goal_position", self._told)
+        bus.write("torque_enable", 1)
+        if watchdog:
+            steps = math.ceil(self._plan.watchdog / _WATCHDOG_UNIT)
+            bus.write("bus_watchdog", steps)
+
+    def _switch_off(self) -> None:
+        """Torque off, read back; a servo that starts again has no watchdog error."""
+        bus = self._bus
+        bus.write("torque_enable", 0)
+        if bus.read("torque_enable"):
+            raise FingerError(f"{bus.port}: servo {bus.id} does not let go of torque.")
+        self._torque, self._told = False, None
+        if "bus_watchdog" in bus.model:
+            bus.write("bus_watchdog", 0)
+
+    def _ask(self) -> None:
+        values = self._measure()
+        now = time.monotonic()
+        with self._lock:
+            self._guard.measured(now, values.flexion)
+        if self._bus.alert:
+            complaint = self._bus.alerts() or "a hardware alert"
+            with self._lock:
+                self.alert = complaint
+                self._guard.fail(f"the servo reports {complaint}", limp=True)
+        if self._torque and now - self._looked > _LOOK:
+            self._looked = now
+            # An AX-12 that starts again takes up torque with the next goal, but has
+            # forgotten how fast it may go.
+            name = "profile_velocity"
+            speed = self._plan.volatile(self._bus.model)[name]
+            if not self._bus.read("torque_enable") or self._bus.read(name) != speed:
+                with self._lock:
+                    self._guard.fail("the servo has lost its torque", limp=True)
+            elif self._watchdog_tripped():
+                self._torque = False
+                self._fail(f"the servo heard nothing for {self._plan.watchdog:g} s")
+
+    def _measure(self) -> FingerState:
+        """Read everything that the servo measures, at once."""
+        bus, model = self._bus, self._bus.model
+        first = "moving" if model.protocol == 2 else "present_position"
+        last = "present_temperature" if model.protocol == 2 else "moving"
+        values = bus.read_many(first, last)
+        now = self._answered = time.monotonic()
+        towards = math.copysign(1.0, self._plan.span)
+        current = values.get("present_current", math.nan) * model.current_unit
+        load = values.get("present_load", math.nan) / 1000
+        if not math.isnan(current):
+            load = current / (model["current_limit"].upper * model.current_unit)
+        known = FingerState(
+            time=now,
+            flexion=self._plan.flexion(values["present_position"]),
+            current=towards * current,
+            load=towards * load,
+            temperature=float(values["present_temperature"]),
+            voltage=values["present_input_voltage"] / 10,
+            moving=bool(values["moving"]),
+        )
+        with self._lock:
+            self.known = known
+        return known
+
+    def _fail(self, reason: str) -> None:
+        with self._lock:
+            self._guard.fail(reason.rstrip("."))
+
+    def _reopen(self) -> None:
+        """Take the port up again when it is back; torque then starts from anew."""
+        now = time.monotonic()
+        if now - self._tried < _REOPEN:
+            return
+        self._tried = now
+        self._bus.close()
+        try:
+            self._bus.open()
+            self._bus.check(diagnose=False)
+        except FingerError:
+            self._bus.close()

@@ -1,0 +1,105 @@
+"""A finger by its address."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+from urllib.parse import parse_qsl
+
+from ikns.errors import InvalidInput
+from ikns.finger.dynamixel import DynamixelFinger
+from ikns.finger.guard import Safety
+from ikns.finger.simulated import SimulatedFinger
+from ikns.finger.state import Finger
+
+__all__ = ["open_finger"]
+
+_SIMULATED: dict[str, Callable[[str], Any]] = {"width": float, "effort": float}
+_DYNAMIXEL: dict[str, Callable[[str], Any]] = {
+    "id": int,
+    "baud": int,
+    "model": str,
+    "open": int,
+    "closed": int,
+    "effort": float,
+    "watchdog": float,
+}
+
+
+def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
+    """Make a finger; it is connected by :meth:`Finger.connect` or ``with``.
+
+    Parameters
+    ----------
+    address : str
+        ``sim:`` or ``sim:width=60`` (what it may hold, mm; also ``effort``), or
+        ``dynamixel:PORT?id=1&baud=57600&model=xl430`` (also ``open`` and ``closed``,
+        ticks, ``effort``, and ``watchdog``, s). Both take ``safe=limp``, ``hold`` or
+        ``open``, which wins over `safety`.
+    safety : Safety, optional
+
+    Returns
+    -------
+    Finger
+
+    Raises
+    ------
+    InvalidInput
+        When the address is not one of these.
+
+    Examples
+    --------
+    >>> open_finger("sim:width=60").object_width
+    0.06
+    >>> open_finger("gpio:7")
+    Traceback (most recent call last):
+    ikns.errors.InvalidInput: unknown finger 'gpio:7', expected sim: or dynamixel:PORT.
+    """
+    scheme, colon, rest = address.partition(":")
+    safety = Safety() if safety is None else safety
+    if scheme == "sim" and colon:
+        values = _options(address, rest.removeprefix("?"), _SIMULATED)
+        safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
+        if "width" in values:
+            values["object_width"] = values.pop("width") / 1000
+        return SimulatedFinger(safety=safety, **values)
+    if scheme == "dynamixel" and colon:
+        port, _, query = rest.partition("?")
+        if not port:
+            raise InvalidInput(
+                f"'{address}' names no port, such as dynamixel:/dev/ttyUSB0."
+            )
+        values = _options(address, query, _DYNAMIXEL)
+        safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
+        for end in ("open", "closed"):
+            if end in values:
+                values[f"{end}_ticks"] = values.pop(end)
+        return DynamixelFinger(port, safety=safety, **values)
+    raise InvalidInput(f"unknown finger '{address}', expected sim: or dynamixel:PORT.")
+
+
+def _options(
+    address: str, query: str, known: dict[str, Callable[[str], Any]]
+) -> dict[str, Any]:
+    types: dict[str, Callable[[str], Any]] = {**known, "safe": str}
+    values = {}
+    try:
+        pairs = parse_qsl(query, strict_parsing=True) if query else []
+    except ValueError:
+        raise InvalidInput(
+            f"'{address}' should end in options like name=value&name=value."
+        ) from None
+    for name, text in pairs:
+        if name not in types:
+            raise InvalidInput(
+                f"'{address}' has an unknown option '{name}', "
+                f"expected {', '.join(types)}."
+            )
+        try:
+            values[name] = types[name](text)
+        except ValueError:
+            raise InvalidInput(
+                f"'{address}' has {name}={text}, expected a number."
+            ) from None
+    return values

@@ -1,0 +1,121 @@
+"""The control table of a simulated servo, with the rules of its firmware."""
+
+from __future__ import annotations
+
+from ikns.finger.models import Model, Register
+
+__all__ = ["Memory", "Trouble"]
+
+
+class Trouble(Exception):
+    """An error number that goes into the status packet (Protocol 2.0)."""
+
+    FAILED, INSTRUCTION, CRC, RANGE, LENGTH, LIMIT, ACCESS = range(1, 8)
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+class Memory:
+    """Values by name, and bytes by address.
+
+    Parameters
+    ----------
+    model : Model
+
+    Attributes
+    ----------
+    alert : int
+        Bits of the hardware error status, also where no register shows them.
+
+    Examples
+    --------
+    >>> from ikns.finger.models import MODELS
+    >>> memory = Memory(MODELS["xl430"])
+    >>> int.from_bytes(memory.read(0, 2), "little")  # model number
+    1060
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._values = {r.name: r.initial for r in model.registers.values()}
+        self._by_address = sorted(model.registers.values(), key=lambda r: r.address)
+        self.alert = 0
+
+    def __getitem__(self, name: str) -> int:
+        """Return the value of a register."""
+        return self._values[name]
+
+    def __setitem__(self, name: str, value: int) -> None:
+        """Set a register, as the servo itself may."""
+        self._values[name] = value
+
+    def forget(self) -> None:
+        """Lose what is not kept without power."""
+        for register in self._by_address:
+            if register.address >= self._model.ram:
+                self._values[register.name] = register.initial
+        self.alert = 0
+
+    def read(self, address: int, count: int) -> bytes:
+        """Bytes from an address; zero between the registers.
+
+        Raises
+        ------
+        Trouble
+            When they lie beyond the table.
+        """
+        if count < 1 or address + count > self._model.memory:
+            raise Trouble(Trouble.ACCESS)
+        data = bytearray(count)
+        for register in self._by_address:
+            if register.end <= address or register.address >= address + count:
+                continue
+            value = register.to_bytes(self._values[register.name])
+            for i, byte in enumerate(value, register.address - address):
+                if 0 <= i < count:
+                    data[i] = byte
+        return bytes(data)
+
+    def check(self, address: int, data: bytes) -> list[tuple[Register, int]]:
+        """Return the registers and values that bytes would write.
+
+        Raises
+        ------
+        Trouble
+            When the firmware would refuse any of them; then none may be written.
+        """
+        end = address + len(data)
+        hit = [r for r in self._by_address if r.address < end and r.end > address]
+        if not hit or end > self._model.memory:
+            raise Trouble(Trouble.ACCESS)
+        written = []
+        for register in hit:
+            if register.address < address or register.end > end:
+                raise Trouble(Trouble.LENGTH)
+            kept = register.address < self._model.ram
+            if not register.writable or (kept and self._values["torque_enable"]):
+                raise Trouble(Trouble.ACCESS)
+            start = register.address - address
+            value = register.from_bytes(data[start : start + register.size])
+            if not register.lower <= value <= register.upper:
+                raise Trouble(Trouble.RANGE)
+            self._check_limit(register.name, value)
+            written.append((register, value))
+        return written
+
+    def _check_limit(self, name: str, value: int) -> None:
+        values = self._values
+        # Only plain position control heeds the position limits.
+        if name == "goal_position" and values.get("operating_mode", 3) == 3:
+            low, high = values["min_position_limit"], values["max_position_limit"]
+            if not low <= value <= high:
+                raise Trouble(Trouble.LIMIT)
+        limit = {
+            "goal_pwm": "pwm_limit",
+            "goal_current": "current_limit",
+            "goal_velocity": "velocity_limit",
+        }.get(name)
+        if limit is not None and abs(value) > values[limit]:
+            raise Trouble(Trouble.LIMIT)

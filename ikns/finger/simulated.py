@@ -1,0 +1,199 @@
+"""A simulated finger: for work without hardware, and for tests of everything above."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Self
+
+from ikns.errors import InvalidInput
+from ikns.finger.chain import flexion_at, joint_angles, opening
+from ikns.finger.errors import FingerError
+from ikns.finger.guard import Guard, Safety
+from ikns.finger.leaving import forget, relax_at_exit
+from ikns.finger.state import FingerState
+
+__all__ = ["SimulatedFinger"]
+
+# A servo that closes the finger with half a turn, ours, after an XL430-W250 (57 rev/min
+# and 1.3 A at 11.1 V): flexion per second, amperes at a standstill, seconds to follow
+# and to change speed, flexion of error at which it pushes as hard as it may.
+_SPEED, _STALL_CURRENT = 1.9, 1.3
+_FOLLOW, _SPIN, _YIELD = 0.03, 0.01, 0.04
+_FRICTION = 0.1  # share of full effort that moving costs
+_STEP = 1e-3
+#: A finger slower than this is said to rest, flexion per second.
+_RESTING = 0.01
+
+
+class SimulatedFinger:
+    """A simulated tendon-driven finger, deterministic for a given clock.
+
+    Six modules bend alike (:mod:`ikns.finger.chain`); the motor is of second order,
+    with limited speed and effort; an object stops the closing finger, and the current
+    rises. Temperature and voltage are not simulated. Time passes for it whenever it is
+    called.
+
+    Parameters
+    ----------
+    object_width : float, optional
+        What lies between finger and palm, m; None for nothing.
+    effort : float
+        Share of its full effort that the motor may push with.
+    safety : Safety, optional
+    flexion : float
+        Where it starts.
+    clock : callable
+        Seconds, monotonic.
+
+    Examples
+    --------
+    >>> now = 0.0
+    >>> with SimulatedFinger(object_width=0.06, clock=lambda: now) as finger:
+    ...     for _ in range(200):
+    ...         now += 0.01
+    ...         sent = finger.command(1.0)
+    ...     state = finger.state()
+    >>> round(1000 * opening(state.flexion))  # it holds the object
+    60
+    >>> state.stalled, state.current > 0.1
+    (True, True)
+    """
+
+    resolution = 0.0
+
+    def __init__(
+        self,
+        *,
+        object_width: float | None = None,
+        effort: float = 0.5,
+        safety: Safety | None = None,
+        flexion: float = 0.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        if not 0 < effort <= 1:
+            raise InvalidInput(f"effort must be in (0, 1], not {effort:g}.")
+        if not 0 <= flexion <= 1:
+            raise InvalidInput(f"flexion must be in [0, 1], not {flexion:g}.")
+        self.safety = Safety() if safety is None else safety
+        self.object_width = object_width
+        self._effort_limit = effort
+        self._clock = clock
+        self._guard = Guard(self.safety)
+        self._flexion, self._velocity, self._effort = flexion, 0.0, 0.0
+        self._now = clock()
+        self._connected = False
+
+    @property
+    def object_width(self) -> float | None:
+        """What lies between finger and palm, m; may be changed at any time."""
+        return self._width
+
+    @object_width.setter
+    def object_width(self, width: float | None) -> None:
+        self._contact = math.inf if width is None else flexion_at(width)
+        self._width = width
+
+    @property
+    def joint_angles(self) -> tuple[float, ...]:
+        """Angles of the joints of ``urdf/finger.urdf``, rad."""
+        return joint_angles(self._flexion)
+
+    @property
+    def opening(self) -> float:
+        """Width between tip and palm, m."""
+        return opening(self._flexion)
+
+    def connect(self) -> None:
+        """Begin to follow commands, from where it is; also leave the safe state."""
+        self._advance()
+        self._guard.start(self._now, self._flexion)
+        self._connected = True
+        relax_at_exit(self)
+
+    def command(self, flexion: float) -> float:
+        """Ask for a flexion; return what is sent, NaN if nothing is."""
+        self._advance()
+        return self._guard.command(self._now, flexion)
+
+    def state(self) -> FingerState:
+        """Return what it measures now."""
+        self._advance()
+        return FingerState(
+            time=self._now,
+            age=0.0,
+            mode=self._guard.mode,
+            flexion=self._flexion,
+            sent=self._guard.goal,
+            current=self._effort * _STALL_CURRENT,
+            load=self._effort,
+            moving=abs(self._velocity) > _RESTING,
+            stalled=self._guard.stalled,
+            alert=self._guard.reason,
+        )
+
+    def make_safe(self, reason: str) -> None:
+        """Go to the safe state and stay there until connected again."""
+        self._advance()
+        self._guard.fail(reason)
+
+    def relax(self) -> None:
+        """Switch the torque off; harmless when repeated."""
+        if self._connected:
+            self._advance()
+            self._connected = False
+        self._guard.relax()
+        forget(self)
+
+    def __enter__(self) -> Self:
+        """Connect."""
+        self.connect()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Relax."""
+        self.relax()
+
+    def _advance(self) -> None:
+        """Let the clock's time pass, in steps of a millisecond."""
+        now = self._clock()
+        if now < self._now:
+            raise FingerError("the clock of a simulated finger went backwards.")
+        while (left := now - self._now) > 0:
+            if self._at_rest() and left > _STEP:
+                # Nothing moves until the guard's next time-out can have passed.
+                step = min(left, 0.01)
+                self._now = now if left <= step else self._now + step
+            else:
+                step = min(left, _STEP)
+                self._now = now if left <= step else self._now + step
+                self._move(step)
+            self._guard.tick(self._now)
+            self._guard.measured(self._now, self._flexion)
+
+    def _at_rest(self) -> bool:
+        goal = self._guard.goal
+        still = self._velocity == 0.0
+        return still and (math.isnan(goal) or abs(goal - self._flexion) < 1e-9)
+
+    def _move(self, dt: float) -> None:
+        goal = self._guard.goal
+        if math.isnan(goal):  # the gear brakes it
+            self._velocity = self._effort = 0.0
+            return
+        limit = self._effort_limit
+        error = goal - self._flexion
+        wanted = min(max(error / _FOLLOW, -_SPEED), _SPEED)
+        self._velocity += (wanted - self._velocity) * min(dt / _SPIN, 1.0)
+        if abs(error) < 1e-9 and abs(self._velocity) < 1e-6:
+            self._velocity = 0.0
+        flexion = self._flexion + self._velocity * dt
+        # The object stops a closing finger; one that was put where the finger already
+        # is does not push it open.
+        contact = max(self._contact, self._flexion)
+        if flexion > contact:
+            flexion, self._velocity = contact, 0.0
+        self._flexion = flexion
+        push = error / _YIELD + _FRICTION * self._velocity / _SPEED
+        self._effort = min(max(push, -limit), limit)
