@@ -84,6 +84,9 @@ def test_leak_is_the_hand_displacement_per_unit_of_c(planted):
     report = compare(mapped(directions), mapped(directions), motion)
     # The hand moves 20 mm while s, and with it c, goes through one unit.
     np.testing.assert_allclose(report.learned_leak, 0.02, atol=1e-9)
+    # A straight line leaves nothing to doubt, and the hand does not turn.
+    np.testing.assert_allclose(report.learned_leak_interval, 0.02, atol=1e-9)
+    np.testing.assert_allclose(report.learned_turn, 0, atol=1e-12)
 
 
 def test_maps_of_different_points_are_refused(planted):

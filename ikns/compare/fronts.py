@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ikns.clustering import nearest_center
-from ikns.compare.coordinates import Coordinates, shoulder_coordinates
+from ikns.compare.coordinates import shoulder_coordinates
 from ikns.compare.reaching import Crosstalk, crosstalk
+from ikns.compare.recast import recast
 from ikns.compare.samples import Kinematics, NullSpaceComparison, compare_samples
 from ikns.compare.subspaces import learned_directions
 from ikns.errors import InvalidInput, NotEnoughData
@@ -298,18 +299,14 @@ def _compared(
     options: dict[str, Any],
 ) -> NullSpaceComparison:
     used = labels >= 0
-    for columns in shoulders:
-        middle = q[used][:, columns].mean(axis=0)
-        there = shoulder_coordinates(coordinates, middle)
-        if coordinates == "internal":
-            continue
+    if coordinates != "internal":
         again = True
-        directions = _turned(directions, q, labels, columns, there)
-        jacobians = np.array(jacobians)
-        jacobians[:, :, columns] = jacobians[:, :, columns] @ there.rates(q[:, columns])
-        kinematics = [_seen_in(there, columns, own) for own in kinematics]
-        q = np.array(q)
-        q[:, columns] = _unwrapped(there.from_internal(q[:, columns]), labels)
+        for columns in shoulders:
+            middle = q[used][:, columns].mean(axis=0)
+            there = shoulder_coordinates(coordinates, middle)
+            q, jacobians, directions, kinematics = recast(
+                there, columns, labels, q, jacobians, directions, kinematics
+            )
     lower, upper = ranges
     if again:
         rows = [q[labels == k] for k in range(len(points))]
@@ -337,45 +334,3 @@ def _compared(
         **options,
     )
     return dataclasses.replace(found, points=points)
-
-
-def _turned(
-    Z: Array,
-    q: Array,
-    labels: NDArray[np.int64],
-    columns: list[int],
-    there: Coordinates,
-) -> Array:
-    """Directions in other coordinates, by the rates at each point's mean posture."""
-    turned = np.array(Z)
-    for k in range(len(Z)):
-        B = there.rates(q[labels == k][:, columns].mean(axis=0))
-        turned[k][:, columns] = np.linalg.solve(B, Z[k][:, columns].T).T
-    return np.asarray(turned / np.linalg.norm(turned, axis=2, keepdims=True))
-
-
-def _seen_in(there: Coordinates, columns: list[int], own: Kinematics) -> Kinematics:
-    """Kinematics that takes joint vectors in other coordinates."""
-
-    def internal(y: Array) -> Array:
-        q = np.array(y)
-        q[..., columns] = there.to_internal(q[..., columns])
-        return q
-
-    def jacobian(y: Array) -> Array:
-        q = internal(y)
-        J = np.array(own.jacobian(q))
-        J[..., columns] = J[..., columns] @ there.rates(q[..., columns])
-        return J
-
-    return Kinematics(lambda y: own.pose(internal(y)), jacobian)
-
-
-def _unwrapped(y: Array, labels: NDArray[np.int64]) -> Array:
-    """Angles without jumps of a full turn among the samples of a point."""
-    smooth = np.array(y)
-    for k in np.unique(labels):
-        rows = y[labels == k]
-        middle = np.angle(np.exp(1j * rows).mean(axis=0))
-        smooth[labels == k] = middle + np.angle(np.exp(1j * (rows - middle)))
-    return smooth
