@@ -259,13 +259,24 @@ def test_a_real_recording_plays(data: Path, name: str, marker_set: str) -> None:
         assert all(np.isfinite(values).all() for values in tracks.values())
 
 
-def test_a_motion_of_another_recording_is_refused() -> None:
+def test_a_motion_without_a_hand_plays_and_one_of_another_recording_is_refused() -> (
+    None
+):
     person = small_person.subject()
     arguments = (person.skeleton, person.null_space_map, CHAIN)
     other = small_person.cut(recording(), 0, 50)
     with pytest.raises(InvalidInput, match="50 frames, found one of 100"):
         recording_scene(*arguments, motion(), other, simulated=True)
     fields = {name: getattr(motion(), name) for name in motion().__dataclass_fields__}
+    unseen = {
+        "q": np.where(np.arange(100)[:, None] == 0, np.nan, motion().q),
+        "hand_in_thorax": np.full_like(motion().hand_in_thorax, np.nan),
+    }
+    made = recording_scene(
+        *arguments, Motion(**fields | unseen), recording(), simulated=True
+    )
+    assert np.isnan(made.c).all()
+    assert "NaN" not in scene_html(made).split('id="scene"')[1].split("</script>")[0]
     unknown = Motion(**fields | {"q": np.full_like(motion().q, np.nan)})
     with pytest.raises(NotEnoughData, match="no frame"):
         recording_scene(*arguments, unknown, recording(), simulated=True)

@@ -94,6 +94,8 @@ def recording_scene(
     place = motion.place(chain)
     distance = np.linalg.norm(place - learned.centers_[chosen], axis=1)
     near = int(np.argmin(np.where(known & np.isfinite(distance), distance, np.inf)))
+    if not known[near]:  # the hand was never in sight
+        near = int(np.argmax(known))
     q = posture_at_point(skeleton, learned, chain, chosen, start=motion.q[near])
     swivel = Swivel.at(skeleton, learned, chain, chosen, q)
 
