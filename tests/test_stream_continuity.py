@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from random import Random
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from ikns.errors import InvalidInput
 from ikns.stream import Continuity, Frame
+from ikns.stream.lsl_numbers import Numbers
 
 PERIOD = 0.01
 
@@ -105,3 +107,27 @@ def test_at_no_pace_nothing_is_late() -> None:
 def test_a_stream_must_have_a_rate(rate: float) -> None:
     with pytest.raises(InvalidInput, match="rate above 0"):
         Continuity(rate)
+
+
+@given(torn(), st.floats(50, 1000), st.randoms(use_true_random=False))
+def test_stamps_on_the_beat_give_the_numbers(
+    numbers: list[int], rate: float, rng: Random
+) -> None:
+    # Two stamps each off by 12 % of a period are apart by less than 25 % off.
+    stamps = [1e5 + (n + rng.uniform(-0.12, 0.12)) / rate for n in numbers]
+    made = Numbers(rate)
+    assert [made.next(s) for s in stamps] == [n - numbers[0] for n in numbers]
+    assert not made.uneven
+
+
+def test_stamps_off_the_beat_are_counted_until_they_are_on_it_again() -> None:
+    rng = np.random.default_rng(2)
+    made = Numbers(100)
+    at = (np.arange(500) + rng.uniform(0, 0.9, 500)) / 100
+    assert [made.next(s) for s in at] == list(range(500))
+    assert made.uneven
+    steady = 6 + np.arange(200) / 100
+    before = [made.next(s) for s in steady]
+    assert not made.uneven
+    assert made.next(steady[-1] + 0.03) == before[-1] + 3
+    assert made.next(steady[-1] + 5.03) == before[-1] + 503

@@ -1,8 +1,4 @@
-"""An LSL MoCap stream as a live source.
-
-LSL numbers no frames. Numbers are counted from its time stamps: a step of n nominal
-periods, rounded, is n frames; stamps may err by up to half a period.
-"""
+"""An LSL MoCap stream as a live source."""
 
 from __future__ import annotations
 
@@ -17,6 +13,7 @@ from ikns.errors import StreamError
 from ikns.stream.frame import Event, Frame
 from ikns.stream.lsl_layout import Layout, read_layout
 from ikns.stream.lsl_library import lsl
+from ikns.stream.lsl_numbers import Numbers
 
 __all__ = ["LslFeed"]
 
@@ -69,7 +66,8 @@ class LslFeed:
         self._search = opened.search
         self._found = threading.Condition()
         self._closed = False
-        self._number, self._stamp = 0, math.nan
+        self._numbers = Numbers(self.rate)
+        self._told_uneven = False
 
     @property
     def device(self) -> dict[str, float]:
@@ -99,7 +97,7 @@ class LslFeed:
             if opened is not None and sample is not None:
                 received = time.monotonic()
                 markers = opened.layout.markers(sample)
-                return Frame(self._count(stamp), stamp, received, markers)
+                return Frame(self._number(stamp), stamp, received, markers)
             if self._closed or time.monotonic() >= give_up:
                 return None
 
@@ -110,11 +108,12 @@ class LslFeed:
             self._open = None
             self._found.notify_all()
 
-    def _count(self, stamp: float) -> int:
-        if not math.isnan(self._stamp):
-            self._number += round((stamp - self._stamp) * self.rate)
-        self._stamp = stamp
-        return self._number
+    def _number(self, stamp: float) -> int:
+        number = self._numbers.next(stamp)
+        if self._numbers.uneven and not self._told_uneven:
+            self._told_uneven = True
+            self._tell("time stamps are uneven, so lost frames cannot be counted.")
+        return number
 
     def _tell(self, text: str) -> None:
         self.events.append(Event(time.monotonic(), f"{self.name}: {text}"))
