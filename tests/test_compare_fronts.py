@@ -9,11 +9,13 @@ import warnings
 import numpy as np
 import pytest
 import small_person
+from example_robot_data import robots_loader
 
 from ikns.compare import compare_motion, compare_robot, motion_crosstalk
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion import chain_joints
 from ikns.nullspace_map import NullSpaceMap, null_space_samples
+from ikns.simulation import explore_null_space
 from ikns.skeleton import Robot
 from ikns.subspace import null_space
 
@@ -184,6 +186,25 @@ def test_a_robot_that_follows_its_null_space_is_found_inside_it():
         compare_robot(mapped, robot, time, q[:, :2])
     with pytest.raises(NotEnoughData, match="slower than"):
         compare_robot(mapped, robot, time, q * 50, max_hand_speed=1e-6)
+
+
+def test_a_real_arm_that_holds_its_tool_neither_leaks_nor_turns():
+    loader = robots_loader.PandaLoader()
+    robot = Robot.load(loader.df_path, "panda_hand_tcp")
+    start = np.array(loader.robot.q0)[: len(robot.joint_names)]
+    time, q = explore_null_space(robot, start, seconds=4, seed=1)
+    mapped = NullSpaceMap(1).fit(robot.pose(q)[0], q)
+    pose, position = (
+        compare_robot(mapped, robot, time, q, task=task, resamples=50)
+        for task in ("pose", "position")
+    )
+    assert (pose.null_dim, position.null_dim) == (1, 4)
+    # The tool is put back to 1e-10 at every sample, while c goes from 0 to 1.
+    assert pose.leak[0, 0] < 1e-8
+    assert pose.turn[0, 0] < 1e-8
+    # A straight line stays within the angle that the curve turns by.
+    assert pose.angles[0, 0] < pose.curvature[0]
+    assert position.mean_posture_angles[0, 0] <= pose.mean_posture_angles[0, 0]
 
 
 def test_a_robot_frame_that_no_joint_moves_is_told():
