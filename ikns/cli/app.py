@@ -14,6 +14,8 @@ from ikns.cli.compare import compare
 from ikns.cli.control import control
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
+from ikns.cli.replay import replay
+from ikns.cli.run import run
 from ikns.cli.scale import scale
 from ikns.cli.servo import servo
 from ikns.cli.stream import stream
@@ -37,6 +39,8 @@ for command in (
     compare,
     ucm,
     view,
+    run,
+    replay,
     stream,
     servo,
 ):

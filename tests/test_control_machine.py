@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikns.control.safety import Safety
+from ikns.control.machine import SafetyMachine
 from ikns.control.smoothing import OneEuro
 from ikns.errors import InvalidInput
 
@@ -29,7 +29,7 @@ WAYS = {
 
 
 def started(**times):
-    machine = Safety(**times)
+    machine = SafetyMachine(**times)
     machine.arm(0.0)
     machine.pose(0.0)
     machine.activate(0.0)
@@ -50,7 +50,7 @@ def call(machine, name, now):
     )
 )
 def test_only_the_ways_of_the_plan_are_taken(calls):
-    machine, now, last_pose = Safety(), 0.0, -math.inf
+    machine, now, last_pose = SafetyMachine(), 0.0, -math.inf
     for name, after in calls:
         now += after  # sometimes backwards
         before = machine.state
@@ -107,7 +107,7 @@ def test_a_late_pose_within_the_safe_time_is_told_as_it_was():
 
 
 def test_it_does_not_start_without_poses():
-    machine = Safety()
+    machine = SafetyMachine()
     machine.arm(0.0)
     assert machine.activate(0.0) == ()
     machine.pose(0.0)
@@ -135,7 +135,7 @@ def test_a_time_that_is_no_number_is_not_believed():
 @pytest.mark.parametrize("times", [(0.0, 1.0), (0.2, 0.1), (0.1, math.inf)])
 def test_times_that_make_no_sense_are_refused(times):
     with pytest.raises(InvalidInput, match="0 s < hold_after"):
-        Safety(hold_after=times[0], safe_after=times[1])
+        SafetyMachine(hold_after=times[0], safe_after=times[1])
 
 
 # --- smoothing -----------------------------------------------------------------------

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Changes", "Safety", "State", "Transition"]
+__all__ = ["Changes", "SafetyMachine", "State", "Transition"]
 
 State = Literal["disarmed", "armed", "active", "holding", "safe"]
 
@@ -43,7 +43,7 @@ class Transition(NamedTuple):
 Changes = tuple[Transition, ...]
 
 
-class Safety:
+class SafetyMachine:
     """The state machine. It has no clock: every call says what time it is.
 
     Every call returns the changes of state that it made, for the log.

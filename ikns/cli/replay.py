@@ -1,0 +1,56 @@
+"""``ikns replay``: a recorded session computed again, checked, or exported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ikns.cli.options import AsJson, Force
+from ikns.cli.output import notes, show, table
+
+__all__ = ["replay"]
+
+
+def replay(
+    session: Annotated[Path, typer.Argument(help="Folder that `ikns run` wrote.")],
+    run: Annotated[
+        int | None, typer.Option(help="Number of the run; the last by default.")
+    ] = None,
+    export: Annotated[
+        Path | None, typer.Option(help="Also write the run as .csv, .mat or .c3d.")
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Compute c and the commands of a session again, and compare them bit for bit."""
+    from ikns.runtime import replay_run
+    from ikns.session import check_session, export_run, read_run
+
+    recorded = read_run(session, run)
+    found = check_session(session)
+    again = replay_run(recorded)
+    if export is not None:
+        export_run(recorded, export, force=force)
+    show(
+        {
+            "session": session,
+            "run": recorded.number,
+            "frames": len(recorded.frame),
+            "same": again.same,
+            "different": again.different,
+            "findings": found,
+            "export": export,
+        },
+        table(
+            f"{session}, run {recorded.number}: {len(recorded.frame)} frames",
+            {"column": "s", "frames that differ\nin any bit": "d"},
+            [[name, count] for name, count in again.different.items()],
+        ),
+        *notes(found),
+        *([f"Wrote {export}"] if export else []),
+        as_json=as_json,
+    )
+    if not again.same:
+        raise typer.Exit(1)

@@ -1,0 +1,254 @@
+"""``ikns run``: from live markers to a finger, with everything written down."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+import ikns
+from ikns.cli.options import AsJson, SubjectFolder
+from ikns.cli.output import show, table
+from ikns.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from ikns.runtime import Report, Status
+    from ikns.session import RunWriter
+
+__all__ = ["run"]
+
+
+def run(
+    subject: SubjectFolder,
+    source: Annotated[
+        str, typer.Option(help="replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST.")
+    ],
+    finger: Annotated[
+        str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
+    ] = "sim:",
+    session: Annotated[
+        Path | None, typer.Option(help="Folder to write everything into.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Add a run to a session that exists.")
+    ] = False,
+    participant: Annotated[
+        str, typer.Option(help="Pseudonym: letters and digits.")
+    ] = "01",
+    duration: Annotated[
+        float | None, typer.Option(help="Seconds; until Ctrl-C without it.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Do everything but move the finger.")
+    ] = False,
+    safe_state: Annotated[
+        Literal["limp", "hold", "open"],
+        typer.Option(
+            help="What the finger does when poses fail to come: letting go of a held "
+            "object may itself be the hazard."
+        ),
+    ] = "limp",
+    hold_speed: Annotated[
+        float | None,
+        typer.Option(help="Hold the finger while the hand is faster, m/s."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
+
+    Research software, not a medical device.
+    """
+    from ikns.control.controller import Settings
+    from ikns.finger import Safety, open_finger
+    from ikns.runtime import run as drive
+    from ikns.stream import open_source
+
+    if duration is not None and not 0 < duration < math.inf:
+        raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
+    if resume and session is None:
+        raise InvalidInput("--resume needs the --session to go on with.")
+    settings = Settings(hold_speed=hold_speed)
+    calibrated = ikns.Subject.load(subject)
+    device = open_finger(finger, safety=Safety(safe_state=safe_state))
+    with ExitStack() as stack:
+        stream = stack.enter_context(
+            open_source(source, needs=calibrated.skeleton.marker_set)
+        )
+        ikns.warm_up()
+        writer = None
+        if session is not None:
+            configuration = {
+                "ikns": ikns.__version__,
+                "python": sys.version.split()[0],
+                "source": source,
+                "source_labels": list(stream.labels),
+                "finger": None if dry_run else finger,
+                "safe_state": safe_state,
+                "settings": dataclasses.asdict(settings),
+            }
+            writer = stack.enter_context(
+                _session(
+                    session,
+                    calibrated,
+                    subject,
+                    configuration,
+                    rate=stream.rate,
+                    participant=participant,
+                    resume=resume,
+                )
+            )
+        stop = stack.enter_context(_stopped_by_signals())
+        line = stack.enter_context(_status_line())
+        report = drive(
+            stream,
+            calibrated,
+            None if dry_run else device,
+            settings=settings,
+            session=writer,
+            duration=math.inf if duration is None else duration,
+            stop=stop,
+            on_status=line,
+        )
+    result = _result(report) | {"session": session}
+    show(
+        result,
+        table(
+            f"{source} to {'nothing (dry run)' if dry_run else finger}",
+            {"quantity": "s", "value": "s"},
+            _rows(report),
+        ),
+        *(
+            f"{c.time:9.3f} s  {c.before} to {c.after}: {c.reason}"
+            for c in report.transitions[-12:]
+        ),
+        *([f"Wrote {session}"] if session else []),
+        as_json=as_json,
+    )
+
+
+@contextmanager
+def _session(
+    folder: Path,
+    calibrated: ikns.Subject,
+    subject: Path,
+    configuration: dict[str, Any],
+    *,
+    rate: float,
+    participant: str,
+    resume: bool,
+) -> Iterator[RunWriter]:
+    from ikns.session import create_session, mend_session, open_run
+    from ikns.subject import FILES
+
+    if resume:
+        for sentence in mend_session(folder):
+            _say(sentence)
+    else:
+        create_session(folder, participant=participant)
+    with open_run(
+        folder,
+        labels=calibrated.skeleton.marker_set.labels,
+        joint_names=calibrated.skeleton.joint_names,
+        rate=rate,
+        n_dof=calibrated.null_space_map.n_dof,
+        configuration=configuration,
+        subject={name: (subject / name).read_text("utf-8") for name in FILES},
+        on_fault=_say,
+    ) as writer:
+        yield writer
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[threading.Event]:
+    """Make Ctrl-C and SIGTERM set an event; a second Ctrl-C interrupts."""
+    stop = threading.Event()
+
+    def ask(number: int, _: object) -> None:
+        if stop.is_set() and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        stop.set()
+
+    before = {n: signal.signal(n, ask) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _status_line() -> Iterator[Any]:
+    """Write one line over and over, while stderr is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+
+    def write(status: Status) -> None:
+        sys.stderr.write(f"\r\x1b[K{_line(status)}")
+        sys.stderr.flush()
+
+    yield write
+    sys.stderr.write("\n")
+
+
+def _say(sentence: str) -> None:
+    sys.stderr.write(f"\nikns: {sentence}\n")
+
+
+def _line(s: Status) -> str:
+    place = "inside" if s.inside else "OUTSIDE"
+    return (
+        f"{s.state:<9} {s.rate:5.0f}/s  p99 {1e3 * s.latency:5.2f} ms  "
+        f"residual {1e3 * s.residual:4.1f} mm  {place:<7}  c {s.c:5.2f}  "
+        f"flexion {s.flexion:4.2f} ({s.measured:4.2f})  misses {s.misses}"
+    )
+
+
+def _result(report: Report) -> dict[str, Any]:
+    return {
+        "frames": report.frames,
+        "seconds": report.seconds,
+        "deadline_misses": report.misses,
+        "latency_s": {
+            name: {
+                "p50": times.percentile(50),
+                "p99": times.percentile(99),
+                "p999": times.percentile(99.9),
+                "worst": times.percentile(100),
+            }
+            for name, times in report.stages.items()
+        },
+        "source": report.source,
+        "transitions": [change._asdict() for change in report.transitions],
+        "lost_rows": report.lost_rows,
+    }
+
+
+def _rows(report: Report) -> list[list[str]]:
+    total = report.stages["total"]
+    counted = report.source
+    return [
+        ["frames", str(report.frames)],
+        ["seconds", f"{report.seconds:.1f}"],
+        [
+            "dropped, late, repeated, out of order",
+            ", ".join(
+                str(counted[name])
+                for name in ("dropped", "late", "repeated", "out_of_order")
+            ),
+        ],
+        [
+            "receipt to command, p50 / p99 / worst ms",
+            " / ".join(f"{1e3 * total.percentile(p):.2f}" for p in (50, 99, 100)),
+        ],
+        ["frames that took longer than a frame", str(report.misses)],
+        ["rows that could not be written", str(report.lost_rows)],
+    ]

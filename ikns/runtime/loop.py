@@ -1,0 +1,381 @@
+"""The live loop: a frame comes, a pose is found, a finger is told, a row is written.
+
+One thread, no waiting but for the next frame. The finger hears from it at least every
+20 ms, frame or no frame, so a loop that hangs is noticed by the finger itself.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.control.controller import Controller, Decision, Settings
+from ikns.control.frame import FrameSolver
+from ikns.control.machine import Changes, Transition
+from ikns.errors import MarkerMismatch
+from ikns.finger import Finger
+from ikns.session import RunWriter, micro
+from ikns.session.channels import STATES
+from ikns.stream import Frame, Source
+from ikns.stream.delays import Delays
+from ikns.subject import Subject
+
+__all__ = ["Report", "Status", "run"]
+
+#: The finger and the watchdog are looked after this often while no frame comes, s.
+_BEAT = 0.02
+#: What is sent when nothing may be: the finger stays where it is.
+_NOTHING = math.nan
+
+
+@dataclass(frozen=True)
+class Status:
+    """How it goes, for a line on a screen.
+
+    Parameters
+    ----------
+    time : float
+        Since the start, s.
+    rate : float
+        Frames per second over the last second or so.
+    frames, misses : int
+        So far; frames that took longer than a frame's time.
+    latency : float
+        99th percentile from receipt to command, s.
+    residual : float
+        Of the last pose, m.
+    inside : bool
+        Whether the hand is within the points of the map.
+    c, flexion, measured : float
+        Raw signal, what is asked, what the finger measured.
+    state : str
+    """
+
+    time: float
+    rate: float
+    frames: int
+    misses: int
+    latency: float
+    residual: float
+    inside: bool
+    c: float
+    flexion: float
+    measured: float
+    state: str
+
+
+@dataclass
+class Report:
+    """What happened, all told.
+
+    Parameters
+    ----------
+    frames, misses : int
+        Frames taken; those that took longer than a frame's time from receipt to
+        command.
+    seconds : float
+    stages : dict of Delays
+        ``solve`` (markers to decision), ``command`` (telling the finger), ``total``
+        (receipt to command), ``loop`` (all of an iteration, logging included).
+    transitions : list of Transition
+        From the start on; the last thousand.
+    source : dict
+        What was dropped, late, repeated or out of order.
+    fault : str
+        Why it ended, where it was not asked to.
+    lost_rows : int
+        Rows of the session that could not be written.
+    """
+
+    frames: int = 0
+    misses: int = 0
+    seconds: float = 0.0
+    stages: dict[str, Delays] = field(
+        default_factory=lambda: {
+            name: Delays() for name in ("solve", "command", "total", "loop")
+        }
+    )
+    transitions: list[Transition] = field(default_factory=list)
+    source: dict[str, Any] = field(default_factory=dict)
+    fault: str = ""
+    lost_rows: int = 0
+
+
+def run(
+    source: Source,
+    subject: Subject,
+    finger: Finger | None = None,
+    *,
+    settings: Settings | None = None,
+    session: RunWriter | None = None,
+    duration: float = math.inf,
+    stop: threading.Event | None = None,
+    on_status: Callable[[Status], None] | None = None,
+    status_every: float = 0.2,
+) -> Report:
+    """Drive a finger with a person's null space until the source ends.
+
+    Parameters
+    ----------
+    source : Source
+        Open, with the markers of the subject's set among its labels.
+    subject : Subject
+        Calibrated.
+    finger : Finger, optional
+        Not connected yet; without one everything runs but nothing moves.
+    settings : Settings, optional
+        Smoothing, dead band, watchdog.
+    session : RunWriter, optional
+        From :func:`ikns.session.open_run` with the labels of the subject's marker set;
+        gets a row a frame and is left open.
+    duration : float
+        Stop after this long, s.
+    stop : threading.Event, optional
+        Set it to stop: the finger is relaxed.
+    on_status : callable, optional
+        Called with a :class:`Status` from the loop, so it must not wait.
+    status_every : float
+        How often, s.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    MarkerMismatch
+        When the source lacks markers that the subject wears.
+    FingerError
+        When the finger cannot be connected.
+    """
+    marker_set = subject.skeleton.marker_set
+    missing = [label for label in marker_set.labels if label not in source.labels]
+    if len(missing) == len(marker_set.labels):
+        raise MarkerMismatch(
+            f"{source.name}: expected markers of the subject such as "
+            f"{', '.join(missing[:6])}, found {', '.join(source.labels[:6])}."
+        )
+    columns = marker_set.columns(source.labels)
+    solver = FrameSolver(subject.skeleton, subject.null_space_map, subject.chain)
+    controller = Controller(solver, settings)
+    loop = _Loop(source, controller, finger, session)
+    # What compiles or loads on first use does so before anybody waits.
+    solver.solve(np.full((len(marker_set.labels), 3), np.nan))
+    solver.reset()
+    stopped = threading.Event() if stop is None else stop
+    with _hands_on(finger), _no_collector():
+        loop.begin()
+        try:
+            while not (stopped.is_set() or source.ended or loop.elapsed() >= duration):
+                frame = source.read(_BEAT)
+                if frame is None:
+                    loop.beat()
+                else:
+                    loop.take(frame, columns)
+                if on_status and loop.due(status_every):
+                    on_status(loop.status())
+        finally:
+            loop.end("asked to stop" if stopped.is_set() else "the end")
+    return loop.report
+
+
+class _Loop:
+    """State of one run."""
+
+    def __init__(
+        self,
+        source: Source,
+        controller: Controller,
+        finger: Finger | None,
+        session: RunWriter | None,
+    ) -> None:
+        self._source, self._controller = source, controller
+        self._finger, self._session = finger, session
+        self._period = 1 / source.rate if source.speed else math.inf
+        self._names = len(controller.solver.skeleton.joint_names)
+        self._measured = math.nan
+        self._first = math.nan
+        self._last: Decision | None = None
+        self._shown, self._shown_frames, self._rate = 0.0, 0, math.nan
+        self.report = Report()
+
+    def begin(self) -> None:
+        """Arm."""
+        self._start = time.monotonic()
+        self._tell(self._controller.machine.arm(0.0))
+
+    def elapsed(self) -> float:
+        """Since the start, s."""
+        return time.monotonic() - self._start
+
+    def take(self, frame: Frame, columns: NDArray[np.int64]) -> None:
+        """Take one frame all the way to the finger, then write it down."""
+        report, received = self.report, frame.receive_time
+        if math.isnan(self._first):
+            self._first = frame.device_time
+        # As on disk, so that a replay computes with the very numbers.
+        seen = micro(np.where(columns[:, None] < 0, np.nan, frame.markers[columns]))
+        device_time = float(micro(frame.device_time - self._first))
+        receive_time = float(micro(received - self._start))
+        began = time.monotonic()
+        decision = self._controller.frame(seen, device_time, receive_time)
+        decided = time.monotonic()
+        self._tell(decision.changes)
+        if decision.valid and decision.state == "armed":
+            self._tell(self._controller.machine.activate(receive_time, "poses come"))
+        sent = self._command()
+        done = time.monotonic()
+        self._watch_finger(receive_time)
+        report.frames += 1
+        report.misses += done - received > self._period
+        report.stages["solve"].add(decided - began)
+        report.stages["command"].add(done - decided)
+        report.stages["total"].add(done - received)
+        self._last = decision
+        if self._session:
+            self._write(
+                frame.number,
+                device_time,
+                receive_time,
+                seen,
+                decision,
+                sent,
+                (decided - began, done - received),
+            )
+        report.stages["loop"].add(time.monotonic() - began)
+
+    def beat(self) -> None:
+        """No frame came: ask the watchdog, and let the finger hear from us."""
+        now = time.monotonic() - self._start
+        self._tell(self._controller.check(now))
+        self._command()
+        self._watch_finger(now)
+
+    def end(self, reason: str) -> None:
+        """Disarm and sum up."""
+        now = time.monotonic() - self._start
+        self._tell(self._controller.machine.disarm(now, reason))
+        self.report.seconds = now
+        self.report.source = asdict(self._source.continuity.counts)
+        if self._session:
+            self.report.lost_rows = self._session.lost
+
+    def due(self, every: float) -> bool:
+        """Whether it is time to show how it goes."""
+        return self.elapsed() - self._shown >= every
+
+    def status(self) -> Status:
+        """How it goes."""
+        now, report, last = self.elapsed(), self.report, self._last
+        self._rate = (report.frames - self._shown_frames) / max(now - self._shown, 1e-9)
+        self._shown, self._shown_frames = now, report.frames
+        return Status(
+            time=now,
+            rate=self._rate,
+            frames=report.frames,
+            misses=report.misses,
+            latency=report.stages["total"].percentile(99),
+            residual=math.nan if last is None else last.solved.residual,
+            inside=last is not None and last.solved.inside,
+            c=math.nan if last is None else float(last.solved.c[0]),
+            flexion=self._controller.flexion,
+            measured=self._measured,
+            state=self._controller.machine.state,
+        )
+
+    def _command(self) -> float:
+        """Tell the finger, which limits what it does; return what was sent."""
+        if self._finger is None:
+            return math.nan
+        moving = self._controller.machine.state in ("active", "holding")
+        return self._finger.command(self._controller.flexion if moving else _NOTHING)
+
+    def _watch_finger(self, now: float) -> None:
+        if self._finger is None:
+            return
+        state = self._finger.state()
+        self._measured = state.flexion
+        if state.mode == "safe" and self._controller.machine.state != "safe":
+            if self._session:  # asked for, so a replay has to know
+                self._session.row("events", [now, 0.0, "stop", state.alert])
+            self._tell(self._controller.machine.stop(now, f"finger: {state.alert}"))
+
+    def _tell(self, changes: Changes) -> None:
+        for change in changes:
+            self.report.transitions.append(change)
+            del self.report.transitions[:-1000]
+            if change.after == "safe" and self._finger is not None:
+                self._finger.make_safe(change.reason)
+            if self._session:
+                words = f"{change.before} to {change.after}: {change.reason}"
+                onset = max(0.0, change.time)
+                self._session.row("events", [onset, 0.0, change.after, words])
+
+    def _write(
+        self,
+        number: int,
+        device_time: float,
+        receive_time: float,
+        seen: np.ndarray,
+        decision: Decision,
+        sent: float,
+        durations: tuple[float, float],
+    ) -> None:
+        assert self._session is not None
+        solved = decision.solved
+        self._session.row(
+            "markers", [number, device_time, receive_time, *seen.ravel().tolist()]
+        )
+        angles = np.degrees(solved.q[7:]).tolist()
+        self._session.row(
+            "model",
+            [
+                *solved.q[:7].tolist(),
+                *angles,
+                *solved.hand_in_thorax.tolist(),
+                *solved.c.tolist(),
+                decision.flexion,
+                sent,
+                self._measured,
+                solved.residual,
+                float(solved.inside),
+                float(STATES.index(decision.state)),
+                *durations,
+            ],
+        )
+
+
+@contextmanager
+def _hands_on(finger: Finger | None) -> Iterator[None]:
+    if finger is None:
+        yield
+        return
+    with finger:
+        yield
+
+
+@contextmanager
+def _no_collector() -> Iterator[None]:
+    """Keep Python's collector of cycles, which may take milliseconds, out of the loop.
+
+    The loop makes no cycles, so nothing piles up meanwhile.
+    """
+    was_on = gc.isenabled()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        if was_on:
+            gc.enable()

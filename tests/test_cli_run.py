@@ -1,0 +1,128 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from command_line import check_refused, contents
+
+from ikns.cli import main
+
+
+PROGRAM = "import sys; from ikns.cli import main; sys.exit(main(sys.argv[1:]))"
+
+
+def run_argv(files, *more):
+    return [
+        "run",
+        "--subject",
+        str(files / "person"),
+        "--source",
+        f"replay:{files / 'free.c3d'}?speed=max",
+        *more,
+    ]
+
+
+def test_a_run_is_written_and_replays_bit_for_bit(files, tmp_path, capsys):
+    session = tmp_path / "session"
+    assert main(run_argv(files, "--session", str(session), "--json")) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["frames"] == 50
+    assert result["source"]["dropped"] == 0
+    assert result["transitions"][-1]["after"] == "disarmed"
+    out = tmp_path / "run.csv"
+    assert main(["replay", str(session), "--export", str(out), "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["same"]
+    assert again["findings"] == []
+    assert out.read_text().count("\n") == 51
+
+
+def test_a_session_is_resumed_with_a_new_run(files, tmp_path, capsys):
+    session = tmp_path / "session"
+    assert main(run_argv(files, "--session", str(session), "--dry-run")) == 0
+    before = contents(session)
+    again = run_argv(files, "--session", str(session), "--resume", "--dry-run")
+    assert main(again) == 0
+    after = contents(session)
+    assert all(after[name] == data for name, data in before.items())
+    capsys.readouterr()
+    assert main(["replay", str(session), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["run"] == 2
+
+
+def test_a_table_for_people(files, capsys):
+    assert main(run_argv(files, "--dry-run")) == 0
+    out, _ = capsys.readouterr()
+    assert "receipt to command" in out
+    assert "disarmed to armed" in out
+
+
+def test_a_replay_that_differs_says_so(files, tmp_path, capsys):
+    session = tmp_path / "session"
+    assert main(run_argv(files, "--session", str(session), "--dry-run")) == 0
+    (path,) = session.rglob("*tracksys-markers*motion.tsv")
+    rows = [line.split("\t") for line in path.read_text().splitlines()]
+    for row in rows[10:]:
+        row[3:] = [
+            v if v == "n/a" else f"{float(v) + 0.01 * (i % 2):.6f}"
+            for i, v in enumerate(row[3:])
+        ]
+    path.write_text("".join("\t".join(row) + "\n" for row in rows))
+    capsys.readouterr()
+    assert main(["replay", str(session), "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["different"]["c"] > 0
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (["--source", "gopher:x"], "unknown source 'gopher:x'"),
+        (["--finger", "gpio:7"], "unknown finger 'gpio:7'"),
+        (["--finger", "dynamixel:/dev/none"], "no such port"),
+        (["--duration", "0"], "expected a duration above 0 s"),
+        (["--resume"], "--resume needs the --session"),
+        (["--hold-speed", "-1"], "positive hold_speed"),
+        (["--session", "{tmp}/s", "--participant", "Jane Doe"], "letters and digits"),
+        (["--session", "{tmp}"], "exists already; use --resume"),
+        (["--session", "{tmp}/none", "--resume"], "that `ikns run` recorded"),
+        (["--subject", "{tmp}/nobody"], "expected a folder"),
+    ],
+)
+def test_bad_input_is_one_sentence(files, tmp_path, capfd, more, says):
+    (tmp_path / "kept.txt").write_text("kept")
+    given = [word.replace("{tmp}", str(tmp_path)) for word in more]
+    assert says in check_refused(run_argv(files, *given), tmp_path, capfd)
+
+
+def test_a_source_without_the_labels_is_refused(files, data, tmp_path, capfd):
+    argv = run_argv(files, "--source", f"replay:{data}/box_lift/markers_analogs.c3d")
+    assert "expected markers" in check_refused(argv, tmp_path, capfd)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_run_in_order(files, tmp_path, number):
+    session = tmp_path / "session"
+    argv = run_argv(files, "--session", str(session), "--json")
+    argv[argv.index("--source") + 1] = f"replay:{files / 'free.c3d'}?loop=yes"
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, *argv],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+    ) as process:
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline and process.poll() is None:
+            rows = list(session.rglob("*tracksys-model*motion.tsv"))
+            if rows and rows[0].stat().st_size > 2000:
+                break
+            time.sleep(0.05)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    result = json.loads(out)
+    assert result["transitions"][-1]["reason"] == "asked to stop"
+    assert main(["replay", str(session)]) == 0
