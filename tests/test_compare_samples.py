@@ -102,6 +102,7 @@ def test_two_directions_against_one_null_vector():
     # The null vector lies in the plane of both directions; the hand follows the first.
     np.testing.assert_allclose(found.angles, 0, atol=1e-7)
     np.testing.assert_allclose(found.leak, [[0.05, 0]] * 2, atol=1e-9)
+    assert found.pooled["leak"][0] == pytest.approx(0.05 / np.sqrt(2))
 
 
 def test_intervals_hold_the_planted_values_and_shrink_with_time():

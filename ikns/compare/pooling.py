@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 def pool(
     points: Sequence[PointFindings], *, level: float, rng: np.random.Generator
 ) -> dict[str, tuple[float, float, float]]:
-    """Root mean squares over points, and shares of all variance, with intervals.
+    """Root mean squares over points (and signals), and shares of all variance.
 
     Parameters
     ----------
@@ -37,10 +37,11 @@ def pool(
         square. NaN ends where there is no interval.
     """
     parts = [point.parts for point in points]
-    root = np.sqrt(len(parts))
     blocks = float(np.mean([part.blocks for part in parts]))
     found: dict[str, tuple[float, float, float]] = {}
+    dof = len(points[0].leak)
     for name in ("angle", "mean_posture_angle", "leak", "turn"):
+        root = np.sqrt(len(parts) * (dof if name in ("leak", "turn") else 1))
         vector = np.concatenate([getattr(part, name)[0] for part in parts]) / root
         rows = np.hstack([getattr(part, name)[1] for part in parts]) / root
         ends = length_interval(vector, rows, blocks, level=level, rng=rng)

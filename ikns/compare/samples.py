@@ -46,7 +46,7 @@ class NullSpaceComparison:
     """What :func:`compare_samples` found: one entry a PCA point, NaN where unknown.
 
     Intervals are (low, high) in the last axis. `pooled` are root mean squares over the
-    points, except for the variance shares, which are those of all samples about their
+    points (and, of leaks and turns, over the d signals), except for the variance shares, which are those of all samples about their
     points' means.
 
     Parameters
