@@ -1,0 +1,1 @@
+"""Reaches to measure a control signal on: simulated ones, and those of real people."""

@@ -1,0 +1,250 @@
+"""What a virtual subject does after the calibration: natural reaches, and tracking.
+
+The person knows a swivel of the elbow for every c: from one end of the self-motion that
+they explored to the other. What they mean is therefore known without any map, and the
+postures come from the Jacobian's self-motion alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ikns.calibration import calibrate, track_chain
+from ikns.errors import InvalidInput
+from ikns.motion import Motion
+from ikns.simulation import (
+    Protocol,
+    Unsteadiness,
+    simulate_protocol,
+    virtual_subject,
+)
+from ikns.simulation.arm import Arm, girdle, self_motion
+from ikns.simulation.movement import (
+    Plan,
+    carry_out,
+    join,
+    reach,
+    reach_samples,
+)
+from ikns.simulation.places import GIRDLE_FOLLOW, Place, comfortable_posture
+from ikns.simulation.trial import Trial, film, place_in_room
+from ikns.simulation.wander import minimum_jerk
+from ikns.skeleton import Skeleton
+from ikns.subject import Subject
+
+RATE = 50.0
+CHAIN = "right_arm"
+#: Least room for the elbow at a place, rad: that of the simulated protocol.
+_LEAST = np.radians(40.0)
+
+
+@dataclass(frozen=True)
+class Session:
+    """What the cameras and the calibrated body made of one exercise.
+
+    Parameters
+    ----------
+    motion : Motion
+        Measured.
+    meant : (T,) array
+        What the person meant c to be.
+    held : (T,) boolean array
+        Whether the hand was held.
+    swivel : (T,) array
+        True elbow swivel, rad.
+    """
+
+    motion: Motion
+    meant: np.ndarray
+    held: np.ndarray
+    swivel: np.ndarray
+
+
+@dataclass(frozen=True)
+class Person:
+    """A calibrated virtual subject and its exercises.
+
+    Parameters
+    ----------
+    subject : Subject
+        As calibrated, with the motion of the calibration.
+    natural, raised, tracking : Session
+        Reaches in comfortable postures; reaches with c meant to stay at 0.8; c meant to
+        follow a curve while holding and while reaching.
+    room : float
+        Elbow swivel from c = 0 to c = 1, on average, rad.
+    """
+
+    subject: Subject
+    natural: Session
+    raised: Session
+    tracking: Session
+    room: float
+
+
+def simulate(seed: int, *, quick: bool) -> Person:
+    """Calibrate a virtual subject and let it reach and track."""
+    person = virtual_subject(seed)
+    run = simulate_protocol(person, seed=seed, free_seconds=0.1, rate=RATE, quick=quick)
+    adult = person.adult
+    subject = calibrate(
+        run.static.recording,
+        [run.points.recording],
+        generic=Skeleton.from_anthropometry(adult.stature_m, adult.mass_kg, adult.sex),
+        chain=CHAIN,
+    )
+    rng = np.random.default_rng([seed, 4])
+    arm = Arm(person.skeleton, "right")
+    places = _places(run, arm, 5 if quick else 12, rng)
+    n = 4 if quick else 17
+    order = [places[i] for i in _wandering(len(places), n, rng)]
+    comfortable = [
+        (p.swivel - p.motion.swivel[0]) / np.ptp(p.motion.swivel) for p in order
+    ]
+
+    def constant(values: list[float]) -> tuple[Plan, np.ndarray]:
+        return _go(order, values, hold=1.3)
+
+    seconds = 12.0 if quick else 120.0
+    curve = _curve(seconds, rng)
+    stay = 3.0
+    visits = [places[i] for i in _wandering(len(places), int(seconds / stay), rng)]
+    exercises = {
+        "natural": constant(comfortable),
+        "raised": constant([0.8] * n),
+        "tracking": _go(visits, curve, hold=stay),
+    }
+    return Person(
+        subject=subject,
+        room=float(np.mean([np.ptp(p.motion.swivel) for p in places])),
+        **{
+            name: _carried_out(run, arm, subject, plan, meant, rng)
+            for name, (plan, meant) in exercises.items()
+        },
+    )
+
+
+def _places(run: Protocol, arm: Arm, n: int, rng: np.random.Generator) -> list[Place]:
+    """Find new places within the box, held as this person held the points."""
+    truth, point = run.points.truth, run.points.point
+    rows = [np.flatnonzero(point == k) for k in range(len(run.places))]
+    first = np.array([r[0] for r in rows])  # at rest, in the comfortable posture
+    sitting = truth.angles[first].mean(axis=0)
+    postures = truth.angles[first][:, arm.columns]
+    rest = np.mean(
+        [p[:2] - girdle(p, np.zeros(2), follow=GIRDLE_FOLLOW) for p in postures], axis=0
+    )
+    habit, wrist = run.points.swivel[first].mean(), postures[:, 6:].mean(axis=0)
+    half = np.mean([np.ptp(run.points.swivel[r]) for r in rows]) / 2
+    places: list[Place] = []
+    while len(places) < n:
+        position = rng.uniform(run.places.min(axis=0), run.places.max(axis=0))
+        swivel = habit + rng.normal(0.0, np.radians(3.0))
+        turned = wrist + rng.normal(0.0, np.radians([8.0, 4.0, 3.0]))
+        try:
+            posture = comfortable_posture(
+                arm, sitting, position, swivel=swivel, wrist=turned, girdle_rest=rest
+            )
+            body = arm.put(sitting, posture)
+            motion = self_motion(arm, body, lowest=swivel - half, highest=swivel + half)
+        except InvalidInput:  # out of reach
+            continue
+        if np.ptp(motion.swivel) >= _LEAST:
+            places.append(Place(posture, *arm.hand(body), arm.swivel(body), motion))
+    return places
+
+
+def _wandering(n: int, steps: int, rng: np.random.Generator) -> list[int]:
+    """Numbers below `n`, none twice in a row."""
+    ways = np.r_[rng.integers(n), rng.integers(1, n, steps - 1)]
+    return [int(i) for i in np.cumsum(ways) % n]
+
+
+def _curve(seconds: float, rng: np.random.Generator) -> np.ndarray:
+    """Pseudo-random curve in 0.05 to 0.95: four sines of 0.05 to 0.25 Hz."""
+    time = np.arange(2 * round(seconds * RATE)) / RATE
+    hertz, phase = rng.uniform(0.05, 0.25, 4), rng.uniform(0, 2 * np.pi, 4)
+    wave = np.sin(2 * np.pi * np.outer(time, hertz) + phase).sum(axis=1)
+    return 0.05 + 0.9 * (wave - wave.min()) / np.ptp(wave)
+
+
+def _at(place: Place, c: np.ndarray) -> np.ndarray:
+    """Postures that mean these c, (..., 9)."""
+    low, high = place.motion.swivel[[0, -1]]
+    return place.motion.at(low + np.asarray(c) * (high - low))
+
+
+def _go(
+    places: list[Place], meant: np.ndarray | list[float], *, hold: float
+) -> tuple[Plan, np.ndarray]:
+    """Visit places one after the other and mean c there: one value each, or a curve."""
+    curve = meant if isinstance(meant, np.ndarray) else None
+    parts, told, done = [], [], 0
+    for i, place in enumerate(places):
+        for n in ([reach_samples(places[i - 1], place, rate=RATE)] if i else []) + [
+            round(hold * RATE)
+        ]:
+            reaching = bool(i) and len(parts) % 2 == 1
+            share = minimum_jerk(n) if reaching else np.ones(n)
+            before = places[i - 1] if reaching else place
+            if curve is not None:
+                start = end = c = curve[done : done + n]
+            else:
+                start, end = meant[i - 1] if reaching else meant[i], meant[i]
+                c = start + share * (end - start)
+            way = reach(before, place, n=n)
+            still = ~np.full(n, reaching)
+            parts.append(
+                Plan(
+                    (1 - share[:, None]) * _at(before, start)
+                    + share[:, None] * _at(place, end),
+                    way.position if reaching else np.tile(place.position, (n, 1)),
+                    way.rotation if reaching else np.tile(place.rotation, (n, 1, 1)),
+                    np.where(still, i, -1),
+                )
+            )
+            told.append(np.broadcast_to(c, n))
+            done += n
+    return join(parts), np.concatenate(told)
+
+
+def _carried_out(
+    run: Protocol,
+    arm: Arm,
+    subject: Subject,
+    plan: Plan,
+    meant: np.ndarray,
+    rng: np.random.Generator,
+) -> Session:
+    n = len(plan.point)
+    sitting = run.points.truth.angles[0]
+    angles = carry_out(
+        arm,
+        np.tile(sitting, (n, 1)),
+        plan,
+        unsteadiness=Unsteadiness(),
+        rate=RATE,
+        rng=rng,
+    )
+    q = place_in_room(
+        angles,
+        height=1.0,
+        heading=0.0,
+        sway=(2e-3, np.radians(0.3)),
+        rate=RATE,
+        rng=rng,
+    )
+    trial: Trial = film(
+        [arm],
+        q,
+        name="reaches",
+        point=plan.point,
+        with_static_only=False,
+        noise=1e-3,
+        skin=None,
+        occluded=0.03,
+        rate=RATE,
+        rng=rng,
+    )
+    motion = track_chain(subject.skeleton, trial.recording, CHAIN)
+    return Session(motion, meant, plan.point >= 0, trial.swivel)
