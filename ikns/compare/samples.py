@@ -45,8 +45,10 @@ class Kinematics:
 class NullSpaceComparison:
     """What :func:`compare_samples` found: one entry a PCA point, NaN where unknown.
 
-    Intervals are (low, high) in the last axis. `pooled` are root mean squares over the
-    points (and, of leaks and turns, over the d signals), except for the variance shares, which are those of all samples about their
+    Intervals are (low, high) in the last axis. They allow for what noise adds to the
+    length of a vector, so those of angles, leaks and turns may end below their value.
+    `pooled` are root mean squares over the points (and, of leaks and turns, over the d
+    signals), except for the variance shares, which are those of all samples about their
     points' means.
 
     Parameters
