@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ikns.errors import FileError, IknsError, InvalidInput, naming
 from ikns.marker_set import MarkerSet
 from ikns.motion import Motion, chain_joints
@@ -122,6 +124,11 @@ class Subject:
                 outside=table["outside"],
             )
             learned.radius_ = float(table["radius_m"])
+            if all("mean_rad" in point for point in points):
+                means = np.array([point["mean_rad"] for point in points], dtype=float)
+                if means.shape != learned.directions_[:, 0].shape:
+                    raise InvalidInput("a mean posture needs one entry a joint.")
+                learned.cluster_means_ = means
             if learned.directions_.shape[2] != len(table["joints"]):
                 raise InvalidInput("a direction needs one entry a joint.")
         except (LookupError, TypeError, ValueError) as error:
@@ -133,6 +140,11 @@ class Subject:
 
     def _map(self) -> dict[str, Any]:
         learned = self.null_space_map
+        # A map that was not fitted knows no postures.
+        known = getattr(learned, "cluster_means_", None)
+        means: list[dict[str, Any]] = [{} for _ in learned.centers_]
+        if known is not None:
+            means = [{"mean_rad": mean.tolist()} for mean in known]
         return {
             "format": FORMAT,
             "chain": self.chain,
@@ -147,12 +159,14 @@ class Subject:
                     "upper_rad": upper.tolist(),
                     "samples": int(count),
                 }
-                for center, directions, lower, upper, count in zip(
+                | mean
+                for center, directions, lower, upper, count, mean in zip(
                     learned.centers_,
                     learned.directions_,
                     learned.lower_,
                     learned.upper_,
                     learned.counts_,
+                    means,
                     strict=True,
                 )
             ],

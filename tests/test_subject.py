@@ -171,3 +171,19 @@ def test_damage_is_told_in_one_sentence_or_is_harmless(
     except IknsError as error:
         fault = str(error)
     assert fault is None or str(tmp_path) in fault
+
+
+def test_a_loaded_subject_knows_its_postures(folder: Path) -> None:
+    loaded = Subject.load(folder).null_space_map
+    fitted = small_person.subject().null_space_map
+    np.testing.assert_array_equal(loaded.cluster_means_, fitted.cluster_means_)
+
+
+def test_a_folder_without_postures_still_opens(folder: Path, tmp_path: Path) -> None:
+    old = tmp_path / "old"
+    shutil.copytree(folder, old)
+    table = json.loads((old / "map.json").read_text())
+    for point in table["points"]:
+        del point["mean_rad"]
+    (old / "map.json").write_text(json.dumps(table))
+    assert not hasattr(Subject.load(old).null_space_map, "cluster_means_")
