@@ -10,9 +10,9 @@ self-motions of the scaled skeleton around the postures of these same recordings
   rest after (0.2 s, a second later, so that what is corrected late counts). Nothing is
   cut off at 0 and 1 for it.
 - tracking: root mean square of c less what is meant while the hand is held for 3 s, is
-  carried elsewhere, and so on; both cut off at 0 and 1. What is meant is a swivel of the
-  elbow within its range at the place. "Fitted": after the best affine map of c to what
-  is meant, one a subject and mode.
+  carried elsewhere, and so on; both cut off at 0 and 1. What is meant is a swivel of
+  the elbow within its range at the place. "Fitted": after the best affine map of c to
+  what is meant, one a subject and mode.
 - offset: root mean square of the error's mean over 10 s, in the trial's last half.
 
 Equal tracking: the 95 % interval of the mean difference of root mean squares, fitted or
@@ -31,74 +31,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from reaches.modes import DEFAULT, MODES, POSITION, SWIVEL, controls, tracks
 from reaches.real import RealArm, real_arms
 from reaches.simulated import CHAIN, RATE, Person, Session, simulate
 
-from ikns.control import RateControl, carried
-from ikns.motion import Motion, chain_joints
-from ikns.nullspace_map import NullSpaceMap
-from ikns.skeleton import Skeleton
+from ikns.control import RateControl
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 REACHED, MARGIN = 5.0, 0.01
-POSITION, SWIVEL = "position mode (paper)", "elbow swivel of the fitted body"
-DEFAULT = "rate, Jacobian, carry, travel"
-#: What differs from the defaults: projector, metric, carry, travel, tau.
-BARE = {"carry": 0.0, "travel": np.inf}
-MODES: dict[str, dict[str, object]] = {
-    "rate, learned, bare": {"learned": True, **BARE},
-    "rate, Jacobian, bare": BARE,
-    "rate, Jacobian, bare, expected motion as metric": {"expected": True, **BARE},
-    "rate, Jacobian, travel": {"carry": 0.0},
-    "rate, Jacobian, carry": {"travel": np.inf},
-    "rate, learned, carry, travel": {"learned": True},
-    DEFAULT: {},
-    "rate, Jacobian, half the carry, travel": {"carry": 0.5},
-    "rate, Jacobian, twice the carry, travel": {"carry": 2.0},
-    "rate, Jacobian, calibrated carry, travel": {"calibrated": True},
-    "rate, Jacobian, carry, tau 5 s": {"travel": np.inf, "tau": 5.0},
-}
 Interval = tuple[float, float, float]
-
-
-def controls(
-    body: Skeleton, learned: NullSpaceMap, chain: str, calm: list[Motion]
-) -> dict[str, Callable[..., RateControl]]:
-    """Rate modes of one person, set with reaches at which nothing was meant."""
-    joints = [motion.chain_velocities(chain) for motion in calm]
-    speeds = [motion.hand_speed(chain) for motion in calm]
-    v = np.concatenate([j[s > 0.05] for j, s in zip(joints, speeds, strict=True)])
-    spread = v.T @ v / len(v)
-    n = len(chain_joints(chain))
-    expected = np.linalg.inv(spread + 1e-3 * np.trace(spread) / n * np.eye(n))
-    made = {}
-    for name, given in MODES.items():
-        settings = dict(given)
-        skeleton = None if settings.pop("learned", False) else body
-        if settings.pop("expected", False):
-            settings["metric"] = expected
-        if settings.pop("calibrated", False):
-            # Of several motions the mean, so that each task counts alike.
-            bare = RateControl(learned, skeleton, chain)
-            settings["carry"] = np.mean([carried(bare, m) for m in calm], axis=0)
-        made[name] = lambda limits, s=skeleton, k=settings: RateControl(
-            learned, s, chain, limits=limits, **k
-        )
-    return made
-
-
-def tracks(control: RateControl, motion: Motion, known: dict) -> np.ndarray:
-    """As `control.track`, but with rates that modes share found once."""
-    metric = None if control.metric is None else control.metric.tobytes()
-    key = id(motion), control.skeleton is None, metric
-    find = control.rate
-    if key in known:
-        found = iter(known[key])
-        control.rate = lambda *sample: next(found)
-    else:
-        known[key] = kept = []
-        control.rate = lambda *sample: kept.append(find(*sample)) or kept[-1]
-    return control.track(motion)
 
 
 def swings(time_s: np.ndarray, c: np.ndarray, ends: list[tuple[int, int]]) -> list:
@@ -114,12 +55,6 @@ def swings(time_s: np.ndarray, c: np.ndarray, ends: list[tuple[int, int]]) -> li
         seen = before.size and after.size
         rows.append(float(after.mean() - before.mean()) if seen else np.nan)
     return rows
-
-
-def reaches_of(session: Session) -> list[tuple[int, int]]:
-    """Last sample of the rest before and first of the rest after each reach."""
-    ends = np.flatnonzero(np.diff((~session.held).astype(int)))
-    return [(int(a), int(b + 1)) for a, b in ends.reshape(-1, 2)]
 
 
 def rms(values: np.ndarray) -> float:
@@ -168,7 +103,7 @@ def of_subject(person: Person) -> dict[str, dict[str, float]]:
             if kind == "tracking":
                 row |= tracked(session, c)
             else:
-                changes = np.abs(swings(motion.time, c, reaches_of(session)))
+                changes = np.abs(swings(motion.time, c, session.reaches()))
                 if name == POSITION:  # where the arm was in sight, for every mode
                     seen[kind] = np.isfinite(changes)
                 row[kind] = float(np.mean(changes[seen[kind]]))
@@ -176,7 +111,7 @@ def of_subject(person: Person) -> dict[str, dict[str, float]]:
     true = swings(
         person.natural.motion.time,
         person.natural.swivel / person.room,
-        reaches_of(person.natural),
+        person.natural.reaches(),
     )
     rows["truth"] = {"natural": float(np.mean(np.abs(true)[seen["natural"]]))}
     calibrated = made["rate, Jacobian, calibrated carry, travel"](None)
@@ -301,7 +236,9 @@ def show(table: dict[str, dict], n_real: int) -> None:
 
 def conclude(table: dict, people: list[dict], arms: list[dict]) -> str:
     """Say in words what the numbers say."""
-    bare, full = table["rate, Jacobian, bare"], table[DEFAULT]
+    bare, full, base = (
+        table[name] for name in ("rate, Jacobian, bare", DEFAULT, POSITION)
+    )
     truth = np.mean([p["truth"]["natural"] for p in people])
     cut, low, high = full["natural cut"]
     verdict = "reached" if cut >= REACHED and full["equal"] else "MISSED"
@@ -311,22 +248,22 @@ def conclude(table: dict, people: list[dict], arms: list[dict]) -> str:
         f"Target, crosstalk cut {REACHED:g} x at equal tracking: {verdict}: "
         f"{cut:.1f} x ({low:.1f} to {high:.1f}) with tracking "
         f"{'equal' if full['equal'] else 'not equal'}: rms "
-        f"{table[POSITION]['tracking']:.3f} grows by {span(full['tracking worse'], 3)}, "
-        f"fitted {table[POSITION]['fitted']:.3f} by {span(full['fitted worse'], 3)}.",
+        f"{base['tracking']:.3f} grows by {span(full['tracking worse'], 3)}, "
+        f"fitted {base['fitted']:.3f} by {span(full['fitted worse'], 3)}.",
         f"Projecting alone cuts it {bare['natural cut'][0]:.1f} x: reaches are not "
         "free of null-space motion. Simulated natural reaches truly change the elbow's "
         f"swivel by {truth:.3f} of its range each, position mode changes c by "
-        f"{table[POSITION]['natural']:.3f}, and a signal that follows all "
+        f"{base['natural']:.3f}, and a signal that follows all "
         "self-motion cannot be much below the first.",
         f"And it drifts: offset {bare['offset']:.3f} against "
-        f"{table[POSITION]['offset']:.3f}; with travel "
+        f"{base['offset']:.3f}; with travel "
         f"{table['rate, Jacobian, travel']['offset']:.3f}.",
         "What cuts crosstalk is taking off what a reach carries along, 1 per m "
         "(these people's calibrations: median "
         f"{np.median([p['carry']['calibrated'] for p in people]):.2f}); the price is "
         f"paid mostly while reaching: error {full['reaching']:.3f} there against "
-        f"{table[POSITION]['reaching']:.3f}, {full['held']:.3f} against "
-        f"{table[POSITION]['held']:.3f} with the hand held.",
+        f"{base['reaching']:.3f}, {full['held']:.3f} against "
+        f"{base['held']:.3f} with the hand held.",
     ]
     if best not in (None, DEFAULT):
         lines.append(
@@ -337,61 +274,15 @@ def conclude(table: dict, people: list[dict], arms: list[dict]) -> str:
         degrees = 70 * np.concatenate([arm[SWIVEL] for arm in arms])
         lines.append(
             f"Real people turn the elbow by {np.mean(degrees):.0f} deg a reach "
-            f"({np.min(degrees):.0f} to {np.max(degrees):.0f}) and mean nothing by it. "
-            "Their map lies around their own posture at each place, which position mode "
-            "gains from: it changes c by "
-            f"{table[POSITION]['real']:.2f}, the swivel says {np.mean(degrees) / 70:.2f}; "
+            f"({np.min(degrees):.0f} to {np.max(degrees):.0f}) and mean nothing by "
+            "it. Their map lies around their own posture at each place, which "
+            f"position mode gains from: it changes c by {base['real']:.2f}, the "
+            f"swivel alone says {np.mean(degrees) / 70:.2f}; "
             f"projecting alone cuts that {bare['real cut'][0]:.1f} x, with "
             f"carry and travel {full['real cut'][0]:.1f} x "
             f"({full['real cut'][1]:.1f} to {full['real cut'][2]:.1f})."
         )
     return "\n".join(lines)
-
-
-def draw(folder: Path, person: Person) -> None:
-    """Draw c over time in both modes: natural reaches, then tracking."""
-    from ikns.view.style import BLUE, GREY, INK, ORANGE, PALE, house_style, new_figure
-
-    subject = person.subject
-    learned = subject.null_space_map
-    made = controls(subject.skeleton, learned, CHAIN, list(subject.motions))
-    with house_style():
-        figure = new_figure(
-            "c in position and in rate mode", simulated=True, height=4.6
-        )
-        for axes, kind, title in zip(
-            figure.subplots(2, 1),
-            ("natural", "tracking"),
-            ("Natural reaches (shaded): c should stay", "Following what is meant"),
-            strict=True,
-        ):
-            session = getattr(person, kind)
-            motion, known = session.motion, session.motion.time <= 30
-            t = motion.time[known]
-            position = learned.control_signal(
-                motion.chain_angles(CHAIN), motion.place(CHAIN)
-            )
-            bare = made["rate, Jacobian, bare"]((0.0, 1.0)).track(motion)
-            full = made[DEFAULT]((0.0, 1.0)).track(motion)
-            for a, b in reaches_of(session):
-                if motion.time[a] <= 30:
-                    axes.axvspan(motion.time[a], motion.time[b], color=PALE, lw=0)
-            if kind == "tracking":
-                axes.plot(t, session.meant[known], color=INK, ls="--", label="meant")
-            lines = ((bare, GREY, "rate, projection alone"),)
-            lines += ((position, ORANGE, "position"), (full, BLUE, "rate"))
-            for c, color, label in lines:
-                axes.plot(t, np.clip(c, 0, 1)[known], color=color, label=label)
-            axes.set(
-                title=title, ylabel="c (no unit)", ylim=(-0.02, 1.02), xlim=(0, 30)
-            )
-        axes.set_xlabel("time (s)")
-        figure.legend(
-            *axes.get_legend_handles_labels(), loc="outside upper right", ncols=4
-        )
-        folder.mkdir(parents=True, exist_ok=True)
-        for kind in ("png", "svg"):
-            figure.savefig(folder / f"rate_mode.{kind}", dpi=150)
 
 
 def main() -> None:
@@ -419,6 +310,8 @@ def main() -> None:
         if seed == 0:
             speed = us_per_step(person)
             if options.figures:
+                from reaches.figure import draw  # matplotlib
+
                 draw(options.figures, person)
         people.append(of_subject(person))
         print(f"subject {seed}: {time.process_time():.0f} s", file=sys.stderr)

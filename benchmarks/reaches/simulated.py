@@ -59,6 +59,11 @@ class Session:
     held: np.ndarray
     swivel: np.ndarray
 
+    def reaches(self) -> list[tuple[int, int]]:
+        """Last sample of the rest before and first of the rest after each reach."""
+        ends = np.flatnonzero(np.diff((~self.held).astype(int)))
+        return [(int(a), int(b + 1)) for a, b in ends.reshape(-1, 2)]
+
 
 @dataclass(frozen=True)
 class Person:
