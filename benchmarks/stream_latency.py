@@ -5,7 +5,8 @@ another over LSL on this machine, as `ikns stream` sends them. Latency runs from
 the call that sends a frame to the moment the reader holds its markers; both processes
 read the same clock. Then a recording is replayed inside one process: jitter is how long
 after its deadline a frame is handed over, and pass-through what handing over costs when
-frames are read as fast as they come.
+frames are read as fast as they come; a million more (not with --quick) show what memory
+does.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import platform
 import sys
 import time
 from multiprocessing.connection import Connection
+from pathlib import Path
 
 import numpy as np
 
@@ -91,6 +93,23 @@ def passed_through(frames: int, seed: int) -> tuple[Row, dict[str, int]]:
     return percentiles(spent), {"dropped": source.continuity.counts.dropped, "late": 0}
 
 
+def growth(frames: int, seed: int) -> list[int]:
+    """Memory after each tenth of the frames against the first, kB."""
+    source = Source(Replay(simulated(1000, 100.0, seed), speed=0, loop=True))
+    marks = []
+    for _ in range(10):
+        for _ in range(frames // 10):
+            source.read()
+        marks.append(resident())
+    return [mark - marks[0] for mark in marks]
+
+
+def resident() -> int:
+    """Memory of this process, kB."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") // 1024
+
+
 def percentiles(seconds: np.ndarray) -> Row:
     """Percentiles in ms."""
     values = 1e3 * np.percentile(seconds, [50, 95, 99, 99.9, 100])
@@ -115,6 +134,8 @@ def main() -> None:
         )
     frames = round(seconds * 10_000)
     rows["replay, as fast as it is read"] = passed_through(frames, options.seed)
+    million = 10_000 if options.quick else 1_000_000
+    memory = growth(million, options.seed)
     machine = {
         "machine": platform.processor() or platform.machine(),
         "cores": os.cpu_count(),
@@ -126,7 +147,8 @@ def main() -> None:
     }
     if options.json:
         named = {key: {**row, **lost} for key, (row, lost) in rows.items()}
-        print(json.dumps({**machine, "milliseconds": named}, indent=2))
+        told = {**machine, "milliseconds": named, "memory_kb": memory}
+        print(json.dumps(told, indent=2))
         return
     print(", ".join(f"{key} {value}" for key, value in machine.items()) + "; simulated")
     print(f"{'ms':<36}" + "".join(f"{h:>9}" for h in next(iter(rows.values()))[0])
@@ -134,6 +156,8 @@ def main() -> None:
     for name, (row, lost) in rows.items():
         cells = "".join(f"{value:>9.3f}" for value in row.values())
         print(f"{name:<36}{cells}{lost['dropped']:>9}{lost['late']:>7}")
+    marks = ", ".join(f"{kb:+d}" for kb in memory)
+    print(f"{million} frames; memory against the first tenth, kB: {marks}")
 
 
 if __name__ == "__main__":

@@ -55,6 +55,20 @@ def test_every_frame_of_a_file_comes_once_and_in_order(tmp_path: Path) -> None:
     assert source.read(0.0) is None
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["stoop/stoop1_t169_f620f800.c3d",
+     "ue_adl/ADL001/ADL001_static.csv"],
+)  # fmt: skip
+def test_real_recordings_replay_whole(data: Path, name: str) -> None:
+    there = read(data / name)
+    with open_source(f"replay:{data / name}?speed=0") as source:
+        frames = list(source)
+    np.testing.assert_array_equal([f.markers for f in frames], there.markers)
+    np.testing.assert_array_equal([f.device_time for f in frames], there.time)
+    assert source.continuity.counts.dropped == 0
+
+
 @given(st.floats(0.1, 10), st.lists(st.floats(0, 0.05), min_size=20, max_size=20))
 def test_deadlines_are_absolute_and_slowness_shows(
     speed: float, busy: list[float]

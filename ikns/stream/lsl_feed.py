@@ -15,7 +15,10 @@ from ikns.stream.lsl_layout import Layout, read_layout
 from ikns.stream.lsl_library import lsl
 from ikns.stream.lsl_numbers import Numbers
 
-__all__ = ["LslFeed"]
+__all__ = ["ANY_MOCAP", "LslFeed"]
+
+#: Query for streams of type MoCap in any case; XPath 1.0 knows no lower-case().
+ANY_MOCAP = "translate(type,'MOCAP','mocap')='mocap'"
 
 #: Seconds that one call into liblsl may take, so that Ctrl-C is heard.
 _SLICE = 0.2
@@ -61,8 +64,9 @@ class LslFeed:
         self._timeout = timeout
         opened = self._connect(self._find(stream))
         self.labels, self.rate = opened.layout.labels, opened.rate
-        self._clock_offset = opened.clock_offset
         self._open: _Open | None = opened
+        self._reading = opened
+        self._first_offset, self._ahead = opened.clock_offset, 0.0
         self._search = opened.search
         self._found = threading.Condition()
         self._closed = False
@@ -72,7 +76,7 @@ class LslFeed:
     @property
     def device(self) -> dict[str, float]:
         """``clock_offset``: seconds to add to device times for `time.monotonic`."""
-        return {"clock_offset": self._clock_offset}
+        return {"clock_offset": self._first_offset}
 
     @property
     def ended(self) -> bool:
@@ -88,18 +92,32 @@ class LslFeed:
                 if self._open is None:
                     self._found.wait(min(left, _SLICE))
                 opened = self._open
-            sample = None
             if opened is not None:
                 try:
                     sample, stamp = opened.inlet.pull_sample(min(left, _SLICE))
-                except self._pylsl.util.LostError:
+                    received = time.monotonic()
+                except RuntimeError:  # LostError, or whatever else liblsl met
                     self._lose()
-            if opened is not None and sample is not None:
-                received = time.monotonic()
-                markers = opened.layout.markers(sample)
-                return Frame(self._number(stamp), stamp, received, markers)
+                    continue
+                if sample is not None:
+                    return self._frame(opened, sample, stamp, received)
             if self._closed or time.monotonic() >= give_up:
                 return None
+
+    def _frame(
+        self, opened: _Open, sample: Any, stamp: float, received: float
+    ) -> Frame:
+        if opened is not self._reading:  # the stream came back since the last frame
+            self._reading = opened
+            self._numbers.bridge()
+            # It may come from another machine; times go on in the first one's clock.
+            self._ahead = opened.clock_offset - self._first_offset
+        device_time = stamp + self._ahead
+        number = self._numbers.next(device_time)
+        if self._numbers.uneven and not self._told_uneven:
+            self._told_uneven = True
+            self._tell("time stamps are uneven, so lost frames cannot be counted.")
+        return Frame(number, device_time, received, opened.layout.markers(sample))
 
     def close(self) -> None:
         """Leave the stream."""
@@ -108,18 +126,11 @@ class LslFeed:
             self._open = None
             self._found.notify_all()
 
-    def _number(self, stamp: float) -> int:
-        number = self._numbers.next(stamp)
-        if self._numbers.uneven and not self._told_uneven:
-            self._told_uneven = True
-            self._tell("time stamps are uneven, so lost frames cannot be counted.")
-        return number
-
     def _tell(self, text: str) -> None:
         self.events.append(Event(time.monotonic(), f"{self.name}: {text}"))
 
     def _find(self, stream: str) -> Any:
-        predicate = "name=" + _quoted(stream) if stream else _TYPE
+        predicate = "name=" + _quoted(stream) if stream else ANY_MOCAP
         found = self._pylsl.resolve_bypred(predicate, 1, self._timeout)
         if found:
             return found[0]
@@ -151,10 +162,10 @@ class LslFeed:
             self._pylsl.cf_double64,
         ):
             raise StreamError(f"{self.name}: expected channels of float32 or double64.")
-        inlet = self._pylsl.StreamInlet(
-            found, max_buflen=_BUFFER, max_chunklen=1, recover=False, as_numpy=True
-        )
         try:
+            inlet = self._pylsl.StreamInlet(
+                found, max_buflen=_BUFFER, max_chunklen=1, recover=False, as_numpy=True
+            )
             layout = read_layout(inlet.info(self._timeout).as_xml(), self.name)
             offset = inlet.time_correction(self._timeout)
             offset += time.monotonic() - self._pylsl.local_clock()
@@ -164,8 +175,8 @@ class LslFeed:
                 f"{self.name}: expected the stream to answer within "
                 f"{self._timeout:g} s; a firewall may stand in between."
             ) from None
-        except self._pylsl.util.LostError:
-            raise StreamError(f"{self.name}: broke off while being opened.") from None
+        except RuntimeError as error:  # the root of pylsl's errors
+            raise StreamError(f"{self.name}: cannot be opened ({error}).") from None
         source_id = found.source_id()
         search = "source_id=" if source_id else "name="
         search += _quoted(source_id or found.name())
@@ -198,14 +209,9 @@ class LslFeed:
                 with self._found:
                     if not self._closed:
                         self._open = opened
-                        self._clock_offset = opened.clock_offset
                         self._tell("the stream is back.")
                     self._found.notify_all()
                 return
-
-
-# XPath 1.0 knows no lower-case().
-_TYPE = "translate(type,'MOCAP','mocap')='mocap'"
 
 
 def _quoted(text: str) -> str:

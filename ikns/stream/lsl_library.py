@@ -65,6 +65,8 @@ def lsl_settings(*, this_machine: bool) -> str:
             ("multicast", "ResolveScope"): "machine",
             ("multicast", "ListenAddress"): "127.0.0.1",
             ("ports", "IPv6"): "disable",
+            # Eight probes of the clock's offset, here 10 ms apart and not 64.
+            ("tuning", "TimeProbeInterval"): "0.01",
         }
     for (section, option), value in wanted.items():
         if not settings.has_section(section):

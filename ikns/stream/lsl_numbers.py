@@ -35,7 +35,12 @@ class Numbers:
         self._rate = rate
         self._number, self._stamp = 0, math.nan
         self._even_in_row = 0
+        self._bridge = False
         self.uneven = False
+
+    def bridge(self) -> None:
+        """Take the next frame for a new one, numbered by its stamp alone."""
+        self._bridge = True
 
     def next(self, stamp: float) -> int:
         """Return the number of the frame with this stamp, s."""
@@ -45,8 +50,11 @@ class Numbers:
         periods = (stamp - self._stamp) * self._rate
         self._stamp = stamp
         step = round(periods)
-        # A gap of a second or more, or a new clock, says nothing about evenness.
-        if abs(periods) < self._rate:
+        # A gap of a second or more says nothing about evenness.
+        if self._bridge:
+            self._bridge = False
+            step = max(1, step)
+        elif abs(periods) < self._rate:
             even = abs(periods - step) <= _EVEN
             self._even_in_row = self._even_in_row + 1 if even else 0
             self.uneven = not even or (self.uneven and self._even_in_row < _RUN)
