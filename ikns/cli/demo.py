@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from pathlib import Path
 from typing import Annotated
@@ -24,7 +25,7 @@ _RECORDINGS = (
     "truth.json",
     "truth.urdf",
 )
-_RESULTS = ("control.csv", "report.html", "summary.json", "workspace.png")
+_RESULTS = ("control.csv", "report.html", "summary.json", "view.html", "workspace.png")
 
 
 def demo(
@@ -45,6 +46,7 @@ def demo(
     from ikns.calibration import track_chain
     from ikns.cli.demo_report import still_samples, write_demo_report
     from ikns.subject import FILES
+    from ikns.view.scene import recording_scene, scene_html
 
     files = (
         *(f"recordings/{name}" for name in _RECORDINGS),
@@ -64,6 +66,8 @@ def demo(
             ikns.read(folder / "recordings" / f"{trial}.c3d") for trial in _TRIALS
         )
         subject = ikns.calibrate(static, [points], progress=report)
+        about = subject.report | {"simulated": True}
+        subject = dataclasses.replace(subject, report=about)
         subject.save(folder / "subject")
         motion = subject.motions[0]
         reaching = track_chain(subject.skeleton, free, subject.chain, progress=report)
@@ -102,6 +106,18 @@ def demo(
             summary=summary,
         )
         (folder / "summary.json").write_text(json_text(summary), encoding="utf-8")
+        report("drawing", 0, 1)
+        scene = recording_scene(
+            subject.skeleton,
+            subject.null_space_map,
+            subject.chain,
+            motion,
+            points,
+            simulated=True,
+            title=f"Virtual subject {seed} at the PCA points",
+        )
+        (folder / "view.html").write_text(scene_html(scene), encoding="utf-8")
+        report("drawing", 1, 1)
     page = out / "report.html"
     show(
         {"folder": out, "report": page, "seconds": time.perf_counter() - started}
@@ -112,6 +128,6 @@ def demo(
         f"c and the true elbow swivel: r from {min(correlations):.3f} to "
         f"{max(correlations):.3f} over the points",
         *notes(summary["warnings"]),
-        f"Open {page}",
+        f"Open {page}, and {out / 'view.html'} for the motion in 3-D",
         as_json=as_json,
     )

@@ -279,6 +279,10 @@ def write_demo_report(
         ],
         next_steps=[
             Step(
+                "ikns view subject recordings/points.c3d --open",
+                "See body, map and motion in 3-D, as in `view.html` beside this page:",
+            ),
+            Step(
                 "ikns calibrate --static static.c3d --exploration points.c3d "
                 "--out person",
                 "Calibrate a person from your own recordings:",
