@@ -4,7 +4,7 @@ Each simulated subject stands still, explores with the right arm and holds the h
 ten points; the left arm rests. Compared are the static trial alone (ikns.scale) and the
 joint fit of lengths, marker offsets and postures over 60 frames (ikns.symbolic), once
 with the errors of all frames taken as one frame's (the default: skin repeats them) and
-once as independent. Lengths are known exactly, and landmarks are palpated to 2 mm.
+once as independent. Lengths are known exactly.
 """
 
 import argparse
@@ -23,8 +23,9 @@ from ikns.symbolic import fit_lengths
 FRAMES = 60
 GOAL = 5.0  # mm, of the worst segment
 CONDITIONS: dict[str, dict[str, object]] = {
-    "1 mm noise": {},
-    "and 6 mm soft tissue": {"soft_tissue": 6e-3},
+    "1 mm noise, landmarks exact": {"palpation_sd": 0.0},
+    "and landmarks palpated to 2 mm": {},
+    "with 6 mm soft tissue": {"soft_tissue": 6e-3},
 }
 METHODS = {
     "static trial alone": None,
@@ -35,7 +36,8 @@ METHODS = {
 
 def subject(seed: int, *, seconds: float, **options: object) -> dict:
     """Return errors (mm), spreads (mm) and times of one simulated subject."""
-    person = virtual_subject(seed)
+    palpation = float(options.pop("palpation_sd", 2e-3))
+    person = virtual_subject(seed, palpation_sd=palpation)
     run = simulate_protocol(
         person, seed=seed, free_seconds=10, point_seconds=seconds, rate=50, **options
     )
@@ -137,6 +139,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20, help="how many subjects")
     parser.add_argument("--first", type=int, default=0, help="seed of the first")
     parser.add_argument("--quick", action="store_true", help="1 subject, 1.5 s a point")
+    parser.add_argument("--only", type=int, help="only this condition, from 0")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     n, seconds = (1, 1.5) if options.quick else (options.seeds, 3.0)
@@ -152,7 +155,8 @@ def main() -> None:
     }
     people = {
         condition: [subject(seed, seconds=seconds, **settings) for seed in seeds]
-        for condition, settings in CONDITIONS.items()
+        for i, (condition, settings) in enumerate(CONDITIONS.items())
+        if options.only in (None, i) and (i > 0 or not options.quick)
     }
     if options.json:
         print(json.dumps({"about": about, "conditions": people}))
