@@ -14,8 +14,11 @@ __all__ = ["Crosstalk", "crosstalk", "find_reaches"]
 
 Array = NDArray[np.float64]
 
-#: Neighboring reaches share the rest between them, so they are drawn in pairs at least.
-_LEAST_BLOCK = 2
+#: Neighboring reaches share the rest between them, so their changes are correlated, by
+#: 0.22 for normally distributed c at unrelated rests. Then G / g(0) of
+#: :func:`ikns.bootstrap.block_length` is 0.3 and its rule asks for three reaches; a
+#: dozen reaches are too few for it to see that by itself.
+_LEAST_BLOCK = 3
 
 
 @dataclass(frozen=True, eq=False)

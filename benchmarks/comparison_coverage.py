@@ -1,0 +1,366 @@
+"""Do the intervals of leak and crosstalk hold the truth? Virtual subjects, one table.
+
+Everything here is simulated: a calibration of 5 s at each of three points
+(50 Hz, 1 mm of marker noise, 3 % occluded, landmarks palpated to 2 mm), then 20 s of
+natural reaches. `ikns.compare` reports leak, turn and crosstalk with 95 % intervals
+from these seconds alone. What the intervals should hold was written down before any
+was drawn:
+
+- The map is the one that was calibrated: its Z, m and M are taken as given.
+- leak, turn: the length of the slope of the true hand's position (orientation) on c,
+  with c from the true joint angles through this map, while the same person explores the
+  same place again and again: 24 visits of 5 s, no cameras. All points: root mean
+  square over the three.
+- crosstalk: the mean change of c from rest to rest, and the sum of changes over the sum
+  of distances, over 150 natural reaches of the same person, likewise.
+
+So an interval has to allow for the few swivels in 5 s, for the noise, and for the error
+of the scaled body. The truth is itself a sample, 24 and about 10 times as long as the
+recording; what that adds to the scatter (2 and 5 %) counts against the intervals.
+
+Coverage is the share of intervals that hold their truth, with its own exact binomial
+interval (Clopper and Pearson 1934). Points of one subject are not independent; the rows
+"all points" have one interval a subject.
+"""
+
+import argparse
+import json
+import os
+import platform
+import sys
+import time
+import warnings
+from itertools import pairwise
+
+import numpy as np
+import scipy
+from scipy.spatial.transform import Rotation
+from scipy.stats import binomtest
+
+from ikns.calibration import calibrate, track_chain
+from ikns.compare import (
+    Crosstalk,
+    NullSpaceComparison,
+    compare_motion,
+    crosstalk,
+    motion_crosstalk,
+)
+from ikns.compare.leak import hand_turns, slopes
+from ikns.motion import SIDES
+from ikns.nullspace_map import MapWarning, NullSpaceMap
+from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
+from ikns.simulation.arm import Arm
+from ikns.simulation.movement import Plan, explore, join, reach, reach_samples
+from ikns.simulation.places import (
+    BOX_HIGH,
+    BOX_LOW,
+    GIRDLE_FOLLOW,
+    Place,
+    box_points,
+    explored_places,
+)
+from ikns.simulation.protocol import _RESTING, _STATIC_SD, _pose
+from ikns.simulation.wander import tremor, wander
+from ikns.skeleton import Skeleton
+
+CHAIN, SIDE = "right_arm", "right"
+POINTS, RATE, TRUE_RATE = 3, 50.0, 25.0
+SECONDS, REACHING, VISITS, REACHES = 5.0, 20.0, 24, 150
+ROWS = (
+    "leak, each point",
+    "leak, all points",
+    "turn, each point",
+    "turn, all points",
+    "crosstalk, mean change",
+    "crosstalk, per meter",
+)
+
+
+def habits(
+    arm: Arm, seed: int, positions_in_record: np.ndarray
+) -> tuple[np.ndarray, list[Place], np.ndarray]:
+    """Draw about a person what :func:`simulate_protocol` draws first."""
+    of_person = np.random.default_rng(seed).spawn(6)[0]
+    girdle_rest = of_person.normal(0.0, np.radians([3.0, 2.0]))
+    of_person.uniform(-np.pi, np.pi)
+    of_person.normal(0.0, _STATIC_SD, len(arm.skeleton.joint_names))
+    sitting = _pose(arm.skeleton, _RESTING)
+    positions = box_points([arm], sitting, n=POINTS, rng=of_person)
+    np.testing.assert_array_equal(positions[0], positions_in_record)  # in step with it
+    places = explored_places(
+        arm,
+        sitting,
+        positions[0],
+        rng=of_person,
+        girdle_rest=girdle_rest,
+        girdle_follow=0.0,
+    )
+    return sitting, places, girdle_rest
+
+
+def random_places(
+    arm: Arm, sitting: np.ndarray, girdle_rest: np.ndarray, rng: np.random.Generator
+) -> list[Place]:
+    """Draw places as :func:`ikns.simulation.places.random_place` does, all at a time.
+
+    Newton's method on the hand's position and the elbow's swivel; a place whose posture
+    is not found within the joint limits is drawn no further.
+    """
+    body, side, n = arm.skeleton, SIDES.index(SIDE), REACHES + 1
+    lengths = body.segment_lengths
+    full = sum(lengths[f"{SIDE}_{s}"] for s in ("upper_arm", "forearm", "hand"))
+    goal = arm.shoulder(sitting) + full * rng.uniform(BOX_LOW, BOX_HIGH, (n, 3))
+    swivel = rng.uniform(np.radians(15), np.radians(65), n)
+    wrist = rng.normal(0.0, np.radians([20, 8, 5]), (n, 3))
+
+    def bodies(four: np.ndarray) -> np.ndarray:
+        follow = np.column_stack(
+            [np.sin(four[:, 1]), 1 - np.cos(four[:, 0]) * np.cos(four[:, 1])]
+        )
+        girdle = girdle_rest + GIRDLE_FOLLOW * follow
+        angles = np.tile(sitting, (len(four), 1))
+        angles[:, arm.columns] = np.hstack([girdle, four, wrist])
+        return angles
+
+    def miss(four: np.ndarray) -> np.ndarray:
+        angles = bodies(four)
+        off = body.hands_in_thorax(angles)[0][:, side] - goal
+        turned = 0.2 * (body.swivel(angles)[:, side] - swivel)
+        return np.column_stack([off, turned])
+
+    four, h = np.tile([0.4, 0.6, 0.0, 1.4], (n, 1)), 1e-6
+    for _ in range(30):
+        columns = [(miss(four + e) - miss(four - e)) / (2 * h) for e in h * np.eye(4)]
+        step = np.linalg.solve(np.stack(columns, axis=2), -miss(four)[:, :, None])
+        step = step[:, :, 0]
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        four += step * np.minimum(1.0, 0.3 / np.maximum(longest, 1e-300))
+    angles = bodies(four)
+    low, high = arm.lower[2:6] + 0.05, arm.upper[2:6] - 0.05
+    found = (np.abs(miss(four)).max(axis=1) < 1e-6) & (
+        (low < four) & (four < high)
+    ).all(axis=1)
+    x, R = (each[:, side] for each in body.hands_in_thorax(angles))
+    return [
+        Place(angles[i, arm.columns], x[i], R[i], float(swivel[i]))
+        for i in np.flatnonzero(found)
+    ]
+
+
+def carried_out(
+    arm: Arm, sitting: np.ndarray, plan: Plan, rng: np.random.Generator
+) -> np.ndarray:
+    """Joint angles of the body as in the simulation, all samples at a time, (T, 18)."""
+    n, u, body = len(plan.point), Unsteadiness(), arm.skeleton
+    settings = {"cutoff": u.drift_hz, "rate": TRUE_RATE}
+    shift = wander(rng, n, 3, sd=u.drift, **settings)
+    shift += tremor(rng, n, 3, sd=u.tremor, rate=TRUE_RATE)
+    tilt = wander(rng, n, 3, sd=u.tilt, **settings)
+    tilt += tremor(rng, n, 3, sd=u.tremor_tilt, rate=TRUE_RATE)
+    wanted = Rotation.from_rotvec(tilt) * Rotation.from_matrix(plan.rotation)
+    # Joints outside the arm wander a third of a degree there; they do not move it.
+    angles = np.tile(sitting, (n, 1))
+    angles[:, arm.columns] = plan.postures
+    side = SIDES.index(SIDE)
+    for _ in range(20):
+        x, R = (each[:, side] for each in body.hands_in_thorax(angles))
+        turn = (wanted * Rotation.from_matrix(R).inv()).as_rotvec()
+        error = np.hstack([plan.position + shift - x, turn])
+        if np.abs(error).max() < 1e-7:
+            return angles
+        J = body.chain_jacobian(angles, CHAIN)
+        Jt = np.swapaxes(J, 1, 2)
+        step = (Jt @ np.linalg.solve(J @ Jt, error[:, :, None]))[:, :, 0]
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        step *= np.minimum(1.0, 0.3 / np.maximum(longest, 1e-300))
+        angles[:, arm.columns[2:]] += step
+    raise RuntimeError("a planned hand pose was not reached")
+
+
+def true_slopes(
+    learned: NullSpaceMap,
+    arm: Arm,
+    sitting: np.ndarray,
+    place: Place,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes of the true hand and its turn on c, at the map's point nearest to here."""
+    visits = [
+        explore(place, seconds=SECONDS, rate=TRUE_RATE, rng=rng, index=0)
+        for _ in range(VISITS)
+    ]
+    angles = carried_out(arm, sitting, join(visits), rng)
+    x, R = (each[:, SIDES.index(SIDE)] for each in arm.skeleton.hands_in_thorax(angles))
+    k = int(np.linalg.norm(learned.centers_ - place.position, axis=1).argmin())
+    width = learned.upper_[k, 0] - learned.lower_[k, 0]
+    c = angles[:, arm.columns[2:]] @ learned.directions_[k, 0] / width
+    return slopes(c[:, None], x)[0], slopes(c[:, None], hand_turns(R))[0]
+
+
+def true_crosstalk(
+    learned: NullSpaceMap,
+    arm: Arm,
+    sitting: np.ndarray,
+    girdle_rest: np.ndarray,
+    rng: np.random.Generator,
+) -> Crosstalk:
+    """Crosstalk on many natural reaches of the true body."""
+    stops = random_places(arm, sitting, girdle_rest, rng)
+    reaches = [
+        reach(start, end, n=reach_samples(start, end, rate=TRUE_RATE))
+        for start, end in pairwise(stops)
+    ]
+    plan = join(reaches)
+    angles = carried_out(arm, sitting, plan, rng)
+    x = arm.skeleton.hands_in_thorax(angles)[0][:, SIDES.index(SIDE)]
+    speed = np.linalg.norm(np.gradient(x, 1 / TRUE_RATE, axis=0), axis=1)
+    c = learned.control_signal(angles[:, arm.columns[2:]], x)
+    return crosstalk(c, speed, x, resamples=0)
+
+
+def reported(
+    seed: int, resamples: int
+) -> tuple[NullSpaceComparison, Crosstalk, NullSpaceMap, Arm, np.ndarray]:
+    """Return what the recordings alone say about a virtual subject."""
+    person = virtual_subject(seed)
+    run = simulate_protocol(
+        person,
+        seed=seed,
+        n_points=POINTS,
+        static_seconds=2.0,
+        free_seconds=REACHING,
+        point_seconds=SECONDS,
+        rate=RATE,
+    )
+    adult = person.adult
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MapWarning)
+        subject = calibrate(
+            run.static.recording,
+            [run.points.recording],
+            generic=Skeleton.from_anthropometry(
+                adult.stature_m, adult.mass_kg, adult.sex
+            ),
+            n_points=POINTS,
+        )
+    learned = subject.null_space_map
+    found = compare_motion(
+        learned, subject.skeleton, subject.motions[0], resamples=resamples, seed=seed
+    )
+    reaching = track_chain(subject.skeleton, run.free.recording, CHAIN)
+    across = motion_crosstalk(learned, reaching, resamples=resamples, seed=seed)
+    return found, across, learned, Arm(person.skeleton, SIDE), run.places
+
+
+def one_subject(seed: int, resamples: int) -> dict[str, list[list[float]]]:
+    """Return the reported value, low, high, and the truth of each row."""
+    found, across, learned, arm, positions = reported(seed, resamples)
+    sitting, places, girdle_rest = habits(arm, seed, positions)
+    rng = np.random.default_rng([seed, 1])
+    order = [
+        int(np.linalg.norm([p.position - center for p in places], axis=1).argmin())
+        for center in learned.centers_[found.points]
+    ]
+    true = [true_slopes(learned, arm, sitting, places[k], rng) for k in order]
+    truly = true_crosstalk(learned, arm, sitting, girdle_rest, rng)
+    rows: dict[str, list[list[float]]] = {}
+    for i, name in enumerate(("leak", "turn")):
+        lengths = np.array([np.linalg.norm(slope[i]) for slope in true])
+        values = getattr(found, name)[:, 0]
+        ends = getattr(found, f"{name}_interval")[:, 0]
+        rows[f"{name}, each point"] = np.column_stack([values, ends, lengths]).tolist()
+        root = float(np.sqrt(np.mean(lengths**2)))
+        rows[f"{name}, all points"] = [[*found.pooled[name], root]]
+    for name, key in (("mean change", "mean_change"), ("per meter", "per_meter")):
+        ends = getattr(across, f"{key}_interval")
+        rows[f"crosstalk, {name}"] = [
+            [getattr(across, key), *ends, getattr(truly, key)]
+        ]
+    return rows
+
+
+def summary(subjects: list[dict[str, list[list[float]]]]) -> dict[str, dict]:
+    """Coverage of each row."""
+    table = {}
+    for name in ROWS:
+        rows = np.array([row for subject in subjects for row in subject[name]])
+        known = np.isfinite(rows).all(axis=1)
+        value, low, high, truth = rows[known].T
+        hit = (low <= truth) & (truth <= high)
+        exact = binomtest(int(hit.sum()), len(hit)).proportion_ci(0.95)
+        table[name] = {
+            "intervals": len(hit),
+            "without": int((~known).sum()),
+            "coverage": float(hit.mean()),
+            "coverage_interval": [float(exact.low), float(exact.high)],
+            "truth_below": float((truth < low).mean()),
+            "truth_above": float((truth > high).mean()),
+            "median_value": float(np.median(value)),
+            "median_low": float(np.median(low)),
+            "median_high": float(np.median(high)),
+            "median_truth": float(np.median(truth)),
+        }
+    return table
+
+
+def print_table(table: dict[str, dict]) -> None:
+    """Print the table; leak in mm, turn in deg."""
+    print(
+        "                             coverage of 95 % intervals    truth     "
+        "median reported [interval]   median\n"
+        "                          n  %     (exact 95 %)        below above   "
+        "mm, deg or c                  truth"
+    )
+    scale = {"leak": 1000.0, "turn": float(np.degrees(1)), "cros": 1.0}
+    for name, row in table.items():
+        unit = scale[name[:4]]
+        low, high = (100 * end for end in row["coverage_interval"])
+        value = [unit * row[f"median_{k}"] for k in ("value", "low", "high", "truth")]
+        print(
+            f"{name:24}{row['intervals']:5d} {100 * row['coverage']:5.1f}  "
+            f"({low:4.1f} to {high:5.1f}) {100 * row['truth_below']:10.1f} "
+            f"{100 * row['truth_above']:5.1f}  {value[0]:7.2f} "
+            f"[{value[1]:5.2f}, {value[2]:6.2f}] {value[3]:13.2f}"
+        )
+
+
+def main() -> None:
+    """Print one table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=200, help="how many subjects")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first")
+    parser.add_argument("--resamples", type=int, default=400)
+    parser.add_argument("--quick", action="store_true", help="2 subjects")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--progress", action="store_true", help="on stderr")
+    options = parser.parse_args()
+    seeds = range(
+        options.first, options.first + (2 if options.quick else options.seeds)
+    )
+    started, subjects = time.process_time(), []
+    for seed in seeds:
+        subjects.append(one_subject(seed, options.resamples))
+        if options.progress:
+            sys.stderr.write(json.dumps({"seed": seed} | subjects[-1]) + "\n")
+            sys.stderr.flush()
+    about = {
+        "seeds": [seeds[0], seeds[-1]],
+        "resamples": options.resamples,
+        "processor_s_a_subject": (time.process_time() - started) / len(subjects),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "cores": os.cpu_count(),
+    }
+    table = summary(subjects)
+    if options.json:
+        result = {"about": about, "simulated": True, "coverage": table}
+        print(json.dumps(result | {"subjects": subjects}, indent=1))
+        return
+    print("Virtual subjects: everything here is simulated.")
+    print(", ".join(f"{key} {value}" for key, value in about.items()))
+    print_table(table)
+
+
+if __name__ == "__main__":
+    main()
