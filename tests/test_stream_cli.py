@@ -73,6 +73,28 @@ def test_interrupting_an_endless_stream_is_its_normal_end(
     assert told["faults"]["drop"] >= counts.dropped > 0
 
 
+def test_a_stream_that_dies_without_a_word_is_noticed_and_found_again(
+    walk: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A stopped process, as a cut wire, leaves the connection open and answers nothing.
+    monkeypatch.setattr("ikns.stream.lsl_feed._SILENCE", 0.3)
+    monkeypatch.setattr("ikns.stream.lsl_feed._SIGN_OF_LIFE", 0.5)
+    with start(str(walk), "--name", name, "--loop") as server:
+        with open_source(f"lsl:{name}?scope=machine&timeout=60") as source:
+            next(source)
+            server.send_signal(signal.SIGSTOP)
+            while not any("broke off" in event.text for event in source.events):
+                source.read(0.1)
+            server.send_signal(signal.SIGCONT)
+            before = source.continuity.counts.received
+            while source.continuity.counts.received == before:
+                next(source)
+            assert any("is back" in event.text for event in source.events)
+        server.send_signal(signal.SIGINT)
+        server.communicate(timeout=60)
+    assert server.returncode == 0
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [

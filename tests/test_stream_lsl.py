@@ -289,6 +289,25 @@ def test_uneven_stamps_are_told_and_no_frame_is_called_lost(name: str) -> None:
     assert ["stamps are uneven" in text for text in told] == [True]
 
 
+def test_a_stream_that_pauses_but_answers_is_kept(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ikns.stream.lsl_feed._SILENCE", 0.1)
+    there = recording(5)
+    with LslOutlet(there.labels, there.rate, name=name) as outlet:
+        with opened(name) as source:
+            assert source.read(0.5) is None
+            outlet.push(there.markers[0])
+            assert source.read(10.0) is not None
+            assert not source.events
+        # Leaving is leaving: the other side sees it, if not at once.
+        give_up = time.monotonic() + 20
+        while outlet.has_listener:
+            assert time.monotonic() < give_up
+            outlet.push(there.markers[0])
+            time.sleep(0.01)
+
+
 def test_silence_is_told_and_iterating_gives_up(name: str) -> None:
     there = recording(5)
     with LslOutlet(there.labels, there.rate, name=name) as outlet:

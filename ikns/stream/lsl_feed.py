@@ -24,6 +24,10 @@ ANY_MOCAP = "translate(type,'MOCAP','mocap')='mocap'"
 _SLICE = 0.2
 #: Seconds of frames kept for a reader that is busy; more is lost, oldest first.
 _BUFFER = 10
+#: Seconds without a frame after which a stream must show that it is still there.
+_SILENCE = 5.0
+#: Seconds it has to do so, over the network.
+_SIGN_OF_LIFE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,7 @@ class _Open:
     rate: float
     clock_offset: float
     search: str
+    uid: str
 
 
 class LslFeed:
@@ -65,7 +70,9 @@ class LslFeed:
         opened = self._connect(self._find(stream))
         self.labels, self.rate = opened.layout.labels, opened.rate
         self._open: _Open | None = opened
-        self._reading = opened
+        self._reading: _Open | None = opened
+        self._silent_since = time.monotonic()
+        self._checking = False
         self._first_offset, self._ahead = opened.clock_offset, 0.0
         self._search = opened.search
         self._found = threading.Condition()
@@ -100,7 +107,13 @@ class LslFeed:
                     self._lose()
                     continue
                 if sample is not None:
+                    self._silent_since = received
                     return self._frame(opened, sample, stamp, received)
+                if received - self._silent_since > _SILENCE and not self._checking:
+                    self._checking = True
+                    threading.Thread(
+                        target=self._check, args=(opened,), daemon=True
+                    ).start()
             if self._closed or time.monotonic() >= give_up:
                 return None
 
@@ -123,7 +136,7 @@ class LslFeed:
         """Leave the stream."""
         with self._found:
             self._closed = True
-            self._open = None
+            self._open = self._reading = None
             self._found.notify_all()
 
     def _tell(self, text: str) -> None:
@@ -180,11 +193,21 @@ class LslFeed:
         source_id = found.source_id()
         search = "source_id=" if source_id else "name="
         search += _quoted(source_id or found.name())
-        return _Open(inlet, layout, rate, offset, search)
+        return _Open(inlet, layout, rate, offset, search, found.uid())
+
+    def _check(self, opened: _Open) -> None:
+        """Give a silent stream up unless it answers; a cut wire closes nothing."""
+        answers = self._pylsl.resolve_bypred(f"uid='{opened.uid}'", 1, _SIGN_OF_LIFE)
+        if not answers and opened is self._open:
+            self._lose()
+        self._silent_since = time.monotonic()
+        self._checking = False
 
     def _lose(self) -> None:
         with self._found:
-            self._open = None
+            if self._open is None:  # noticed already, or closed
+                return
+            self._open = self._reading = None
         self._tell("the stream broke off.")
         threading.Thread(target=self._search_again, daemon=True).start()
 
@@ -209,6 +232,7 @@ class LslFeed:
                 with self._found:
                     if not self._closed:
                         self._open = opened
+                        self._silent_since = time.monotonic()
                         self._tell("the stream is back.")
                     self._found.notify_all()
                 return
