@@ -29,8 +29,8 @@ Numbers = dict[str, float]
 PAPER_LAYOUT = "box surface (paper)"
 #: Schemes that are tried on any number of points.
 MORE = (
-    "nearest point",
     PAPER,
+    "nearest point",
     "natural neighbor, projected",
     "smooth (C1), projected",
     "thin-plate spline",

@@ -133,15 +133,16 @@ def layouts_figure(people: People) -> Figure:
         panels = figure.subplots(2, 2, sharex=True)
         for row, (of, title) in enumerate(
             (
-                ("layouts", "the paper's interpolation"),
-                ("numbers", "the paper's layout"),
+                ("layouts", "by layout (natural neighbor)"),
+                ("numbers", "by scheme (box surface)"),
             )
         ):
             for axes, what, unit in (
                 (panels[row, 0], "angle", "error of the direction, deg"),
                 (panels[row, 1], "c", "error of c, % of the range"),
             ):
-                for k, name in enumerate(people[0][of]):
+                names = [name for name in people[0][of] if name != "nearest point"]
+                for k, name in enumerate(names):
                     color, mark = _MARKS[k]
                     there = [one[of][name] for one in people]
                     ns = list(there[0])
@@ -152,9 +153,9 @@ def layouts_figure(people: People) -> Figure:
                 floor = middle([one["floor"] for one in people], what)
                 axes.axhline(floor, color=GREY, ls="--", label="a visit right there")
                 axes.set_ylabel(unit)
-                axes.set_ylim(bottom=0)
+                axes.set_ylim(0, 1.05 * axes.get_ylim()[1])
                 axes.grid(axis="y")
-                axes.set_title(f"with {title}")
+                axes.set_title(title)
             panels[row, 1].legend(
                 *panels[row, 0].get_legend_handles_labels(),
                 loc="center left",
@@ -196,7 +197,7 @@ def sweep_figure(
         figure = new_figure(
             f"Which {what}? Recorded with markers, {people} people",
             simulated=True,
-            height=2.9,
+            height=3.2,
         )
         panels = figure.subplots(1, 4)
         for axes, (key, title) in zip(panels, lines, strict=True):
@@ -208,18 +209,28 @@ def sweep_figure(
                 high = [
                     np.nanmax(v) if np.isfinite(v).any() else np.nan for v in values
                 ]
-                x = at + 0.12 * (k - 1)
+                x = at + 0.12 * (k - (len(sweeps) - 1) / 2)
                 axes.vlines(x, low, high, color=color, lw=1.0, alpha=0.6)
+                # No line to the rule: it is no number.
+                first = settings.count(None)
+                axes.plot(x[:first], usual[:first], mark, color=color, ms=4.0, mew=0)
                 axes.plot(
-                    x, usual, color=color, marker=mark, ms=4.0, mew=0, label=condition
+                    x[first:],
+                    usual[first:],
+                    color=color,
+                    marker=mark,
+                    ms=4.0,
+                    mew=0,
+                    label=condition,
                 )
             axes.axvline(settings.index(paper), color=GREY, ls=":", zorder=0)
             axes.set_title(title)
             axes.set_xticks(at, ticks)
-            axes.set_ylim(bottom=0)
+            axes.set_ylim(0, 1.05 * axes.get_ylim()[1])
             axes.grid(axis="y")
         handles, labels = panels[0].get_legend_handles_labels()
         labels = [f"{label} hand" for label in labels]
-        figure.legend(handles, labels, loc="outside upper right", ncols=3)
-        figure.supxlabel(f"{name};  dotted: the paper's", fontsize=8.5)
+        figure.legend(handles, labels, loc="outside lower left", ncols=3)
+        dotted = "the paper's" if paper is not None else "the package's rule"
+        figure.supxlabel(f"{name};  dotted: {dotted}", x=0.99, ha="right", fontsize=8.5)
     return figure

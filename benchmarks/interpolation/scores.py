@@ -1,4 +1,4 @@
-"""How far interpolated values are from true ones, how c jumps, and who is better."""
+"""How far interpolated values are from true ones, and how c jumps."""
 
 from collections.abc import Callable, Sequence
 
@@ -12,7 +12,6 @@ __all__ = [
     "errors",
     "hull_jump",
     "in_hull",
-    "interval",
     "largest_steps",
     "left_out",
     "revisited",
@@ -23,8 +22,8 @@ Scheme = Callable[[Known], Callable[[Array], Local]]
 
 #: Every so many samples of a visit are compared: a tenth of a second apart.
 _EVERY = 5
-#: How far to either side of the hull two places are, m: far above rounding, and c
-#: changes by less than 1e-5 over it where it does not jump.
+#: How far to either side of the hull two places are, m: far above rounding. Where a
+#: point lies just inside the hull c is steep, yet changes by a few 1e-4 at most.
 _ASIDE = 1e-7
 #: Steps along a reach are looked at after every millimeter of the hand's path.
 _MM = 1e-3
@@ -128,12 +127,3 @@ def largest_steps(
         for steps, xs, qs in ((frame, x, q), (mm, fine[:, :3], fine[:, 3:])):
             steps.append(100 * np.abs(np.diff(at(xs).signal(qs)[:, 0])).max())
     return np.array(frame), np.array(mm)
-
-
-def interval(
-    values: Array, rng: np.random.Generator, draws: int = 4000
-) -> tuple[float, float]:
-    """Bootstrap interval (95 %) of the mean over subjects, (S,)."""
-    drawn = rng.integers(len(values), size=(draws, len(values)))
-    low, high = np.quantile(np.asarray(values)[drawn].mean(axis=1), [0.025, 0.975])
-    return float(low), float(high)

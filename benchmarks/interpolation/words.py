@@ -25,13 +25,14 @@ __all__ = [
 People = Sequence[dict]
 Sweeps = dict[str, dict[float | None, People]]
 
-#: A jump of c below this is none, %.
-_NONE = 0.01
+#: A change of c below this within 0.2 um across the hull is steep, but no jump, %.
+_NONE = 0.1
 #: Errors that differ by less than this share are as good as equal.
 _SAME = 0.10
 #: A step of c this many times the calmest scheme's is large.
 _LARGE = 3.0
 _UNIT = {"angle": "deg", "c": "%"}
+_WORD = {"angle": "the direction", "c": "c"}
 
 
 def about_schemes(people: People) -> list[str]:
@@ -143,7 +144,7 @@ def _choice(rows: dict[str, People]) -> str:
     more = f"{_apart(rows[best], rows[PAPER], 'c_mean')} %"
     spread = [c[name] for name in fit]
     said = (
-        f"of those that jump nowhere and step little ({', '.join(fit)}), {best} has "
+        f"of those that jump nowhere and step little ({_list(fit)}), {best} has "
         f"the best direction ({gain} and, of c, {more} against the paper's). "
     )
     alike = max(spread) <= (1 + _SAME) * min(spread)
@@ -205,9 +206,9 @@ def about_numbers(people: People) -> list[str]:
             cost = middle([p["layouts"][layout][enough] for p in people], "minutes")
             floor = column([p["floor"] for p in people], f"{what}_mean").mean()
             parts.append(
-                f"for the {what} {enough} points ({cost:.1f} min, {mean[enough]:.1f} "
-                f"{unit}; {mean[most]:.1f} with {most}, {floor:.1f} on a visit right "
-                "there)"
+                f"for {_WORD[what]} {enough} points ({cost:.1f} min, "
+                f"{mean[enough]:.1f} {unit}; {mean[most]:.1f} with {most}, "
+                f"{floor:.1f} on a visit right there)"
             )
         said.append(
             f"number, {layout}: within a tenth of what {most} points reach come "
@@ -251,23 +252,25 @@ def about_sweep(what: str, paper: float | None, sweeps: Sweeps) -> list[str]:
     for condition, settings in sweeps.items():
         good, best = _good(settings)
         is_good = "is" if paper in good else "is not"
-        gain = _apart(settings[best], settings[paper], "angle")
+        gain = "none has a smaller angle"
+        if (column(settings[best], "angle") != column(settings[paper], "angle")).any():
+            apart = _apart(settings[best], settings[paper], "angle")
+            gain = f"angle with {say(what, best)} against it: {apart} deg"
         text = (
             f"{what}, {condition} hand: within a tenth of the best, with no point "
             f"lost, {_verb(good)} {_list([say(what, v) for v in good])}; "
-            f"{say(what, paper)} {is_good} among them (angle with {say(what, best)} "
-            f"against it: {gain} deg)"
+            f"{say(what, paper)} {is_good} among them ({gain})"
         )
         losing = [say(what, v) for v, rows in settings.items() if not _whole(rows)]
         if losing:
-            text += f"; points are lost with {_list(losing)}"
+            text += f". Points are lost with {_list(losing)}"
         if what == "variance":
             one = [
                 say(what, v)
                 for v, rows in settings.items()
                 if column(rows, "components").max() == 1
             ]
-            text += f"; one component is enough for everybody with {_list(one)}"
+            text += f". One component is enough for everybody with {_list(one)}"
         said.append(text + ".")
     return said
 
@@ -304,7 +307,7 @@ def verdict(
         for what in _UNIT:
             enough = _enough(_by_number(people, PAPER_LAYOUT, what))
             word = "enough" if enough <= 10 else f"too few, {enough} would do"
-            said.append(f"10 points: for the {what} {word}")
+            said.append(f"10 points: for {_WORD[what]} {word}")
     rows = _schemes(people)
     for what in _UNIT:
         mean = _means(rows, f"{what}_mean")
@@ -312,7 +315,7 @@ def verdict(
         word = (
             "as good as any" if share <= _SAME else f"{100 * share:.0f} % off the best"
         )
-        said.append(f"natural neighbor: for the {what} {word}")
+        said.append(f"natural neighbor: for {_WORD[what]} {word}")
     jump = _worst(rows, "jump_worst")[PAPER]
     said.append(
         f"the nearest point's values outside: c jumps by up to {jump:.0f} %"
@@ -326,6 +329,8 @@ def verdict(
             if paper[what] not in _good(settings)[0]
         ]
         name = f"{what} {say(what, paper[what])}"
+        if what == "radius":
+            name = "radius, for which the paper gives none: the package's rule"
         said.append(
             f"{name}: "
             + ("good for every hand" if not bad else f"not good for: {', '.join(bad)}")
@@ -338,4 +343,4 @@ def _verb(names: Sequence[object]) -> str:
 
 
 def _list(names: Sequence[str]) -> str:
-    return ", ".join(names) if names else "none"
+    return "; ".join(names) if names else "none"
