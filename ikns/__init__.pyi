@@ -1,9 +1,16 @@
 from .calibration import calibrate as calibrate
 from .compare import compare as compare
+from .compare import compare_motion as compare_motion
+from .compare import compare_samples as compare_samples
 from .control import FrameSolver as FrameSolver
+from .control import RateControl as RateControl
 from .errors import IknsError as IknsError
 from .files import read as read
 from .files import write_c3d as write_c3d
+from .finger import DynamixelFinger as DynamixelFinger
+from .finger import SimulatedFinger as SimulatedFinger
+from .finger import check_finger as check_finger
+from .finger import open_finger as open_finger
 from .interpolation import NaturalNeighborInterpolator as NaturalNeighborInterpolator
 from .marker_ik import MarkerIK as MarkerIK
 from .marker_set import MarkerSet as MarkerSet
@@ -12,13 +19,24 @@ from .nullspace_map import NullSpaceMap as NullSpaceMap
 from .nullspace_map import analytic_map as analytic_map
 from .nullspace_map import null_space_samples as null_space_samples
 from .recording import Recording as Recording
+from .runtime import replay_run as replay_run
+from .runtime import run as run
 from .scaling import scale as scale
+from .session import read_run as read_run
 from .simulation import simulate_protocol as simulate_protocol
 from .simulation import virtual_subject as virtual_subject
 from .simulation import write_protocol as write_protocol
 from .skeleton import Robot as Robot
 from .skeleton import Skeleton as Skeleton
+from .stream import open_source as open_source
 from .subject import Subject as Subject
+from .symbolic import available_control as available_control
+from .symbolic import available_range as available_range
+from .symbolic import fit_lengths as fit_lengths
+from .ucm import across_trials as across_trials
+from .ucm import surrogate_test as surrogate_test
+from .ucm import variance_split as variance_split
+from .ucm import within_trial as within_trial
 from .warm_up import warm_up as warm_up
 
 __version__: str

@@ -5,17 +5,24 @@ title when the data come from a virtual subject.
 """
 
 from ikns.view.body import arm_points
+from ikns.view.comparison import comparison_figure
 from ikns.view.directions import directions_figure, principal_angle_figure
+from ikns.view.error_map import error_map_figure, workspace_slices
 from ikns.view.residuals import residual_figure
 from ikns.view.signals import control_figure, swivel_figure
+from ikns.view.variance_split import variance_split_figure
 from ikns.view.workspace import workspace_figure
 
 __all__ = [
     "arm_points",
+    "comparison_figure",
     "control_figure",
     "directions_figure",
+    "error_map_figure",
     "principal_angle_figure",
     "residual_figure",
     "swivel_figure",
+    "variance_split_figure",
     "workspace_figure",
+    "workspace_slices",
 ]
