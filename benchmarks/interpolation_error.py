@@ -6,8 +6,8 @@ self-motion comes from their own Jacobian. What is true at a place is the null s
 the true body's Jacobian, averaged over the postures that the person visits there; no
 interpolation has a part in it. Errors: the angle between interpolated and true
 direction; the root mean square error of c over the visited postures, in % of the range;
-the jump of c across the hull; its largest step on reaches, half of them out of the
-hull.
+the jump of c across the hull; its largest step on reaches between places in and around
+the box.
 
 The first two questions take the true joint angles of an unsteady hand, the others whole
 recordings: markers with 1 mm noise, 3 % of them hidden, scaling, marker inverse

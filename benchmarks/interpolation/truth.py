@@ -202,7 +202,7 @@ class Person:
     ) -> list[tuple[Array, Array]]:
         """Return reaches between places in and around the box, as (x, q) each.
 
-        Half of the ends lie where they please in a box larger by a fifth on each side.
+        The ends lie anywhere in a box larger by a fifth on each side.
         """
         ends: list[Place] = []
         margin = _BEYOND * (self.high - self.low)
