@@ -144,7 +144,7 @@ class LslFeed:
 
     def _find(self, stream: str) -> Any:
         predicate = "name=" + _quoted(stream) if stream else ANY_MOCAP
-        found = self._pylsl.resolve_bypred(predicate, 1, self._timeout)
+        found = self._resolve(predicate, self._timeout)
         if found:
             return found[0]
         there = ", ".join(
@@ -154,6 +154,11 @@ class LslFeed:
             f"{self.name}: expected an LSL stream {stream or 'of type MoCap'} to "
             f"answer within {self._timeout:g} s, found {there or 'no stream at all'}."
         )
+
+    def _resolve(self, predicate: str, timeout: float) -> list[Any]:
+        # liblsl asks in waves 0.5 or 1.25 s apart; a time-out that falls on one is
+        # missed, and the call then takes 5 s longer.
+        return list(self._pylsl.resolve_bypred(predicate, 1, 0.97 * timeout))
 
     def _streams(self) -> list[Any]:
         return list(self._pylsl.resolve_streams(min(self._timeout, 1.0)))
@@ -197,7 +202,7 @@ class LslFeed:
 
     def _check(self, opened: _Open) -> None:
         """Give a silent stream up unless it answers; a cut wire closes nothing."""
-        answers = self._pylsl.resolve_bypred(f"uid='{opened.uid}'", 1, _SIGN_OF_LIFE)
+        answers = self._resolve(f"uid='{opened.uid}'", _SIGN_OF_LIFE)
         if not answers and opened is self._open:
             self._lose()
         self._silent_since = time.monotonic()
@@ -215,7 +220,7 @@ class LslFeed:
         """Look for the stream until it is back with the same markers."""
         told = ""
         while not self._closed:
-            for found in self._pylsl.resolve_bypred(self._search, 1, 1.0):
+            for found in self._resolve(self._search, 1.0):
                 try:
                     opened = self._connect(found)
                     if (opened.layout.labels, opened.rate) != (self.labels, self.rate):
