@@ -27,6 +27,7 @@ def test_the_examples_run(
         small_person.write(
             tmp_path / "ikns-demo" / "recordings", trial.name, trial.recording
         )
+    small_person.subject().save(tmp_path / "ikns-demo" / "subject")
     monkeypatch.chdir(tmp_path)
     offline, live = blocks("python")
     assert len([line for line in offline.splitlines() if line]) <= 15
@@ -35,7 +36,8 @@ def test_the_examples_run(
     assert "degrees" in capsys.readouterr().out
     assert np.isfinite(names["c"]).all()
     exec(compile(live, "README.md", "exec"), names)
-    assert "the last frame's signal:" in capsys.readouterr().out
+    assert "frames:" in capsys.readouterr().out
+    assert names["log"].frames == len(names["points"].time)
 
 
 def test_set_up_is_two_commands() -> None:
@@ -51,10 +53,16 @@ def test_every_command_line_shown_is_one_that_the_program_knows(
     shown = [line.split() for line in "".join(blocks("console")).splitlines()]
     assert {line[1] for line in shown} == {
         "calibrate",
-        "control",
         "compare",
+        "control",
         "ik",
+        "replay",
+        "run",
         "scale",
+        "servo",
+        "stream",
+        "ucm",
+        "view",
     }
     for program, command, *rest in shown:
         assert program == "ikns"
