@@ -1,12 +1,16 @@
 """LSL: a recording sent over the loopback arrives as it was, faults and all."""
 
 import socket
+import subprocess
+import sys
 import threading
 import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -323,37 +327,65 @@ def test_silence_is_told_and_iterating_gives_up(name: str) -> None:
 def test_other_machines_reach_no_port_of_the_outlet(name: str) -> None:
     with LslOutlet(["A"], 100.0, name=name) as outlet:
         assert outlet.open_ports == []
-        assert _answers(_data_port(name), "127.0.0.1")
+        port = data_ports(name)[0]
+        assert answers(port, "127.0.0.1", "127.0.0.1")
         # From an address of this machine beside the loopback, as from another machine.
-        assert not _answers(_data_port(name), _own_address()) or _no_network()
+        assert not answers(port, own_address(), "127.0.0.1") or no_network()
     with LslOutlet(["A"], 100.0, name=f"{name}-open", everywhere=True):
-        assert _answers(_data_port(f"{name}-open"), _own_address())
+        port = data_ports(f"{name}-open")[0]
+        assert answers(port, own_address(), "127.0.0.1")
 
 
-def _answers(port: int, source: str) -> bool:
-    with socket.socket() as caller:
+def test_nor_after_lsl_was_started_for_the_network(name: str) -> None:
+    # liblsl reads its settings once, so this takes a process of its own.
+    code = f"""
+import test_stream_lsl as own
+from ikns.stream import LslOutlet, open_source
+from ikns.stream.lsl_library import lsl
+lsl("a test", this_machine=False)
+with LslOutlet(["A"], 100.0, name="{name}") as outlet:
+    assert outlet.open_ports == []
+    four, six = own.data_ports("{name}")
+    assert own.answers(four, "127.0.0.1", "127.0.0.1")
+    assert not own.answers(four, own.own_address(), "127.0.0.1") or own.no_network()
+    assert not six or not own.answers(six, "::1", "::1")
+    with open_source("lsl:{name}?timeout=10") as source:
+        outlet.push([[1, 2, 3]])
+        assert next(source).markers.tolist() == [[1, 2, 3]]
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def answers(port: int, source: str, target: str) -> bool:
+    family = socket.AF_INET6 if ":" in source else socket.AF_INET
+    with socket.socket(family) as caller:
         caller.settimeout(0.5)
-        caller.bind((source, 0))
         try:
-            caller.connect(("127.0.0.1", port))
+            caller.bind((source, 0))
+            caller.connect((target, port))
         except OSError:
             return False
         return True
 
 
-def _no_network() -> bool:
-    return _own_address().startswith("127.")
-
-
-def _data_port(name: str) -> int:
-    from xml.etree import ElementTree
-
+def data_ports(name: str) -> tuple[int, int]:
+    """Ports of a stream for IPv4 and IPv6, 0 where there is none."""
     pylsl = lsl("a test", this_machine=True)
     (info,) = pylsl.resolve_byprop("name", name, 1, 10)
-    return int(ElementTree.fromstring(info.as_xml()).findtext("v4data_port", "0"))
+    tree = ElementTree.fromstring(info.as_xml())
+    four, six = (tree.findtext(f"v{n}data_port", "0") for n in (4, 6))
+    return int(four), int(six)
 
 
-def _own_address() -> str:
+def own_address() -> str:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))  # sends nothing
@@ -362,8 +394,12 @@ def _own_address() -> str:
         return str(probe.getsockname()[0])
 
 
+def no_network() -> bool:
+    return own_address().startswith("127.")
+
+
 def test_settings_of_the_user_are_kept(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LSLAPICFG", str(tmp_path / "lab.cfg"))
     (tmp_path / "lab.cfg").write_text(

@@ -21,21 +21,21 @@ _SO_ATTACH_FILTER = 26
 #: Offset of the IPv4 header, wherever the packet's data start (SKF_NET_OFF).
 _NETWORK = 0xFFF00000
 _ACCEPT, _DROP = 0xFFFFFFFF, 0
-# struct sock_filter: code, jump if true, jump if false, operand.
-_PROGRAM = b"".join(
-    struct.pack("HBBI", *line)
-    for line in (
-        (0x30, 0, 0, _NETWORK + 12),  # load the first byte of the source address
-        (0x15, 0, 1, 127),  # is it 127?
-        (0x06, 0, 0, _ACCEPT),
-        (0x06, 0, 0, _DROP),
-    )
+Line = tuple[int, int, int, int]  # code, jump if true, jump if false, operand
+_FROM_THIS_MACHINE: tuple[Line, ...] = (
+    (0x30, 0, 0, _NETWORK + 12),  # load the first byte of the source address
+    (0x15, 0, 1, 127),  # is it 127?
+    (0x06, 0, 0, _ACCEPT),
+    (0x06, 0, 0, _DROP),
 )
+_FROM_NOBODY: tuple[Line, ...] = ((0x06, 0, 0, _DROP),)
 
 
 @contextmanager
 def only_from_this_machine() -> Iterator[list[int]]:
-    """Filter every IPv4 socket that was opened inside the block.
+    """Filter every socket for all networks that this process opens inside the block.
+
+    IPv6 ones are closed altogether: IPv4 is enough within a machine.
 
     Yields
     ------
@@ -55,18 +55,22 @@ def only_from_this_machine() -> Iterator[list[int]]:
         except OSError:  # not a socket, or closed in the meantime
             continue
         with ours:
-            if ours.family == socket.AF_INET and ours.getsockname()[0] == "0.0.0.0":
+            if ours.family not in (socket.AF_INET, socket.AF_INET6):
+                continue
+            if ours.getsockname()[0] in ("0.0.0.0", "::"):
+                version_4 = ours.family == socket.AF_INET
                 try:
-                    _filter(ours)
+                    _filter(ours, _FROM_THIS_MACHINE if version_4 else _FROM_NOBODY)
                 except OSError:
                     open_ports.append(ours.getsockname()[1])
 
 
-def _filter(listening: socket.socket) -> None:
-    program = ctypes.create_string_buffer(_PROGRAM, len(_PROGRAM))
-    lines = len(_PROGRAM) // struct.calcsize("HBBI")
+def _filter(listening: socket.socket, lines: tuple[Line, ...]) -> None:
+    program = ctypes.create_string_buffer(
+        b"".join(struct.pack("HBBI", *line) for line in lines)  # struct sock_filter
+    )
     # struct sock_fprog: number of lines and a pointer to them.
-    option = struct.pack("HP", lines, ctypes.addressof(program))
+    option = struct.pack("HP", len(lines), ctypes.addressof(program))
     listening.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, option)
 
 
