@@ -6,7 +6,7 @@ counted (:class:`Continuity`) and told (``events``), never hidden.
 
 from ikns.stream.address import open_source
 from ikns.stream.broadcast import Broadcast, broadcast
-from ikns.stream.continuity import Continuity
+from ikns.stream.continuity import Continuity, Counts
 from ikns.stream.faults import Faults, inject
 from ikns.stream.frame import Event, Feed, Frame
 from ikns.stream.lsl_outlet import LslOutlet
@@ -15,6 +15,7 @@ from ikns.stream.source import Source
 __all__ = [
     "Broadcast",
     "Continuity",
+    "Counts",
     "Event",
     "Faults",
     "Feed",
