@@ -25,7 +25,9 @@ HEAVY = {
     "matplotlib",
     "casadi",
     "pylsl",
+    "qtm_rt",
     "dynamixel_sdk",
+    "serial",
 }
 
 

@@ -27,6 +27,11 @@ ONLY_IN = {
     "meshcat": {"view"},
     "numba": {"_kernels"},
     "casadi": {"symbolic"},
+    "dynamixel_sdk": {"finger"},
+    "pylsl": {"stream"},
+    "qtm_rt": {"stream"},
+    "serial": {"finger"},
+    "vicon_dssdk": {"stream"},
     "typer": {"cli"},
     "rich": {"cli"},
 }
