@@ -1,4 +1,8 @@
-"""``ikns calibrate``: static trial and explorations in, subject folder out."""
+"""``ikns calibrate``: static trial and explorations in, subject folder out.
+
+They come from files or, with ``--live``, from cameras and a person who is told what to
+do; after that both go the same way.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import ikns
+from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import AsJson, Force, MarkerSetName
 from ikns.cli.output import notes, progress, show, table
 from ikns.errors import InvalidInput
@@ -17,15 +22,47 @@ from ikns.output_folder import check_output_folder
 __all__ = ["calibrate", "calibration_parts"]
 
 
+#: Options that only a live calibration knows.
+_LIVE_ONLY = (
+    "source",
+    "recordings",
+    "static_seconds",
+    "free_seconds",
+    "point_seconds",
+    "countdown",
+    "resume",
+    "auto",
+)
+
+
 def calibrate(
-    static: Annotated[
-        Path, typer.Option(help="Recording of the person standing still.")
-    ],
-    exploration: Annotated[
-        list[Path],
-        typer.Option(help="Recordings of the hand at the points, one or more."),
-    ],
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="Subject folder to write.")],
+    static: Annotated[
+        Path | None, typer.Option(help="Recording of the person standing still.")
+    ] = None,
+    exploration: Annotated[
+        list[Path] | None,
+        typer.Option(help="Recordings of the hand at the points, one or more."),
+    ] = None,
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="Record them now, from --source, with prompts."),
+    ] = False,
+    source: Annotated[
+        str | None,
+        typer.Option(help="replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST."),
+    ] = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="Folder for what is recorded live; SUBJECT-recordings."),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with recordings that exist.")
+    ] = False,
+    auto: Annotated[
+        bool, typer.Option("--auto", help="Live without keys: follow every verdict.")
+    ] = False,
     marker_set: MarkerSetName = "oxford24",
     side: Annotated[
         Literal["right", "left", "both"], typer.Option(help="Arm of the task.")
@@ -37,6 +74,16 @@ def calibrate(
     mass: Annotated[float | None, typer.Option(help="Body mass, kg.")] = None,
     sex: Annotated[str | None, typer.Option(help="'female' or 'male'.")] = None,
     points: Annotated[int, typer.Option(help="PCA points.")] = 10,
+    static_seconds: Annotated[
+        float, typer.Option(help="Live: standing still, s.")
+    ] = 5.0,
+    free_seconds: Annotated[
+        float, typer.Option(help="Live: free exploration, s.")
+    ] = 60.0,
+    point_seconds: Annotated[float, typer.Option(help="Live: each point, s.")] = 5.0,
+    countdown: Annotated[
+        float, typer.Option(help="Live: before each recording, s.")
+    ] = 3.0,
     n_dof: Annotated[int, typer.Option(help="Degrees of freedom to control.")] = 1,
     max_hand_speed: Annotated[
         float, typer.Option(help="A slower hand is still, m/s.")
@@ -57,7 +104,11 @@ def calibrate(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Scale the body, learn the null-space map and write a subject folder."""
+    """Scale the body, learn the null-space map and write a subject folder.
+
+    From recordings (--static, --exploration) or live: 5 s standing still, a minute of
+    free exploration, then the hand held at ten points while the elbow moves.
+    """
     from ikns.subject import FILES
 
     if side == "both" and clavicle:
@@ -70,6 +121,7 @@ def calibrate(
             f"expected --stature, --mass and --sex together or none of them, found "
             f"only {' and '.join(given)}."
         )
+    _check_where_from(context, live=live)
     check_output_folder(out, FILES, force=force)
     # Three times None is none of them.
     generic = (
@@ -77,6 +129,31 @@ def calibrate(
         if stature is None or mass is None or sex is None
         else ikns.Skeleton.from_anthropometry(stature, mass, sex)
     )
+    takes: list[dict[str, Any]] = []
+    if live:
+        static, exploration, takes = record_live(
+            LiveOptions(
+                source=source or "",
+                recordings=recordings or out.with_name(f"{out.name}-recordings"),
+                points=points,
+                static_seconds=static_seconds,
+                free_seconds=free_seconds,
+                point_seconds=point_seconds,
+                countdown=countdown,
+                resume=resume,
+                auto=auto,
+            ),
+            generic=generic,
+            marker_set=marker_set,
+            chain=chain,
+            n_dof=n_dof,
+            max_hand_speed=max_hand_speed,
+            min_static=min_static,
+            min_still=min_still,
+        )
+        points = len(exploration)
+    assert static is not None
+    assert exploration is not None
     with progress() as report:
         subject = ikns.calibrate(
             ikns.read(static),
@@ -95,11 +172,38 @@ def calibrate(
         )
     subject.save(out, force=force)
     show(
-        {"subject": out} | subject.report,
+        {"subject": out} | subject.report | ({"takes": takes} if live else {}),
         *calibration_parts(subject.report),
         f"Wrote {out}",
         as_json=as_json,
     )
+
+
+def _check_where_from(context: typer.Context, *, live: bool) -> None:
+    """Make sure that either files or a source are given, and not both."""
+    given = {
+        name
+        for name in context.params
+        if (origin := context.get_parameter_source(name)) and origin.name != "DEFAULT"
+    }
+    if live:
+        files = [f"--{name}" for name in ("static", "exploration") if name in given]
+        if files:
+            raise InvalidInput(
+                f"--live records what {' and '.join(files)} would name; give one or "
+                "the other."
+            )
+        if "source" not in given:
+            raise InvalidInput("--live needs the --source of the markers.")
+        return
+    alone = [f"--{n.replace('_', '-')}" for n in _LIVE_ONLY if n in given]
+    if alone:
+        raise InvalidInput(f"{' and '.join(alone)} needs --live.")
+    missing = [f"--{n}" for n in ("static", "exploration") if n not in given]
+    if missing:
+        raise InvalidInput(
+            f"expected {' and '.join(missing)}, or --live with a --source."
+        )
 
 
 def calibration_parts(report: dict[str, Any]) -> list[Any]:

@@ -1,0 +1,1 @@
+"""Experiments with a person in front of the cameras, step by step."""

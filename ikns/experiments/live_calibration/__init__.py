@@ -1,0 +1,43 @@
+"""The calibration protocol with a person in front of live cameras.
+
+`protocol` is the order of steps, without a screen or a clock; `verdict` says after each
+step whether it is good enough; `guide` where the hand should go next; `folder` keeps
+every recording; `procedure` ties them to a source of frames.
+"""
+
+from ikns.experiments.live_calibration.folder import RecordingsFolder
+from ikns.experiments.live_calibration.guide import Guide, in_words
+from ikns.experiments.live_calibration.judge import Judge
+from ikns.experiments.live_calibration.procedure import (
+    Status,
+    accepted_recordings,
+    carry_out,
+    check_labels,
+    recall,
+)
+from ikns.experiments.live_calibration.protocol import (
+    Change,
+    Key,
+    LiveProtocol,
+    Step,
+    paper_steps,
+)
+from ikns.experiments.live_calibration.verdict import Verdict
+
+__all__ = [
+    "Change",
+    "Guide",
+    "Judge",
+    "Key",
+    "LiveProtocol",
+    "RecordingsFolder",
+    "Status",
+    "Step",
+    "Verdict",
+    "accepted_recordings",
+    "carry_out",
+    "check_labels",
+    "in_words",
+    "paper_steps",
+    "recall",
+]

@@ -1,0 +1,154 @@
+"""Is a stay at a point good enough? Hand still, elbow moving, and a new place."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.calibration import elbow_reference, track_chain
+from ikns.compare.leak import slopes
+from ikns.errors import IknsError
+from ikns.experiments.live_calibration.measures import (
+    median,
+    millimeters,
+    missing_percent,
+    tracking_fault,
+)
+from ikns.experiments.live_calibration.verdict import ONE_PLACE, Verdict
+from ikns.motion import chain_joints
+from ikns.nullspace_map import MapWarning, NullSpaceMap, still
+from ikns.recording import Recording
+from ikns.skeleton import Skeleton
+
+__all__ = ["judge_point"]
+
+Array = NDArray[np.float64]
+
+#: Least share of samples with the hand still. A virtual person who holds the hand, with
+#: soft tissue and all, has 0.47 at the worst of ten points; a quarter of 5 s is more
+#: than twice what a point needs.
+STEADY_SHARE = 0.25
+#: Least motion along Z, rad: noise of a joint angle is about 0.5 deg, so c would carry
+#: more than 5 % of noise.
+LEAST_RANGE = math.radians(10.0)
+
+
+def judge_point(
+    recording: Recording,
+    skeleton: Skeleton,
+    *,
+    chain: str,
+    n_dof: int = 1,
+    variance: float = 0.8,
+    max_hand_speed: float = 0.05,
+    min_still: float = 0.5,
+    earlier: Mapping[str, Array] | None = None,
+) -> Verdict:
+    """Judge a stay at a point: hand still, elbow moving, one freedom, a new place.
+
+    Directions and ranges come from a map of this one point, the code that the
+    calibration itself uses.
+
+    Parameters
+    ----------
+    recording : Recording
+    skeleton : Skeleton
+        The person's.
+    chain : str
+        See :data:`ikns.motion.CHAINS`.
+    n_dof, variance, max_hand_speed, min_still
+        Of :func:`ikns.calibrate`.
+    earlier : mapping of str to (3,) array
+        Points accepted so far, thorax frame, m.
+    """
+    values: dict[str, Any] = {
+        "seconds": len(recording.time) / recording.rate,
+        "missing_percent": missing_percent(recording, skeleton),
+    }
+    try:
+        motion = track_chain(skeleton, recording, chain)
+    except IknsError as error:
+        return Verdict(False, False, str(error), values)
+    gate = still(motion, chain, max_hand_speed=max_hand_speed)
+    known = np.isfinite(motion.hand_speed(chain))
+    steady = gate.sum() / max(1, known.sum())
+    values |= {
+        "still_percent": 100 * float(steady),
+        "samples": int(gate.sum()),
+        "residual_mm": millimeters(median(motion.residual)),
+    }
+    # As in the calibration, which leaves a point with fewer out.
+    enough = max(int(np.ceil(min_still * recording.rate)), len(chain_joints(chain)) + 1)
+    reason = tracking_fault(motion, known)
+    if gate.sum() < enough:
+        speed = median(motion.hand_speed(chain))
+        return Verdict(
+            False,
+            False,
+            reason
+            or f"The hand was not steady: {gate.sum()} samples below "
+            f"{max_hand_speed:g} m/s of the {enough} needed, its median speed "
+            f"{speed:.2f} m/s.",
+            values,
+        )
+    x, q = motion.place(chain)[gate], motion.chain_angles(chain)[gate]
+    place = x.mean(axis=0)
+    learned = NullSpaceMap(
+        1,
+        n_dof=n_dof,
+        variance=variance,
+        reference=elbow_reference(
+            skeleton, motion.angles[gate].mean(axis=0), chain, n_dof=n_dof
+        ),
+        min_samples=1,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MapWarning)
+        learned.fit(x, q)
+    width = (learned.upper_ - learned.lower_)[0]
+    c = np.reshape(learned.control_signal(q, x), (len(q), n_dof))
+    leak = np.linalg.norm(slopes(c, x), axis=1)
+    components = int(learned.n_components_[0])
+    values |= {
+        "components": components,
+        "range_deg": np.degrees(width).round(1).tolist(),
+        "leak_mm_per_c": np.round(1e3 * leak, 1).tolist(),
+    }
+    apart = {
+        name: float(np.linalg.norm(place - p)) for name, p in (earlier or {}).items()
+    }
+    near = min(apart, key=lambda name: apart[name]) if apart else ""
+    values["nearest"] = near or None
+    values["nearest_cm"] = 100 * apart[near] if near else None
+    if reason:
+        pass
+    elif steady < STEADY_SHARE:
+        reason = (
+            f"The hand was steady in {100 * steady:.0f} % of the samples only, "
+            f"expected {100 * STEADY_SHARE:.0f} % or more."
+        )
+    elif components > n_dof:
+        reason = (
+            f"It took {components} components, so more moved than the elbow: the hand "
+            "turned or the shoulder went along."
+        )
+    elif width.min() < LEAST_RANGE:
+        reason = (
+            f"The elbow hardly moved: {math.degrees(width.min()):.0f} deg along Z, "
+            f"expected at least {math.degrees(LEAST_RANGE):.0f} deg."
+        )
+    elif not leak.max() < ONE_PLACE:
+        travel = millimeters(leak.max())
+        reason = f"The hand went with the elbow, {travel:.0f} mm from end to end."
+    elif near and apart[near] < ONE_PLACE:
+        reason = (
+            f"It is the place of {near}, {100 * apart[near]:.0f} cm away, expected at "
+            f"least {100 * ONE_PLACE:.0f} cm."
+        )
+    words = reason or "The hand was steady and the elbow moved."
+    return Verdict(not reason, True, words, values, place=place)

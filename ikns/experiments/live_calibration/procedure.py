@@ -1,0 +1,375 @@
+"""From a source of frames to accepted recordings: protocol, judge and folder together.
+
+Time is the device's clock while frames come, so a recording played at full speed goes
+through the protocol as the person did; between frames it is this machine's.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ikns.calibration import sight_needs
+from ikns.errors import MarkerMismatch, NotEnoughData, StreamError
+from ikns.experiments.live_calibration.folder import RecordingsFolder
+from ikns.experiments.live_calibration.guide import Guide, HandTracker, in_words
+from ikns.experiments.live_calibration.judge import Judge
+from ikns.experiments.live_calibration.protocol import Change, Key, LiveProtocol, Step
+from ikns.experiments.live_calibration.verdict import Verdict
+from ikns.files import read
+from ikns.marker_set import MarkerSet
+from ikns.skeleton import Skeleton
+from ikns.stream import Frame, Source
+
+__all__ = ["Status", "accepted_recordings", "carry_out", "check_labels", "recall"]
+
+#: Called with a change, the verdict where there is one, and where the hand should go.
+OnChange = Callable[[Change, Verdict | None, str], None]
+
+#: Seconds to wait for a frame before looking at the keys again.
+_WAIT = 0.05
+#: A device's clock that jumps by more between frames is not followed, s.
+_JUMP = 2.0
+
+
+@dataclass(frozen=True)
+class Status:
+    """How it stands, for a line on a screen.
+
+    Parameters
+    ----------
+    state : str
+        Of the protocol.
+    step : Step
+    seconds_left : float
+        Of the countdown or the recording.
+    seen, expected : int
+        Markers of the set in the last frame, and how many there are.
+    silence : float
+        Since the last frame, s.
+    hand_speed : float
+        Speed of the hand in the thorax frame, m/s; NaN while unknown.
+    to_go : float
+        Distance of the hand from the suggested place, m; NaN without one.
+    way : str
+        Which way the hand has to go, in words.
+    """
+
+    state: str
+    step: Step
+    seconds_left: float
+    seen: int
+    expected: int
+    silence: float
+    hand_speed: float
+    to_go: float
+    way: str
+
+
+def check_labels(
+    source: Source, marker_set: str, chain: str, *, generic: Skeleton
+) -> None:
+    """Make sure that every marker of the thorax and of the chain can come.
+
+    Markers of the static trial alone may be missing, and those of an arm that takes no
+    part.
+
+    Raises
+    ------
+    MarkerMismatch
+        With the labels that are missing.
+    """
+    worn = MarkerSet.load(marker_set).without_static()
+    needed = sorted(
+        column
+        for own, _ in sight_needs(generic.wearing(worn), chain).values()
+        for column in own
+    )
+    columns = worn.columns(source.labels)
+    missing = [worn.labels[i] for i in needed if columns[i] < 0]
+    if missing:
+        raise MarkerMismatch(
+            f"{source.name}: expected markers {', '.join(missing)} of {worn.name}, "
+            f"found only {', '.join(source.labels)}."
+        )
+
+
+def recall(judge: Judge, folder: RecordingsFolder, steps: Sequence[Step]) -> None:
+    """Teach the judge what was accepted before."""
+    accepted = folder.accepted
+    for step in steps:
+        if step.name in accepted:
+            judge.accept(step, judge.judge(step, read(accepted[step.name])))
+
+
+def accepted_recordings(
+    folder: RecordingsFolder, steps: Sequence[Step]
+) -> tuple[Path, list[Path]]:
+    """Return the static trial and the points to calibrate from.
+
+    Raises
+    ------
+    NotEnoughData
+        When there is no static trial, or there are fewer points than a map needs: 4,
+        or all where fewer were asked for.
+    """
+    accepted = folder.accepted
+    static = [s for s in steps if s.kind == "static" and s.name in accepted]
+    asked = [s for s in steps if s.kind == "point"]
+    points = [s for s in asked if s.name in accepted]
+    need = min(4, len(asked))
+    if not static or len(points) < need:
+        raise NotEnoughData(
+            f"{folder.path}: expected an accepted static trial and at least {need} "
+            f"accepted points, found {'a' if static else 'no'} static trial and "
+            f"{len(points)} of {len(asked)} points; the recordings stay, so go on with "
+            "--resume."
+        )
+    return accepted[static[0].name], [accepted[step.name] for step in points]
+
+
+def carry_out(
+    source: Source,
+    protocol: LiveProtocol,
+    judge: Judge,
+    folder: RecordingsFolder,
+    *,
+    n_points: int,
+    keys: Callable[[bool], Iterable[Key]] = lambda waiting: (),
+    on_change: OnChange = lambda change, verdict, where: None,
+    on_status: Callable[[Status], None] | None = None,
+    status_every: float = 0.1,
+    patience: float = 10.0,
+) -> None:
+    """Go through the protocol until it is done or stopped.
+
+    Parameters
+    ----------
+    source : Source
+    protocol : LiveProtocol
+        Not begun yet.
+    judge : Judge
+        That knows what was accepted before, see :func:`recall`.
+    folder : RecordingsFolder
+    n_points : int
+        Points in all, for the places to suggest.
+    keys : callable
+        Called with whether only a key goes on; returns the keys that were pressed.
+    on_change : callable
+        Called with every change, the verdict where there is one, and words for where
+        the hand should go.
+    on_status : callable, optional
+        Called with a :class:`Status` about every `status_every` seconds.
+    patience : float
+        Seconds without a frame after which nobody waits any longer where no key could
+        end the wait.
+
+    Raises
+    ------
+    StreamError
+        When the source ends, or falls silent with nobody at the keys.
+    """
+    _Run(source, protocol, judge, folder, n_points, on_change).go(
+        keys, on_status, status_every, patience
+    )
+
+
+class _Run:
+    """State of one way through the protocol."""
+
+    def __init__(
+        self,
+        source: Source,
+        protocol: LiveProtocol,
+        judge: Judge,
+        folder: RecordingsFolder,
+        n_points: int,
+        on_change: OnChange,
+    ) -> None:
+        self._source, self._protocol = source, protocol
+        self._judge, self._folder, self._n_points = judge, folder, n_points
+        self._on_change = on_change
+        self._verdict: Verdict | None = None
+        self._clock = _Clock()
+        self._frame: Frame | None = None
+        self._screen = _Screen(source, judge, n_points)
+
+    def go(
+        self,
+        keys: Callable[[bool], Iterable[Key]],
+        on_status: Callable[[Status], None] | None,
+        status_every: float,
+        patience: float,
+    ) -> None:
+        protocol, source = self._protocol, self._source
+        self._handle(protocol.begin(0.0))
+        shown = -math.inf
+        while not protocol.over:
+            for key in keys(protocol.waiting):
+                self._handle(protocol.key(key, self._clock.now))
+            if protocol.over:
+                break
+            frame = source.read(_WAIT)
+            self._clock.advance(frame)
+            if frame is not None:
+                self._frame = frame
+                self._handle(protocol.frame(frame, self._clock.now))
+            else:
+                self._handle(protocol.tick(self._clock.now))
+                self._wait(patience)
+            if on_status and not protocol.over:
+                if time.monotonic() - shown >= status_every:
+                    shown = time.monotonic()
+                    on_status(self._screen.status(protocol, self._frame, self._clock))
+
+    def _wait(self, patience: float) -> None:
+        protocol, source = self._protocol, self._source
+        step = protocol.step.name if protocol.step else "the end"
+        if source.ended and not protocol.waiting and not protocol.over:
+            raise StreamError(
+                f"{source.name}: ended at {step}; what was recorded is in "
+                f"{self._folder.path}, so go on with --resume."
+            )
+        if protocol.auto and self._clock.silence > patience:
+            raise StreamError(
+                f"{source.name}: no frame for {patience:g} s at {step}; what was "
+                f"recorded is in {self._folder.path}, so go on with --resume."
+            )
+        if source.ended:
+            time.sleep(_WAIT)
+
+    def _handle(self, changes: list[Change]) -> None:
+        while changes:
+            change, *changes = changes
+            step = change.step
+            if step is not None and change.what in ("accepted", "redo", "skipped"):
+                if self._verdict is not None:
+                    if change.what == "accepted":
+                        self._judge.accept(step, self._verdict)
+                    self._folder.decide(step, change.what, self._verdict)
+            if change.what == "stopped":
+                self._verdict = None
+            self._on_change(change, self._verdict, self._screen.where(step))
+            if change.what in ("accepted", "redo", "skipped"):
+                self._verdict = None
+            if change.what == "judging":
+                changes += self._settle(change)
+
+    def _settle(self, change: Change) -> list[Change]:
+        """Keep the take, then judge it: a judge that fails loses nothing."""
+        protocol, step = self._protocol, change.step
+        assert step is not None
+        take = protocol.take
+        if take is not None and not protocol.kept:
+            take = self._folder.keep(step, take)
+        verdict = self._judge.judge(step, take)
+        self._verdict = verdict
+        return protocol.judged(
+            keep=verdict.keep, usable=verdict.usable, now=change.time
+        )
+
+
+class _Clock:
+    """The device's clock from the first frame on, this machine's between frames."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self._frame: Frame | None = None
+        self._at_frame = 0.0
+        self._heard = time.monotonic()
+
+    @property
+    def silence(self) -> float:
+        """Since the last frame, s of this machine."""
+        return time.monotonic() - self._heard
+
+    def advance(self, frame: Frame | None) -> None:
+        """Go on to a frame, or to the present where none came."""
+        if frame is None:
+            self.now = max(self.now, self._at_frame + self.silence)
+            return
+        if self._frame is not None:
+            step = frame.device_time - self._frame.device_time
+            usual = 0 <= step <= max(_JUMP, 2 * self.silence)
+            passed = step if usual else self.silence
+            self.now = max(self.now, self._at_frame + passed)
+        self._frame, self._at_frame = frame, self.now
+        self._heard = time.monotonic()
+
+
+class _Screen:
+    """What the experimenter sees between changes."""
+
+    def __init__(self, source: Source, judge: Judge, n_points: int) -> None:
+        self._labels, self._judge, self._n_points = source.labels, judge, n_points
+        self._worn = MarkerSet.load(judge.marker_set).without_static()
+        self._tracker: tuple[Skeleton, HandTracker] | None = None
+        self._guide: tuple[object, Guide] | None = None
+        self._before: tuple[float, np.ndarray] | None = None
+
+    def guide(self) -> Guide | None:
+        """Places to suggest, once there was a free exploration."""
+        explored = self._judge.explored
+        if explored is None:
+            return None
+        if self._guide is None or self._guide[0] is not explored:
+            self._guide = (explored, Guide(explored, self._n_points))
+        return self._guide[1]
+
+    def where(self, step: Step | None) -> str:
+        """Where the hand should be, in words; empty where nobody knows."""
+        guide = self.guide()
+        if guide is None or step is None or step.kind != "point":
+            return ""
+        return guide.words(_number(step))
+
+    def status(
+        self, protocol: LiveProtocol, frame: Frame | None, clock: _Clock
+    ) -> Status:
+        """Look at the last frame."""
+        step = protocol.step
+        assert step is not None
+        seen, speed, to_go, way = 0, math.nan, math.nan, ""
+        if frame is not None:
+            markers = self._worn.pick(self._labels, frame.markers)
+            seen = int(np.isfinite(markers).all(axis=1).sum())
+            place = self._place(frame)
+            if place is not None:
+                if self._before and frame.device_time > self._before[0]:
+                    moved = float(np.linalg.norm(place - self._before[1]))
+                    speed = moved / (frame.device_time - self._before[0])
+                self._before = (frame.device_time, place)
+                guide = self.guide()
+                if guide is not None and step.kind == "point":
+                    offset = guide.places[_number(step)] - place
+                    to_go, way = float(np.linalg.norm(offset)), in_words(offset)
+        return Status(
+            protocol.state,
+            step,
+            protocol.seconds_left,
+            seen,
+            len(self._worn.labels),
+            clock.silence,
+            speed,
+            to_go,
+            way,
+        )
+
+    def _place(self, frame: Frame) -> np.ndarray | None:
+        skeleton = self._judge.skeleton
+        if skeleton is None:
+            return None
+        if self._tracker is None or self._tracker[0] is not skeleton:
+            tracker = HandTracker(skeleton, self._judge.chain, self._labels)
+            self._tracker = (skeleton, tracker)
+        return self._tracker[1].place(frame.markers)
+
+
+def _number(step: Step) -> int:
+    """Return the number of a point, from 0."""
+    return int(step.name.rsplit("_", 1)[-1]) - 1
