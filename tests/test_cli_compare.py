@@ -1,6 +1,7 @@
 """``ikns compare``: everything in JSON, a table that fits a page, a picture."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,12 @@ def compare(files: Path, *rest: str) -> list[str]:
 def result(files: Path, tmp_path_factory: pytest.TempPathFactory) -> dict:
     folder = tmp_path_factory.mktemp("compare")
     picture, out = folder / "picture.png", folder / "result.json"
-    reaches = ["--reaches", str(files / "points.c3d")]
-    argv = compare(files, *reaches, "--figure", str(picture), "--simulated", "--json")
+    # As simulated recordings come: with their truth beside them.
+    beside = tmp_path_factory.mktemp("simulated")
+    shutil.copy(files / "points.c3d", beside)
+    (beside / "truth.json").write_text('{"simulated": true}')
+    reaches = ["--reaches", str(beside / "points.c3d")]
+    argv = compare(files, *reaches, "--figure", str(picture), "--json")
     with out.open("w") as stream, pytest.MonkeyPatch.context() as patch:
         patch.setattr("sys.stdout", stream)
         assert main(argv) == 0
@@ -106,7 +111,7 @@ def test_a_picture_is_only_overwritten_by_force(
 @pytest.mark.parametrize(
     ("rest", "said"),
     [
-        (["--figure", "picture.gif"], ".png or .svg"),
+        (["--figure", "picture.gif"], ".png, .svg, .pdf"),
         (["--figure", "nowhere/picture.png"], "nowhere"),
         (["--intervals", "-1"], "--intervals"),
         (["--coordinates", "polar"], "polar"),

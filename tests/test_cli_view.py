@@ -89,7 +89,7 @@ def test_what_is_known_to_be_simulated_is_called_so(
         (tmp_path / "summary.json").write_text('{"simulated": true}')
     else:  # as simulated recordings have it beside them
         (tmp_path / "free.c3d").write_bytes((files / "free.c3d").read_bytes())
-        (tmp_path / "truth.json").write_text("{}")
+        (tmp_path / "truth.json").write_text('{"simulated": true}')
         argv.insert(2, str(tmp_path / "free.c3d"))
     out = tmp_path / "view.html"
     assert main([*argv, "--out", str(out)]) == 0

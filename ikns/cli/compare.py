@@ -20,8 +20,10 @@ from ikns.cli.comparison_tables import (
     pooled_table,
 )
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
-from ikns.cli.output import notes, progress, refuse_overwriting, show, table
-from ikns.errors import InvalidInput, NotEnoughData, naming
+from ikns.cli.output import notes, progress, show, table
+from ikns.cli.picture import refuse_picture, write_picture
+from ikns.cli.simulated import is_simulated
+from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
     from ikns.compare import NullSpaceComparison
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["compare", "comparison_rows", "comparison_table"]
 
 _CLAVICLE = "_clavicle"
-_PICTURES = (".png", ".svg")
 
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
@@ -58,11 +59,8 @@ def compare(
         Path | None, typer.Option(help="Recording of natural reaches, for crosstalk.")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Picture to write, .png or .svg.")
+        Path | None, typer.Option(help="Picture to write, .png, .svg or .pdf.")
     ] = None,
-    simulated: Annotated[
-        bool, typer.Option("--simulated", help="Say so in tables and picture.")
-    ] = False,
     intervals: Annotated[
         int, typer.Option(help="Resamples for the 95 % intervals; 0 for none.", min=0)
     ] = 400,
@@ -79,13 +77,7 @@ def compare(
     from ikns.calibration import track_chain
     from ikns.compare import COORDINATES, motion_crosstalk
 
-    if figure is not None:
-        if figure.suffix not in _PICTURES:
-            raise InvalidInput(
-                f"{figure}: expected a picture's name that ends in "
-                f"{' or '.join(_PICTURES)}."
-            )
-        refuse_overwriting(figure, force=force)
+    refuse_picture(figure, force=force)
     calibrated = ikns.Subject.load(subject)
     learned, own = calibrated.null_space_map, calibrated.chain
     with progress() as report:
@@ -120,6 +112,9 @@ def compare(
             if reaches is not None:
                 raise
             warned.append(f"no crosstalk: {error}")
+    simulated = is_simulated(
+        calibrated, subject, [p for p in (recording, reaches) if p is not None]
+    )
     plain = [
         each for each in found if each[0][0] == own and each[0][2] == found[0][0][2]
     ]
@@ -215,17 +210,14 @@ def _findings(
 
 
 def _draw(path: Path, found: list[Named], across: Any, *, simulated: bool) -> None:
-    """Write the figure; it appears whole or not at all."""
-    from ikns.cli.output import write_bytes
     from ikns.view.comparison import comparison_figure
-    from ikns.view.render import png, svg
 
     drawn = comparison_figure(
         {f"hand {HELD[names[1]]} held": each for names, each in found},
         simulated=simulated,
         crosstalk=across,
     )
-    write_bytes(path, svg(drawn) if path.suffix == ".svg" else png(drawn))
+    write_picture(path, drawn)
 
 
 def comparison_rows(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
-from ikns.cli.output import refuse_overwriting
+from ikns.cli.output import refuse_overwriting, write_bytes
 from ikns.errors import InvalidInput
 
 __all__ = ["refuse_picture", "write_picture"]
@@ -36,9 +35,4 @@ def write_picture(path: Path, figure: Any) -> None:
     from ikns.view.render import pdf, png, svg
 
     draw = {".png": png, ".svg": svg, ".pdf": pdf}[path.suffix.lower()]
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(draw(figure))
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    write_bytes(path, draw(figure))

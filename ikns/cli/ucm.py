@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,6 +11,7 @@ import ikns
 from ikns.cli.options import AsJson, Force, SubjectFolder
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
+from ikns.cli.simulated import is_simulated
 from ikns.cli.ucm_designs import over_points, over_time
 from ikns.errors import InvalidInput
 
@@ -80,7 +80,7 @@ def ucm(
         surrogates=surrogates,
         seed=seed,
     )
-    simulated = _simulated(recordings)
+    simulated = is_simulated(calibrated, subject, recordings)
     if figure is not None:
         from ikns.view.variance_split import variance_split_figure
 
@@ -103,15 +103,3 @@ def ucm(
         *([] if figure is None else [f"Wrote {figure}"]),
         as_json=as_json,
     )
-
-
-def _simulated(recordings: list[Path]) -> bool:
-    """Whether the truth of a virtual subject lies beside any of the recordings."""
-    for folder in {path.parent for path in recordings}:
-        try:
-            truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue
-        if isinstance(truth, dict) and truth.get("simulated"):
-            return True
-    return False

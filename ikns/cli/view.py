@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import webbrowser
 from pathlib import Path
@@ -17,9 +16,11 @@ from ikns.cli.output import (
     refuse_overwriting,
     show,
     table,
+    write_bytes,
     write_text,
 )
-from ikns.errors import FileError, InvalidInput
+from ikns.cli.simulated import is_simulated
+from ikns.errors import InvalidInput
 
 __all__ = ["view"]
 
@@ -58,7 +59,7 @@ def view(
             raise InvalidInput(f"{png}: expected two files, found one for both.")
     person = ikns.Subject.load(subject)
     learned, row = person.null_space_map, None if point is None else point - 1
-    simulated = _simulated(person, subject, recording)
+    simulated = is_simulated(person, subject, [] if recording is None else [recording])
     name = subject.resolve().name
     frames = None if recording is None else ikns.read(recording)
 
@@ -91,7 +92,7 @@ def view(
     write_text(out, page)
     remarks = []
     if png is not None and picture is not None:
-        _write_bytes(png, picture.png)
+        write_bytes(png, picture.png)
         if picture.note:
             remarks.append(picture.note)
             sys.stderr.write(f"ikns: {picture.note}.\n")
@@ -130,32 +131,3 @@ def view(
         f"Wrote {out}" if png is None else f"Wrote {out} and {png}",
         as_json=as_json,
     )
-
-
-def _simulated(person: ikns.Subject, folder: Path, recording: Path | None) -> bool:
-    """Whether a virtual subject is known to be behind it.
-
-    The calibration may say so; `ikns demo` says so in the ``summary.json`` beside the
-    subject's folder, and a simulated recording has its ``truth.json`` beside it.
-    """
-    if person.report.get("simulated"):
-        return True
-    if recording is not None and (recording.absolute().parent / "truth.json").is_file():
-        return True
-    try:
-        text = (folder.absolute().parent / "summary.json").read_text(encoding="utf-8")
-        summary = json.loads(text)
-    except (OSError, ValueError):
-        return False
-    return isinstance(summary, dict) and summary.get("simulated") is True
-
-
-def _write_bytes(path: Path, data: bytes) -> None:
-    part = path.with_name(f".{path.name}.part")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
-    finally:
-        part.unlink(missing_ok=True)
