@@ -86,6 +86,18 @@ def test_a_frame_that_is_not_new_does_not_keep_the_finger_going(subject, explori
     assert states[-1] == "safe"
 
 
+def test_a_frozen_picture_does_not_keep_the_finger_going(subject, exploring):
+    made = controller(subject)
+    markers = frames(subject, exploring)[10].copy()
+    markers[3] = np.nan  # hidden markers do not make it a new picture
+    made.frame(markers, 0.0, 0.0)
+    made.machine.activate(0.0)
+    # The device goes on counting time, as a server does whose cameras hang.
+    states = [made.frame(markers, k / 50, k / 50).state for k in range(1, 40)]
+    assert states[4:7] == ["active", "holding", "holding"]
+    assert states[-1] == "safe"
+
+
 def test_a_device_clock_that_starts_anew_is_followed(subject, exploring):
     made = controller(subject)
     markers = frames(subject, exploring)
@@ -285,6 +297,36 @@ def test_a_source_of_other_markers_is_refused(subject):
     with source(other) as stream, pytest.raises(MarkerMismatch, match="found ELSE"):
         run(stream, subject, finger)
     assert finger.state().mode == "relaxed"
+
+
+def test_a_frame_may_take_no_longer_than_until_the_next_at_any_speed(
+    subject, exploring
+):
+    class Slow(SimulatedFinger):
+        def command(self, flexion):
+            time.sleep(0.005)
+            return super().command(flexion)
+
+    # 50 Hz ten times as fast leaves 2 ms a frame.
+    with source(exploring, speed=10) as stream:
+        report = run(stream, subject, Slow())
+    assert report.misses == report.frames
+
+
+def test_garbage_is_collected_before_the_finger_is_connected(subject, exploring):
+    # Collecting takes a tenth of a second and stops every thread, also one that has to
+    # keep a servo's watchdog quiet.
+    import gc
+
+    class Attentive(SimulatedFinger):
+        def connect(self):
+            self.frozen = gc.get_freeze_count()
+            super().connect()
+
+    finger = Attentive()
+    with source(exploring, speed=0) as stream:
+        run(stream, subject, finger)
+    assert finger.frozen > 0
 
 
 def test_the_collector_is_as_it_was(subject, exploring):

@@ -1,5 +1,6 @@
 import json
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -259,6 +260,20 @@ def test_a_full_disk_is_told_at_once_and_loses_nothing_once_there_is_room(tmp_pa
     assert run.lost == 0
     np.testing.assert_array_equal(read_run(session).markers, markers)
     assert check_session(session) == []
+
+
+def test_a_deleted_folder_is_told_within_a_second(tmp_path):
+    session, told = create_session(tmp_path / "s"), []
+    with begun(session, on_fault=told.append) as run:
+        run.row("markers", [0, 0, 0, *[0.0] * 6])
+        shutil.rmtree(session)
+        deadline = time.monotonic() + 20
+        while not told and time.monotonic() < deadline:
+            time.sleep(0.02)
+        run.row("markers", [1, 0, 0, *[0.0] * 6])
+    assert "it has been deleted" in told[0]
+    assert run.lost == 1
+    assert not session.exists()
 
 
 def test_a_row_costs_no_wait(tmp_path, monkeypatch):

@@ -131,3 +131,11 @@ def test_stamps_off_the_beat_are_counted_until_they_are_on_it_again() -> None:
     assert not made.uneven
     assert made.next(steady[-1] + 0.03) == before[-1] + 3
     assert made.next(steady[-1] + 5.03) == before[-1] + 503
+
+
+def test_a_frame_without_time_is_counted_but_neither_late_nor_on_time() -> None:
+    frames = [frame(0), frame(1), frame(2)]
+    nowhere = Frame(3, math.nan, 0.03, np.ones((2, 3)))
+    counts = watched([*frames, nowhere, frame(4)]).counts
+    assert (counts.received, counts.dropped, counts.late) == (5, 0, 0)
+    assert counts.jitter["largest"] == 0.0

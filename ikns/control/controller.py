@@ -1,4 +1,4 @@
-"""From a frame of markers to what a finger is asked: the live loop without clock or I/O.
+"""From a frame of markers to what a finger is asked: the live loop, no clock, no I/O.
 
 Every call says what time it is and nothing else is looked at, so the same frames at the
 same times give the same answers, bit for bit, live and replayed from a session.
@@ -119,6 +119,7 @@ class Controller:
         self._speed = OneEuro(cutoff=_SPEED_CUTOFF, beta=0.0)
         self._device_time = -math.inf
         self._hand = np.full(3, np.nan)
+        self._markers = np.empty((0, 3))
 
     @property
     def smoothing_delay(self) -> float:
@@ -135,7 +136,8 @@ class Controller:
         markers : (M, 3) array
             m in the world, in the order of the skeleton's marker set; NaN = not seen.
         device_time : float
-            On the device's clock, s. A frame that is not newer than the last shows
+            On the device's clock, s. A frame that is not newer than the last, or whose
+            markers are the last one's to the bit (cameras are never that still), shows
             nothing new and does not count.
         receive_time : float
             On the caller's monotonic clock, s.
@@ -143,11 +145,11 @@ class Controller:
         if device_time < self._device_time - _RESTART:
             self._device_time = -math.inf
         dt = device_time - self._device_time
-        new = dt > 0  # never with NaN
+        new = dt > 0 and not _same(markers, self._markers)  # never with NaN
         if not new:
             dt = math.nan
         else:
-            self._device_time = device_time
+            self._device_time, self._markers = device_time, markers.copy()
         solved = self.solver.solve(markers)
         c = float(solved.c[0])
         valid = bool(
@@ -178,3 +180,7 @@ class Controller:
             return
         if abs(wanted - self.flexion) > self.settings.dead_band or wanted in (0.0, 1.0):
             self.flexion = wanted
+
+
+def _same(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    return a.shape == b.shape and bool(((a == b) | ((a != a) & (b != b))).all())

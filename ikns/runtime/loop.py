@@ -172,7 +172,8 @@ def run(
     solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     solver.reset()
     stopped = threading.Event() if stop is None else stop
-    with _hands_on(finger), _no_collector():
+    # Collecting garbage keeps every thread waiting, a finger's among them.
+    with _no_collector(), _hands_on(finger):
         loop.begin()
         try:
             while not (stopped.is_set() or source.ended or loop.elapsed() >= duration):
@@ -200,7 +201,8 @@ class _Loop:
     ) -> None:
         self._source, self._controller = source, controller
         self._finger, self._session = finger, session
-        self._period = 1 / source.rate if source.speed else math.inf
+        pace = source.rate * source.speed
+        self._period = 1 / pace if pace else math.inf
         self._names = len(controller.solver.skeleton.joint_names)
         self._measured = math.nan
         self._first = math.nan

@@ -4,7 +4,7 @@ Rows go into a queue; a thread prints them, gives them to the system five times 
 and asks for them to be on the disk itself once a second. A process that is killed loses
 what is in the queue; a machine that loses power, a second. A row is on disk whole or
 not at all: after a fault (disk full, say) the file is cut back to its last whole row,
-rows wait in memory, and the thread tries again.
+rows wait in memory, and the thread tries again. That a file was deleted is told too.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ class _File:
         self._rows: deque[Row] = deque()
         self._descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
         self._size = os.fstat(self._descriptor).st_size
-        self._torn = False
+        self._torn = self._deleted = False
 
     def put(self, row: Row) -> None:
         if len(self._rows) >= _WAITING:
@@ -145,6 +145,9 @@ class _File:
         rows = []
         while self._rows:
             rows.append(self._rows.popleft())
+        if self._deleted:
+            self.lost += len(rows)
+            return self._fault("it has been deleted")
         try:
             if self._torn:
                 self._cut()
@@ -152,13 +155,17 @@ class _File:
                 self._append("".join(map(self._print, rows)).encode())
             if sync:
                 os.fsync(self._descriptor)
+                # Writing to a file without a name succeeds, for nobody.
+                self._deleted = os.fstat(self._descriptor).st_nlink == 0
         except OSError as error:
             self._wait_again(rows)
             with suppress(OSError):
                 self._cut()
-            reason = (error.strerror or str(error)).lower()
-            return f"{self.path}: cannot be written: {reason}"
-        return ""
+            return self._fault((error.strerror or str(error)).lower())
+        return self._fault("it has been deleted") if self._deleted else ""
+
+    def _fault(self, reason: str) -> str:
+        return f"{self.path}: cannot be written: {reason}"
 
     def close(self) -> None:
         if self._descriptor >= 0:

@@ -147,7 +147,7 @@ class Continuity:
             del self._gaps[:-_GAPS]
 
     def _time(self, frame: Frame) -> None:
-        if not self._speed:
+        if not (self._speed and math.isfinite(frame.device_time)):
             return
         delay = frame.receive_time - frame.device_time / self._speed
         if frame.receive_time >= self._window_ends:
