@@ -16,6 +16,9 @@ _BAUDS = (57600, 1000000, 115200, 2000000, 3000000, 4000000, 9600)
 _IDS = (*range(1, 11), 0)
 #: Reads wait for bytes so long at a time, seconds; the SDK itself would spin.
 _WAIT = 0.001
+_READ, _WRITE = 0x02, 0x03
+#: How long the SDK waits for an answer, seconds.
+_LATE = 0.034
 _REFUSALS = {
     1: "it failed to do so",
     2: "it does not know that instruction",
@@ -122,11 +125,12 @@ class Bus:
         FingerError
             When it is not; the sentence says what was found instead.
         """
-        number = self._ping(self.id)
-        if number is None:
-            number = self._ping(self.id)  # noise may spoil one
-        if number is None:
-            raise NoAnswer(self._nobody() if diagnose else f"{self.port}: no answer.")
+        try:
+            number = self.read("model_number")
+        except NoAnswer:
+            if not diagnose:
+                raise
+            raise NoAnswer(self._nobody()) from None
         if number not in self.model.numbers:
             raise FingerError(
                 f"{self.port}: servo {self.id} has model number {number}, but the "
@@ -150,10 +154,8 @@ class Bus:
         NoAnswer, Refused, Unplugged
         """
         start, end = self.model[first].address, self.model[last].end
-        data = self._talk(f"reading {first}", "readTxRx", start, end - start)
-        data = bytes(data)
-        if len(data) != end - start:
-            raise NoAnswer(f"{self.port}: servo {self.id} answered too short.")
+        count = end - start
+        data = self._talk(f"reading {first}", _READ, self._place(start, count), count)
         return {
             r.name: r.from_bytes(data[r.address - start : r.end - start])
             for r in self.model.registers.values()
@@ -168,9 +170,8 @@ class Bus:
         NoAnswer, Refused, Unplugged
         """
         register: Register = self.model[name]
-        data = list(register.to_bytes(value))
-        doing = f"setting {name} to {value}"
-        self._talk(doing, "writeTxRx", register.address, register.size, data)
+        data = self._place(register.address) + register.to_bytes(value)
+        self._talk(f"setting {name} to {value}", _WRITE, data, 0)
 
     def alerts(self) -> str:
         """Return what the servo complains of; empty if nothing.
@@ -186,59 +187,75 @@ class Bus:
             bits = self._bits
         return alert_text(bits, self.model.protocol) if bits else ""
 
-    def _ping(self, number: int) -> int | None:
+    def _answers(self, number: int) -> bool:
         try:
-            model, result, _ = self._packets.ping(self._port, number)
+            _, result, _ = self._packets.ping(self._port, number)
         except _lost() as error:
             raise Unplugged(f"{self.port}: {_why(error)}.") from None
         except IndexError:  # from within the SDK: the answer is shorter than it says
             self._port.is_using = False
-            return None
-        return model if result == self._success else None
+            return False
+        return bool(result == self._success)
 
     def _nobody(self) -> str:
         """Say who answers instead."""
         start = f"{self.port}: servo {self.id} does not answer at {self.baud} baud"
         for number in _IDS:
-            if number != self.id and self._ping(number) is not None:
+            if number != self.id and self._answers(number):
                 return f"{start}, but servo {number} does."
         for baud in _BAUDS:
             if baud != self.baud:
                 self._port.setBaudRate(baud)
-                if self._ping(self.id) is not None:
+                if self._answers(self.id):
                     return f"{start}, but at {baud}."
         return f"{start}; check its power, cable, id and rate."
 
-    def _talk(self, doing: str, method: str, *arguments: Any) -> Any:
-        """Say something until it is answered; return the data that came, if any."""
-        for left in reversed(range(self.tries)):
-            try:
-                *data, result, error = self._once(method, *arguments)
-                self._judge(doing, result, error)
-            except NoAnswer:
-                if not left:
-                    raise
-            else:
-                return data[0] if data else None
-        raise NoAnswer(f"{self.port}: servo {self.id} was not asked.")
+    def _place(self, *numbers: int) -> bytes:
+        size = self.model.protocol  # bytes of an address or a length
+        return b"".join(number.to_bytes(size, "little") for number in numbers)
 
-    def _once(self, method: str, *arguments: Any) -> Any:
+    def _talk(self, doing: str, instruction: int, data: bytes, count: int) -> bytes:
+        """Say something until it is answered; return the bytes that came."""
+        for _ in range(self.tries - 1):
+            try:
+                return self._once(doing, instruction, data, count)
+            except NoAnswer:
+                pass
+        return self._once(doing, instruction, data, count)
+
+    def _once(self, doing: str, instruction: int, data: bytes, count: int) -> bytes:
+        """Say something; an answer of another length is a late one to something else.
+
+        The SDK's own readTxRx would take its checksum for data.
+        """
         if self._port is None:
             raise Unplugged(f"{self.port}: the port is closed.")
+        wide, content = self.model.protocol == 2, len(data)
+        if wide:
+            packet = [0, 0, 0, 0, self.id, *(content + 3).to_bytes(2, "little")]
+        else:
+            packet = [0, 0, self.id, content + 2]
+        packet += [instruction, *data, 0, 0] if wide else [instruction, *data, 0]
+        silent = NoAnswer(f"{self.port}: servo {self.id} did not answer when {doing}.")
         try:
-            return getattr(self._packets, method)(self._port, self.id, *arguments)
-        except _lost() as error:
-            raise Unplugged(f"{self.port}: {_why(error)}.") from None
+            answer, result, error = self._packets.txRxPacket(self._port, packet)
+        except _lost() as lost:
+            raise Unplugged(f"{self.port}: {_why(lost)}.") from None
         except IndexError:  # from within the SDK: the answer is shorter than it says
             self._port.is_using = False
-            raise NoAnswer(
-                f"{self.port}: servo {self.id} sent a broken answer."
-            ) from None
-
-    def _judge(self, doing: str, result: int, error: int) -> None:
+            raise silent from None
         if result != self._success:
             self._port.is_using = False
-            raise NoAnswer(f"{self.port}: servo {self.id} did not answer when {doing}.")
+            raise silent
+        self._judge(doing, error)
+        start = 9 if wide else 5
+        length = int.from_bytes(answer[5:7], "little") - 4 if wide else answer[3] - 2
+        if length != count:
+            time.sleep(_LATE)  # the right one, too, if it comes, will be late
+            raise silent
+        return bytes(answer[start : start + count])
+
+    def _judge(self, doing: str, error: int) -> None:
         if self.model.protocol == 2:
             self.alert, number = bool(error & 0x80), error & 0x7F
             why = _REFUSALS.get(number, f"error {number}")

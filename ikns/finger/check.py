@@ -98,7 +98,7 @@ def _stays_in_range(bench: _Bench) -> None:
     limits = bench.safety.limits
     with bench.make() as finger:
         for asked in (7.0, -7.0):
-            for _, sent in bench.stream(finger, asked, 0.3):
+            for _, sent in bench.stream(finger, asked, 0.15):
                 inside = limits.lower <= sent <= limits.upper
                 _holds(inside, f"asked for {asked}, it sent {sent}")
 
@@ -109,7 +109,7 @@ def _keeps_the_rate(bench: _Bench) -> None:
         before = bench.clock()
         values = [(before, finger.command(math.nan))]
         for asked in (1.0, 0.0, 1.0):
-            values += bench.stream(finger, asked, 0.2)
+            values += bench.stream(finger, asked, 0.12)
     for (t0, y0), (t1, y1) in zip(values, values[1:], strict=False):
         most = limits.rate * (t1 - t0) * (1 + _JITTER) + finger.resolution
         most += limits.rate * _LATE  # two readings of a clock on a busy machine
@@ -122,7 +122,7 @@ def _holds_without_a_number(bench: _Bench) -> None:
     with bench.make() as finger:
         moving = bench.stream(finger, 0.5, 0.2)[-1][1]
         for asked in (math.nan, math.inf, -math.inf):
-            values = bench.stream(finger, asked, 0.2)
+            values = bench.stream(finger, asked, 0.1)
             far = max(abs(sent - moving) for _, sent in values)
             most = braking + finger.resolution + limits.rate * _LATE
             _holds(far <= most, f"asked for {asked}, it moved by {far:.3f}")
@@ -131,7 +131,7 @@ def _holds_without_a_number(bench: _Bench) -> None:
 def _follows(bench: _Bench) -> None:
     limits = bench.safety.limits
     middle = (limits.lower + limits.upper) / 2
-    enough = 1.0 / limits.rate + 2 * limits.rate / limits.acceleration + 0.5
+    enough = 1.0 / limits.rate + 2 * limits.rate / limits.acceleration + 0.3
     with bench.make() as finger:
         sent = bench.stream(finger, middle, enough)[-1][1]
         _holds(abs(sent - middle) <= finger.resolution, f"asked {middle}, sent {sent}")
@@ -160,7 +160,7 @@ def _tells_its_state(bench: _Bench) -> None:
 def _never_blocks(bench: _Bench) -> None:
     with bench.make() as finger:
         longest = 0.0
-        for _ in range(50):
+        for _ in range(20):
             bench.sleep(_PERIOD)
             began = time.monotonic()
             finger.command(0.5)
@@ -196,7 +196,7 @@ def _stays_safe_until_connected(bench: _Bench) -> None:
 def _relaxes(bench: _Bench) -> None:
     finger = bench.make()
     finger.connect()
-    bench.stream(finger, 0.5, 0.1)
+    bench.stream(finger, 0.5, 0.05)
     for _ in range(2):
         finger.relax()
         state = finger.state()
@@ -209,7 +209,7 @@ def _relaxes_after_an_exception(bench: _Bench) -> None:
     passed = False
     try:
         with finger:
-            bench.stream(finger, 0.5, 0.1)
+            bench.stream(finger, 0.5, 0.05)
             raise _Broken
     except _Broken:
         passed = True
@@ -221,7 +221,7 @@ def _connects_again(bench: _Bench) -> None:
     finger = bench.make()
     for _ in range(2):
         with finger:
-            bench.stream(finger, 0.5, 0.1)
+            bench.stream(finger, 0.5, 0.05)
             mode = finger.state().mode
             _holds(mode == "active", f"its mode is {mode}")
 

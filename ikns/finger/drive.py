@@ -24,6 +24,10 @@ _WATCHDOG_UNIT = 0.02
 _LOOK, _REOPEN = 0.1, 0.2
 _POSITION_MODE, _CURRENT_POSITION_MODE = 3, 5
 _ANSWER_ALL = 2
+_BEGINNINGS = {
+    2: ("moving", "realtime_tick", "goal_position", "profile_velocity"),
+    1: ("present_position", "goal_pwm", "profile_velocity", "goal_position"),
+}
 
 
 @dataclass(frozen=True)
@@ -143,6 +147,7 @@ class Drive:
         self.alert = ""
         self._torque = False  # as far as is known
         self._told: int | None = None
+        self._beginning = 0
         self._answered = self._looked = self._tried = -math.inf
 
     def set_up(self) -> None:
@@ -156,9 +161,7 @@ class Drive:
                 f"{bus.port}: servo {bus.id} reports {complaint}; let it rest and "
                 "switch its power off and on."
             )
-        bus.write("torque_enable", 0)
-        if bus.read("torque_enable"):
-            raise FingerError(f"{bus.port}: servo {bus.id} does not let go of torque.")
+        self._no_torque()
         if "bus_watchdog" in model:
             bus.write("bus_watchdog", 0)
         for values in (plan.kept(model), plan.volatile(model)):
@@ -271,12 +274,21 @@ class Drive:
     def _switch_off(self) -> None:
         """Torque off, read back; a servo that starts again has no watchdog error."""
         bus = self._bus
-        bus.write("torque_enable", 0)
-        if bus.read("torque_enable"):
-            raise FingerError(f"{bus.port}: servo {bus.id} does not let go of torque.")
+        self._no_torque()
         self._torque, self._told = False, None
         if "bus_watchdog" in bus.model:
             bus.write("bus_watchdog", 0)
+
+    def _no_torque(self) -> None:
+        """Switch torque off and read that it is off.
+
+        Answers carry no number, so a late one may be taken for the next. The LED is
+        read as well only to make this answer as long as no other while it runs.
+        """
+        bus = self._bus
+        bus.write("torque_enable", 0)
+        if bus.read_many("torque_enable", "led")["torque_enable"]:
+            raise FingerError(f"{bus.port}: servo {bus.id} does not let go of torque.")
 
     def _ask(self) -> None:
         values = self._measure()
@@ -302,11 +314,18 @@ class Drive:
                 self._fail(f"the servo heard nothing for {self._plan.watchdog:g} s")
 
     def _measure(self) -> FingerState:
-        """Read everything that the servo measures, at once."""
+        """Read everything that the servo measures, at once.
+
+        Where to begin changes after every failure, and with it the answer's length, so
+        that an answer to an earlier question is not taken for news.
+        """
         bus, model = self._bus, self._bus.model
-        first = "moving" if model.protocol == 2 else "present_position"
         last = "present_temperature" if model.protocol == 2 else "moving"
-        values = bus.read_many(first, last)
+        try:
+            values = bus.read_many(_BEGINNINGS[model.protocol][self._beginning], last)
+        except NoAnswer:
+            self._beginning = (self._beginning + 1) % len(_BEGINNINGS[model.protocol])
+            raise
         now = self._answered = time.monotonic()
         towards = math.copysign(1.0, self._plan.span)
         current = values.get("present_current", math.nan) * model.current_unit

@@ -129,13 +129,13 @@ class DynamixelFinger:
         self._halt()
         self._bus.close()
         self._bus.open()
+        self._bus.tries = _TRIES  # nothing depends on time yet
         try:
             self._bus.check()  # whoever else is there stays untouched
         except BaseException:
             self._bus.close()
             raise
         relax_at_exit(self)
-        self._bus.tries = _TRIES  # nothing depends on time yet
         try:
             self._drive.set_up()
             self._drive.arm()

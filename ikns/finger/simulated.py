@@ -20,7 +20,7 @@ __all__ = ["SimulatedFinger"]
 # and 1.3 A at 11.1 V): flexion per second, amperes at a standstill, seconds to follow
 # and to change speed, flexion of error at which it pushes as hard as it may.
 _SPEED, _STALL_CURRENT = 1.9, 1.3
-_FOLLOW, _SPIN, _YIELD = 0.03, 0.01, 0.04
+_FOLLOW, _SPIN, _YIELD = 0.03, 0.01, 0.1
 _FRICTION = 0.1  # share of full effort that moving costs
 _STEP = 1e-3
 #: A finger slower than this is said to rest, flexion per second.

@@ -14,6 +14,8 @@ __all__ = ["Motor"]
 _FOLLOW, _SPIN, _YIELD = 0.03, 0.01, 0.02
 # Heat, ours: degrees above the room at full effort, and seconds to get there.
 _ROOM, _HEAT, _WARM = 25.0, 60.0, 120.0
+#: A motor this slow stands still, ticks per second.
+_FRICTION = 0.01
 #: Effort beyond this share, for so many seconds, is an overload.
 _OVERLOAD, _PATIENCE = 0.95, 2.0
 _STEP = 1e-3
@@ -117,6 +119,8 @@ class Motor:
         top = self._model.speed * max_effort
         wanted = min(max(error / _FOLLOW, -top), top)
         self.velocity += (wanted - self.velocity) * min(dt / _SPIN, 1.0)
+        if abs(self.velocity) < _FRICTION and abs(wanted) < _FRICTION:
+            self.velocity = 0.0
         position = self.position + self.velocity * dt
         # An obstacle stops the horn; it does not push it back.
         low, high = self.obstacles

@@ -1,0 +1,382 @@
+"""The Dynamixel finger against a simulated servo, byte for byte, in real time.
+
+Times are bounded by what the mechanism promises and by what a busy machine may add:
+every wait below ends as soon as what is waited for is there.
+"""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from ikns.finger import DynamixelFinger, FingerError, Safety, check_finger, open_finger
+from ikns.finger.check import LAWS
+from ikns.finger.servo import Servo, Wire
+
+#: Longer than anything here takes, seconds.
+PATIENCE = 10.0
+
+
+def wait_for(condition, patience=PATIENCE):
+    """Seconds until it holds."""
+    began = time.monotonic()
+    while not condition():
+        if time.monotonic() - began > patience:
+            pytest.fail("it did not happen in time")
+        time.sleep(0.002)
+    return time.monotonic() - began
+
+
+def stream(finger, target, duration):
+    end = time.monotonic() + duration
+    sent = math.nan
+    while time.monotonic() < end:
+        sent = finger.command(target)
+        time.sleep(0.005)
+    return sent
+
+
+@pytest.fixture
+def servo():
+    return Servo("xl430", baud=1_000_000)
+
+
+@pytest.fixture
+def wire(servo, tmp_path):
+    with Wire(servo, link=tmp_path / "bus") as wire:
+        yield wire
+
+
+def finger_on(wire, **options):
+    servo = wire.servos[0]
+    options = {"model": servo.model.name, "baud": round(servo.baud)} | options
+    return DynamixelFinger(wire.port, **options)
+
+
+@pytest.mark.parametrize("model", ["xl430", "ax12"])  # Protocols 2.0 and 1.0
+def test_it_keeps_the_laws(model):
+    with Wire(Servo(model, baud=1_000_000)) as wire:
+        # A busy machine must not look like a caller that hangs.
+        report = check_finger(lambda: finger_on(wire, watchdog=1.0))
+    assert report.kept == LAWS
+
+
+def test_it_moves_the_servo_and_leaves_it_without_torque(servo, wire):
+    with finger_on(wire) as finger:
+        assert servo.torque
+        assert stream(finger, 0.9, 1.0) == pytest.approx(0.9, abs=finger.resolution)
+        # 1024 to 3072 ticks; the profile ends where it is told, to the tick.
+        wait_for(lambda: abs(servo.motor.position - (1024 + 0.9 * 2048)) < 2)
+        stream(finger, 0.9, 0.1)
+        state = finger.state()
+        assert state.flexion == pytest.approx(0.9, abs=2 * finger.resolution)
+        assert (state.mode, state.alert) == ("active", "")
+        assert state.voltage == pytest.approx(12.0, abs=0.1)  # one unit
+        assert math.isnan(state.current)  # this one measures none
+    assert not servo.torque
+    assert finger.state().mode == "relaxed"
+
+
+def test_closed_may_be_the_lower_end(servo, wire):
+    with finger_on(wire, open_ticks=3000, closed_ticks=1500) as finger:
+        stream(finger, 1.0, 1.0)
+        wait_for(lambda: abs(servo.motor.position - 1500) < 2)
+
+
+def test_connecting_does_not_move_it(servo, wire):
+    servo.motor.position = servo.motor.profile = 1500.0
+    servo.memory["goal_position"] = 3000  # left over from somebody else
+    with finger_on(wire):
+        time.sleep(0.2)
+        assert servo.motor.position == pytest.approx(1500, abs=1)
+    assert [ticks for _, ticks in servo.goals] == [1500]
+
+
+def test_limits_are_written_into_the_servo_and_only_once(servo, wire):
+    def kept():
+        names = ("min_position_limit", "max_position_limit", "pwm_limit", "drive_mode")
+        return [servo.memory[name] for name in names]
+
+    servo.memory["drive_mode"] = 8  # torque by goal alone
+    safety = Safety()
+    with finger_on(wire, open_ticks=1000, closed_ticks=2000, effort=0.4, safety=safety):
+        assert kept() == [1000, 2000, round(0.4 * 885), 0]
+        assert servo.memory["bus_watchdog"] == 15  # 0.3 s in steps of 20 ms
+        # Twice the half turn's rate, and half as much again to stay out of the way.
+        speed = servo.memory["profile_velocity"] * servo.model.velocity_unit
+        assert 3.0 * 1000 <= speed <= 3.0 * 1000 + servo.model.velocity_unit
+    assert servo.memory["bus_watchdog"] == 0
+
+
+def test_current_is_limited_where_it_is_measured():
+    servo = Servo("xm430", baud=1_000_000)
+    servo.motor.obstacles = (-math.inf, 2048.0)
+    with Wire(servo) as wire, finger_on(wire, effort=0.2) as finger:
+        stream(finger, 1.0, 0.6)
+        current = finger.state().current
+        assert servo.memory["operating_mode"] == 5
+    # A fifth of what the servo gives at most, in whole units of 2.69 mA.
+    assert current == pytest.approx(0.2 * 2.3, abs=2 * 2.69e-3)
+
+
+def test_pushing_against_something_becomes_a_light_grip(servo, wire):
+    servo.motor.obstacles = (-math.inf, 2048.0)
+    safety = Safety(stall_timeout=0.2)
+    with finger_on(wire, safety=safety) as finger:
+        stream(finger, 1.0, 1.0)
+        state = finger.state()
+        assert state.stalled
+        assert state.mode == "active"
+        assert state.sent == pytest.approx(0.5 + safety.grip, abs=2 * finger.resolution)
+
+
+def test_commands_do_not_wait_for_a_silent_bus(servo, wire):
+    with finger_on(wire) as finger:
+        wire.inject("silence")
+        longest = 0.0
+        for _ in range(40):
+            began = time.monotonic()
+            finger.command(1.0)
+            finger.state()
+            longest = max(longest, time.monotonic() - began)
+            time.sleep(0.005)
+        wire.mend()
+    # A question without an answer blocks 35 ms and four of them 140; nothing but the
+    # scheduler is waited for here.
+    assert longest < 0.1
+
+
+#: What must be true of the servo, and how long it may take beyond the finger's own
+#: time-out: the servo's watchdog, or two questions of 35 ms each.
+FAULTS = {
+    "silence": "stopped",
+    "mute": "off",
+    "delay": "off",
+    "crc": "off",
+    "id": "off",
+    "alert": "off",
+    "overheat": "off",
+    "power": "off",
+    "unplug": "stopped",
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_at_any_instant_ends_in_the_safe_state(fault, tmp_path):
+    rng = np.random.default_rng([len(fault), *fault.encode()])
+    for trial in range(2):
+        servo = Servo("xl430", baud=1_000_000)
+        link = tmp_path / f"bus{trial}"
+        with Wire(servo, link=link) as wire:
+            finger = finger_on(wire)
+            finger.connect()
+            stream(finger, rng.uniform(), rng.uniform(0.02, 0.2))
+            before = len(servo.goals)
+            wire.inject(fault)
+            flexion = rng.uniform()
+
+            def safe(finger=finger, servo=servo, flexion=flexion):
+                finger.command(flexion)
+                still = not servo.torque or servo.watchdog_error
+                return finger.state().mode == "safe" and still
+
+            took = wait_for(safe)
+            # Silence is noticed after 0.25 s, the watchdog after 0.3 s; the rest is a
+            # generous share for a busy machine.
+            assert took < 2.0
+            goals = list(servo.goals)
+            assert all(1024 <= ticks <= 3072 for _, ticks in goals)
+            wait_for(lambda servo=servo: servo.motor.velocity == 0)
+            stood = servo.motor.position
+            for _ in range(10):
+                finger.command(1.0 - flexion)
+                time.sleep(0.01)
+            assert len(servo.goals) == len(goals) >= before
+            assert servo.motor.position == pytest.approx(stood, abs=0.01)
+            assert finger.state().alert != ""
+            wire.mend()
+            if fault == "unplug":
+                with pytest.raises(FingerError, match=r"did not confirm|no such port"):
+                    raise_unless_gone(finger, wire)
+            else:
+                finger.relax()
+                assert not servo.torque
+
+
+def raise_unless_gone(finger, wire):
+    """Relax before the plug is back, as on leaving in a hurry."""
+    if not wire.plugged:
+        finger.relax()
+    raise FingerError("no such port")
+
+
+@pytest.mark.parametrize("safe_state", ["hold", "open"])
+def test_after_silence_it_is_taken_up_again_in_its_safe_state(servo, wire, safe_state):
+    with finger_on(wire, safety=Safety(safe_state=safe_state)) as finger:
+        stream(finger, 0.8, 0.6)
+        wire.inject("silence", duration=0.6)
+        wait_for(lambda: finger.command(0.1) and finger.state().mode == "safe")
+        wait_for(lambda: servo.watchdog_error)
+        stood = servo.motor.position
+        wait_for(lambda: servo.torque and not servo.watchdog_error)
+        if safe_state == "open":
+            wait_for(lambda: servo.motor.position < 1024 + 5)
+        else:
+            time.sleep(0.3)
+            assert servo.motor.position == pytest.approx(stood, abs=5)
+        assert finger.state().mode == "safe"
+        finger.connect()
+        assert finger.state().mode == "active"
+
+
+def test_a_port_that_comes_back_is_taken_up_again(servo, wire):
+    with finger_on(wire) as finger:
+        stream(finger, 0.8, 0.2)
+        wire.inject("unplug", duration=0.5)
+        wait_for(lambda: not wire.plugged)
+        wait_for(lambda: finger.command(0.8) != 0 and finger.state().mode == "safe")
+        wait_for(lambda: wire.plugged)
+        wait_for(lambda: not servo.torque)  # limp: told so as soon as it is back
+        finger.connect()
+        stream(finger, 0.2, 0.1)
+        assert finger.state().mode == "active"
+
+
+def test_torque_that_is_not_confirmed_off_is_reported(servo, wire):
+    finger = finger_on(wire)
+    finger.connect()
+    wire.inject("mute")
+    with pytest.raises(FingerError, match=r"did not confirm that its torque is off"):
+        finger.relax()
+    finger.relax()  # harmless
+    assert not servo.torque  # it did obey
+
+
+def test_an_exception_is_not_hidden_by_one_of_relaxing(wire):
+    def fail():
+        with finger_on(wire):
+            wire.inject("mute")
+            raise KeyError("mine")
+
+    with pytest.raises(KeyError) as caught:
+        fail()
+    assert "did not confirm" in caught.value.__notes__[0]
+
+
+class TestRefusals:
+    """One sentence that says what is there, and the servo as it was."""
+
+    def refused(self, wire, sentence, **options):
+        servo = wire.servos[0]
+        before = dict(servo.memory._values)
+        with pytest.raises(FingerError, match=sentence) as error:
+            finger_on(wire, **options).connect()
+        kept = [name for name in before if servo.model[name].writable]
+        assert all(servo.memory[name] == before[name] for name in kept)
+        assert str(error.value).endswith(".")
+
+    def test_wrong_id(self, wire):
+        self.refused(
+            wire, r"servo 4 does not answer at 1000000 baud, but servo 1", id=4
+        )
+
+    def test_wrong_rate(self, wire):
+        self.refused(wire, r"at 57600 baud, but at 1000000\.", baud=57600)
+
+    def test_no_such_rate(self, wire):
+        self.refused(wire, r"no serial port runs at 12345 baud", baud=12345)
+
+    def test_wrong_model(self, wire):
+        sentence = r"servo 1 has model number 1060, but the mx28 has 30"
+        self.refused(wire, sentence, model="mx28")
+
+    def test_busy(self, wire):
+        with finger_on(wire), pytest.raises(FingerError, match=r"another program uses"):
+            finger_on(wire).connect()
+
+    def test_absent(self):
+        with pytest.raises(FingerError, match=r"no such port, see ls /dev/serial"):
+            open_finger("dynamixel:/dev/ttyNOWHERE").connect()
+        with pytest.raises(FingerError, match=r"this is not a serial port"):
+            open_finger("dynamixel:/dev/null").connect()
+
+    def test_complaining(self, servo, wire):
+        servo.overheat()
+        self.refused(wire, r"reports overheating; let it rest and switch its power")
+
+
+LEAVES = """
+import os, signal, sys, time
+from ikns.finger import DynamixelFinger
+finger = DynamixelFinger(sys.argv[1], baud=1_000_000)
+def drive():
+    print("ready", flush=True)
+    while True:
+        finger.command(0.5 + 0.4 * (time.monotonic() % 1))
+        time.sleep(0.005)
+"""
+ENDINGS = {
+    "with": "with finger:\n    drive()",
+    "bare": "finger.connect()\ndrive()",
+    "exception": "finger.connect()\nprint('ready', flush=True)\nraise SystemError",
+}
+
+
+@pytest.mark.parametrize(
+    ("ending", "number"),
+    [
+        ("with", signal.SIGINT),
+        ("bare", signal.SIGINT),
+        ("with", signal.SIGTERM),
+        ("bare", signal.SIGHUP),
+        ("exception", None),
+    ],
+)
+def test_no_exit_leaves_torque_on(servo, wire, ending, number):
+    program = LEAVES + ENDINGS[ending]
+    command = [sys.executable, "-c", program, wire.port]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdout=pipe, stderr=pipe)
+    assert process.stdout.readline() == b"ready\n"
+    if number is not None:
+        assert servo.torque
+        os.kill(process.pid, number)
+    process.communicate(timeout=PATIENCE)
+    assert not servo.torque
+    assert "torque on" in [text for _, text in servo.events]
+    assert (
+        process.returncode
+        == {
+            signal.SIGINT: -signal.SIGINT,
+            signal.SIGTERM: 128 + signal.SIGTERM,
+            signal.SIGHUP: 128 + signal.SIGHUP,
+            None: 1,
+        }[number]
+    )
+
+
+def test_after_a_kill_the_servos_own_watchdog_stops_it(servo, wire):
+    process = subprocess.Popen(
+        [sys.executable, "-c", LEAVES + ENDINGS["with"], wire.port],
+        stdout=subprocess.PIPE,
+    )
+    assert process.stdout.readline() == b"ready\n"
+    process.kill()
+    process.communicate(timeout=PATIENCE)
+    took = wait_for(lambda: servo.watchdog_error)
+    assert took < 2.0  # 0.3 s, on a busy machine
+    wait_for(lambda: servo.motor.velocity == 0)
+
+
+def test_no_thread_outlives_a_finger(wire):
+    before = set(threading.enumerate())
+    for _ in range(3):
+        with finger_on(wire) as finger:
+            finger.command(0.5)
+    assert set(threading.enumerate()) == before
