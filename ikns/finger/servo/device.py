@@ -100,6 +100,7 @@ class Servo:
         self._now = self._heard = clock()
         self._silent_until = -math.inf
         self._waiting: bytes | None = None
+        self.memory["goal_position"] = round(self.motor.position)
         self._show()
 
     @property
@@ -187,6 +188,7 @@ class Servo:
     def restart(self) -> None:
         """Start again as after a loss of power: RAM forgotten, torque off, no alert."""
         self.memory.forget()
+        self.memory["goal_position"] = round(self.motor.position)
         self.motor.stop()
         self._waiting = None
         self._parser.forget()

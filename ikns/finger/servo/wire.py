@@ -185,14 +185,15 @@ class Wire:
                     "overheat": servo.overheat,
                     "power": servo.restart,
                 }[kind]()
-        fault = self._active("unplug")
+        begun = (f for f in self._faults if f.kind == "unplug")
+        fault = next((f for f in begun if f.start <= self.elapsed), None)
         if fault is not None and self.plugged:
             if self._due or self.elapsed > fault.start + _PULL:
                 if self._due and (data := min(self._due)[1]):
                     with contextlib.suppress(BlockingIOError):
                         os.write(self._master, data[: len(data) // 2])
                 self._unplug()
-                self._replug_at = fault.start + fault.duration
+                self._replug_at = self.elapsed + fault.duration
                 self._faults.remove(fault)
         elif not self.plugged and self.elapsed > self._replug_at:
             self._plug()
