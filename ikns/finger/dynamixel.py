@@ -21,8 +21,8 @@ __all__ = ["DynamixelFinger"]
 
 #: Time that a servo has for giving up its torque, seconds; then relaxing fails.
 _RELAX_TIMEOUT = 1.0
-#: How often to say the same while connecting: noise may spoil one packet, not three.
-_TRIES = 3
+#: How often to say the same while connecting: noise may spoil a packet, not five.
+_TRIES = 5
 
 
 class DynamixelFinger:
