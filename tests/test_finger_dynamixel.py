@@ -248,6 +248,19 @@ def test_a_port_that_comes_back_is_taken_up_again(servo, wire):
         assert finger.state().mode == "active"
 
 
+def test_connecting_again_in_vain_leaves_it_doing_nothing(servo, wire):
+    with finger_on(wire) as finger:
+        stream(finger, 0.8, 0.1)
+        wire.inject("silence")
+        with pytest.raises(FingerError, match=r"does not answer"):
+            finger.connect()
+        assert finger.state().mode == "relaxed"
+        assert math.isnan(finger.command(1.0))
+        assert servo.torque  # still, as far as anybody knows
+        wire.mend()
+    assert not servo.torque
+
+
 def test_torque_that_is_not_confirmed_off_is_reported(servo, wire):
     finger = finger_on(wire)
     finger.connect()
@@ -359,6 +372,22 @@ def test_no_exit_leaves_torque_on(servo, wire, ending, number):
             None: 1,
         }[number]
     )
+
+
+def test_impatience_does_not_leave_torque_on(servo, wire):
+    process = subprocess.Popen(
+        [sys.executable, "-c", LEAVES + ENDINGS["with"], wire.port],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdout.readline() == b"ready\n"
+    wire.inject("mute", duration=0.3)  # relaxing takes a while
+    for _ in range(3):
+        os.kill(process.pid, signal.SIGINT)
+        time.sleep(0.05)
+    process.communicate(timeout=PATIENCE)
+    assert not servo.torque
+    assert not servo.watchdog_error
 
 
 def test_after_a_kill_the_servos_own_watchdog_stops_it(servo, wire):

@@ -10,11 +10,12 @@ from typing import Self
 
 from ikns.errors import InvalidInput
 from ikns.finger.bus import Bus
-from ikns.finger.drive import Drive, Plan
+from ikns.finger.drive import Drive
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.leaving import forget, relax_at_exit
 from ikns.finger.models import model_named
+from ikns.finger.plan import Plan
 from ikns.finger.state import FingerState
 
 __all__ = ["DynamixelFinger"]
@@ -112,6 +113,7 @@ class DynamixelFinger:
         self._guard = Guard(self.safety)
         self._drive = Drive(self._bus, self._plan, self._guard, self._lock)
         self._thread: threading.Thread | None = None
+        self._held = False
         self._stop = threading.Event()
 
     def connect(self) -> None:
@@ -127,22 +129,22 @@ class DynamixelFinger:
             one, or complains of something.
         """
         self._halt()
+        with self._lock:
+            self._guard.relax()
         self._bus.close()
         self._bus.open()
         self._bus.tries = _TRIES  # nothing depends on time yet
+        checked = False
         try:
             self._bus.check()  # whoever else is there stays untouched
-        except BaseException:
-            self._bus.close()
-            raise
-        relax_at_exit(self)
-        try:
+            checked = self._held = True
+            relax_at_exit(self)
             self._drive.set_up()
             self._drive.arm()
         except BaseException:
-            self._drive.let_go(_RELAX_TIMEOUT)
+            if checked:
+                self._let_go()
             self._bus.close()
-            forget(self)
             raise
         finally:
             self._bus.tries = 1
@@ -184,13 +186,10 @@ class DynamixelFinger:
             When the servo does not confirm that its torque is off. The port is closed
             all the same.
         """
-        if self._thread is None:
+        if not self._held:
             return
         self._halt()
-        confirmed = self._drive.let_go(_RELAX_TIMEOUT)
-        self._bus.close()
-        forget(self)
-        if not confirmed:
+        if not self._let_go():
             watchdog = "bus_watchdog" in self._model
             raise FingerError(
                 f"{self._bus.port}: servo {self._bus.id} did not confirm that its "
@@ -211,6 +210,14 @@ class DynamixelFinger:
             if not isinstance(exception[1], BaseException):
                 raise
             exception[1].add_note(str(error))
+
+    def _let_go(self) -> bool:
+        """Torque off and port closed; one that is interrupted is repeated at exit."""
+        confirmed = self._drive.let_go(_RELAX_TIMEOUT)
+        self._bus.close()
+        self._held = False
+        forget(self)
+        return confirmed
 
     def _halt(self) -> None:
         """End the thread; the bus is then free for the caller."""

@@ -52,6 +52,8 @@ def _leave(number: int, frame: FrameType | None) -> None:
 
 
 def _relax_all() -> None:
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # impatience must not stop this
     for finger in tuple(_connected):
         try:
             finger.relax()
