@@ -131,6 +131,8 @@ def calibrate(
     )
     takes: list[dict[str, Any]] = []
     if live:
+        if radius is not None and not radius > 0:
+            raise InvalidInput(f"expected a radius above 0 m, found {radius:g}.")
         static, exploration, takes = record_live(
             LiveOptions(
                 source=source or "",
@@ -151,7 +153,6 @@ def calibrate(
             min_static=min_static,
             min_still=min_still,
         )
-        points = len(exploration)
     assert static is not None
     assert exploration is not None
     with progress() as report:
@@ -161,6 +162,8 @@ def calibrate(
             generic=generic,
             marker_set=marker_set,
             chain=chain,
+            # Also where points were left out live: the clustering starts from the box
+            # of all, and clusters that stay empty are left out.
             n_points=points,
             n_dof=n_dof,
             max_hand_speed=max_hand_speed,

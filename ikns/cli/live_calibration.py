@@ -90,7 +90,17 @@ def record_live(
         static_seconds=options.static_seconds,
         free_seconds=options.free_seconds,
         point_seconds=options.point_seconds,
+        countdown=options.countdown,
     )
+    for least, seconds, name in (
+        (min_static, options.static_seconds, "static"),
+        (min_still, options.point_seconds, "point"),
+    ):
+        if seconds < least:
+            raise InvalidInput(
+                f"--{name}-seconds {seconds:g} is too short, expected at least "
+                f"{least:g} s."
+            )
     if not options.auto and sys.stdin is None:
         raise InvalidInput("expected a keyboard; use --auto where there is none.")
     body = ikns.Skeleton.load() if generic is None else generic
@@ -114,7 +124,6 @@ def record_live(
             steps,
             labels=source.labels,
             rate=source.rate,
-            countdown=options.countdown,
             auto_takes=_AUTO_TAKES if options.auto else 0,
             settled=folder.accepted,
             pending={name: ikns.read(path) for name, path in pending.items()},
@@ -154,7 +163,8 @@ class _Screen:
         if step is None:
             return
         if what == "ready" and not self._auto:
-            self._say(f"{self._prompt(step, where)}; Enter starts, s skips, q quits.")
+            skip = "" if step.kind == "static" else "s skips, "
+            self._say(f"{self._prompt(step, where)}; Enter starts, {skip}q quits.")
         elif what == "countdown" and self._auto:
             self._say(f"{self._prompt(step, where)}.")
         elif what == "recording":

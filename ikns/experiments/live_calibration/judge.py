@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.errors import InvalidInput
 from ikns.experiments.live_calibration.point_verdict import judge_point
 from ikns.experiments.live_calibration.protocol import Step
 from ikns.experiments.live_calibration.verdict import Verdict, judge_free, judge_static
+from ikns.motion import chain_joints
 from ikns.recording import Recording
 from ikns.skeleton import Skeleton
 
@@ -32,6 +36,11 @@ class Judge:
         Where the hand went in the free exploration, thorax frame, m.
     places : dict of str to (3,) array
         Accepted points, thorax frame, m.
+
+    Raises
+    ------
+    InvalidInput
+        When a setting is out of its range: better now than after the protocol.
     """
 
     def __init__(
@@ -46,6 +55,16 @@ class Judge:
         min_static: float = 1.0,
         min_still: float = 0.5,
     ) -> None:
+        n = len(chain_joints(chain))
+        for right, sentence in (
+            (1 <= n_dof <= n, f"n_dof between 1 and the {n} joints, found {n_dof}"),
+            (0 < variance <= 1, f"variance above 0 and at most 1, found {variance:g}"),
+            (max_hand_speed > 0, f"max_hand_speed above 0, found {max_hand_speed:g}"),
+            (0 <= min_static < math.inf, f"min_static of 0 s on, found {min_static:g}"),
+            (0 <= min_still < math.inf, f"min_still of 0 s on, found {min_still:g}"),
+        ):
+            if not right:
+                raise InvalidInput(f"expected {sentence}.")
         self.chain, self.marker_set = chain, marker_set
         self.skeleton: Skeleton | None = None
         self.explored: NDArray[np.float64] | None = None

@@ -112,7 +112,8 @@ def judge_point(
         learned.fit(x, q)
     width = (learned.upper_ - learned.lower_)[0]
     c = np.reshape(learned.control_signal(q, x), (len(q), n_dof))
-    leak = np.linalg.norm(slopes(c, x), axis=1)
+    known_c = bool(np.isfinite(c).all())  # unless no joint moves at all
+    leak = np.linalg.norm(slopes(c, x), axis=1) if known_c else np.full(n_dof, np.nan)
     components = int(learned.n_components_[0])
     values |= {
         "components": components,
@@ -132,15 +133,15 @@ def judge_point(
             f"The hand was steady in {100 * steady:.0f} % of the samples only, "
             f"expected {100 * STEADY_SHARE:.0f} % or more."
         )
-    elif components > n_dof:
-        reason = (
-            f"It took {components} components, so more moved than the elbow: the hand "
-            "turned or the shoulder went along."
-        )
     elif width.min() < LEAST_RANGE:
         reason = (
             f"The elbow hardly moved: {math.degrees(width.min()):.0f} deg along Z, "
             f"expected at least {math.degrees(LEAST_RANGE):.0f} deg."
+        )
+    elif components > n_dof:
+        reason = (
+            f"It took {components} components, so more moved than the elbow: the hand "
+            "turned or the shoulder went along."
         )
     elif not leak.max() < ONE_PLACE:
         travel = millimeters(leak.max())

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -140,7 +140,7 @@ def carry_out(
     folder: RecordingsFolder,
     *,
     n_points: int,
-    keys: Callable[[bool], Iterable[Key]] = lambda waiting: (),
+    keys: Callable[[bool], Sequence[Key]] = lambda waiting: (),
     on_change: OnChange = lambda change, verdict, where: None,
     on_status: Callable[[Status], None] | None = None,
     status_every: float = 0.1,
@@ -201,7 +201,7 @@ class _Run:
 
     def go(
         self,
-        keys: Callable[[bool], Iterable[Key]],
+        keys: Callable[[bool], Sequence[Key]],
         on_status: Callable[[Status], None] | None,
         status_every: float,
         patience: float,
@@ -210,8 +210,9 @@ class _Run:
         self._handle(protocol.begin(0.0))
         shown = -math.inf
         while not protocol.over:
-            for key in keys(protocol.waiting):
-                self._handle(protocol.key(key, self._clock.now))
+            while not protocol.over and (pressed := keys(protocol.waiting)):
+                for key in pressed:
+                    self._handle(protocol.key(key, self._clock.now))
             if protocol.over:
                 break
             frame = source.read(_WAIT)

@@ -36,11 +36,14 @@ class Step:
     kind : {"static", "free", "point"}
     seconds : float
         How long it is recorded.
+    countdown : float
+        Seconds before the recording.
     """
 
     name: str
     kind: Literal["static", "free", "point"]
     seconds: float
+    countdown: float = 3.0
 
 
 class Change(NamedTuple):
@@ -68,6 +71,7 @@ def paper_steps(
     static_seconds: float = 5.0,
     free_seconds: float = 60.0,
     point_seconds: float = 5.0,
+    countdown: float = 3.0,
 ) -> tuple[Step, ...]:
     """Return the steps of Lisini Baldi et al. (arXiv 2012.03600).
 
@@ -88,10 +92,17 @@ def paper_steps(
             raise InvalidInput(
                 f"expected steps of above 0 s to 3600 s, found {seconds:g} s."
             )
+    if not 0 <= countdown <= 3600:
+        raise InvalidInput(
+            f"expected a countdown of 0 s to 3600 s, found {countdown:g} s."
+        )
     return (
-        Step("static", "static", static_seconds),
-        Step("free", "free", free_seconds),
-        *(Step(f"point_{k:02d}", "point", point_seconds) for k in range(1, points + 1)),
+        Step("static", "static", static_seconds, countdown),
+        Step("free", "free", free_seconds, countdown),
+        *(
+            Step(f"point_{k:02d}", "point", point_seconds, countdown)
+            for k in range(1, points + 1)
+        ),
     )
 
 
@@ -105,8 +116,6 @@ class LiveProtocol:
         Markers of the frames.
     rate : float
         Frames per second of the device's clock.
-    countdown : float
-        Seconds before each recording.
     auto_takes : int
         0: a key decides everything. Otherwise nothing waits for a key, verdicts are
         followed, and a step gets at most this many takes.
@@ -135,15 +144,10 @@ class LiveProtocol:
         *,
         labels: Sequence[str],
         rate: float,
-        countdown: float = 3.0,
         auto_takes: int = 0,
         settled: Collection[str] = (),
         pending: Mapping[str, Recording] | None = None,
     ) -> None:
-        if not 0 <= countdown <= 3600:
-            raise InvalidInput(
-                f"expected a countdown of 0 s to 3600 s, found {countdown:g} s."
-            )
         self.auto = auto_takes > 0
         self.state: State = "ready"
         self.take: Recording | None = None
@@ -153,8 +157,7 @@ class LiveProtocol:
         self._left = [step for step in steps if step.name not in settled]
         self._pending = dict(pending or {})
         self._labels, self._rate = tuple(labels), rate
-        self._countdown, self._auto_takes = countdown, auto_takes
-        self._takes = 0
+        self._auto_takes, self._takes = auto_takes, 0
         self._frames: list[Frame] = []
         self._since = 0.0
 
@@ -182,7 +185,7 @@ class LiveProtocol:
         # A frame counts as on time when it is less than half a period early.
         half = 0.5 / self._rate
         if self.state == "countdown":
-            self.seconds_left = self._since + self._countdown - now
+            self.seconds_left = self._since + self._present.countdown - now
             if self.seconds_left <= half:
                 self._frames, self._since = [], now
                 self.seconds_left = self._present.seconds
@@ -260,7 +263,7 @@ class LiveProtocol:
         return [self._to("ready", now)] + (self._count(now) if self.auto else [])
 
     def _count(self, now: float) -> list[Change]:
-        self._since, self.seconds_left = now, self._countdown
+        self._since, self.seconds_left = now, self._present.countdown
         return [self._to("countdown", now)]
 
     def _finish(self, now: float) -> list[Change]:
