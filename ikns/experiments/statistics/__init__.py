@@ -1,0 +1,113 @@
+"""Statistics of the two experiments: the paper's own, and beside them the right ones.
+
+`analysis` runs everything on a table of trials. Each test has a small frozen result
+with a ``sentence()`` in plain words, which never takes a difference that was not found
+for equality. `pairs` is what paired tests take; `paired_tests` repeats the paper;
+`equivalence`, `effects`, `mixed_model`, `within_subject_anova`, `success`, `times` and
+`learning` stand beside it; `power` says how many participants; `published` examines the
+paper's printed numbers. scipy and statsmodels compute.
+"""
+
+from ikns.experiments.statistics.analysis import (
+    PickAnalysis,
+    TrackingAnalysis,
+    analyze_picking,
+    analyze_tracking,
+)
+from ikns.experiments.statistics.effects import (
+    Effect,
+    cohens_dz,
+    effect_sizes,
+    hedges_g_av,
+    hodges_lehmann,
+)
+from ikns.experiments.statistics.equivalence import Equivalence, equivalence
+from ikns.experiments.statistics.learning import (
+    LearningCurve,
+    LearningCurves,
+    learning_curves,
+)
+from ikns.experiments.statistics.mixed_model import (
+    Coefficient,
+    MixedModel,
+    mixed_model,
+)
+from ikns.experiments.statistics.paired_tests import (
+    Normality,
+    PairedT,
+    RankTest,
+    SignTest,
+    exact_sign,
+    normality,
+    pooled_t,
+    signed_rank,
+    subject_means_t,
+)
+from ikns.experiments.statistics.pairs import Pairs, pair_arrays, pair_trials
+from ikns.experiments.statistics.power import (
+    Design,
+    Power,
+    SampleSize,
+    Spread,
+    sample_size,
+    simulated_power,
+)
+from ikns.experiments.statistics.published import Finding, paper_reexamined
+from ikns.experiments.statistics.success import (
+    SuccessTest,
+    success_pairs,
+    success_test,
+)
+from ikns.experiments.statistics.times import TimeTest, restricted_mean, time_test
+from ikns.experiments.statistics.within_subject_anova import (
+    VarianceTable,
+    within_subject_anova,
+)
+
+__all__ = [
+    "Coefficient",
+    "Design",
+    "Effect",
+    "Equivalence",
+    "Finding",
+    "LearningCurve",
+    "LearningCurves",
+    "MixedModel",
+    "Normality",
+    "PairedT",
+    "Pairs",
+    "PickAnalysis",
+    "Power",
+    "RankTest",
+    "SampleSize",
+    "SignTest",
+    "Spread",
+    "SuccessTest",
+    "TimeTest",
+    "TrackingAnalysis",
+    "VarianceTable",
+    "analyze_picking",
+    "analyze_tracking",
+    "cohens_dz",
+    "effect_sizes",
+    "equivalence",
+    "exact_sign",
+    "hedges_g_av",
+    "hodges_lehmann",
+    "learning_curves",
+    "mixed_model",
+    "normality",
+    "pair_arrays",
+    "pair_trials",
+    "paper_reexamined",
+    "pooled_t",
+    "restricted_mean",
+    "sample_size",
+    "signed_rank",
+    "simulated_power",
+    "subject_means_t",
+    "success_pairs",
+    "success_test",
+    "time_test",
+    "within_subject_anova",
+]

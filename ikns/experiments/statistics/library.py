@@ -1,0 +1,26 @@
+"""statsmodels, loaded when a test needs it: it and pandas take seconds."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from ikns.errors import InvalidInput
+
+__all__ = ["statsmodels"]
+
+
+def statsmodels(module: str) -> Any:
+    """Import a module of statsmodels by its path below the package.
+
+    Raises
+    ------
+    InvalidInput
+        When statsmodels is not installed.
+    """
+    try:
+        return importlib.import_module(f"statsmodels.{module}")
+    except ImportError:
+        raise InvalidInput(
+            "this test needs statsmodels, which pip install 'ikns[study]' brings."
+        ) from None
