@@ -1,6 +1,7 @@
 """Protocol, takes, verdicts, guide and folder of a live calibration."""
 
 import json
+import time
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -24,7 +25,8 @@ from ikns.experiments.live_calibration import (
     in_words,
     paper_steps,
 )
-from ikns.experiments.live_calibration.guide import HandTracker, suggested_places
+from ikns.experiments.live_calibration.clock import DeviceClock
+from ikns.experiments.live_calibration.guide import HandTracker
 from ikns.experiments.live_calibration.take import take_recording
 from ikns.nullspace_map import still
 from ikns.recording import Recording
@@ -395,7 +397,7 @@ def test_suggested_places_are_the_corners_of_a_box_that_was_explored_whole():
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 12))
 def test_no_suggested_place_is_out_of_reach(seed, n):
     explored = np.random.default_rng(seed).normal(size=(50, 3)) * [0.1, 0.2, 0.1]
-    for place in suggested_places(explored, n):
+    for place in Guide(explored, n).places:
         assert (explored == place).all(axis=1).any()
 
 
@@ -474,3 +476,32 @@ def test_a_folder_that_does_not_fit_is_refused(tmp_path: Path):
         table.write_text(damage)
         with pytest.raises(FileError, match="cannot be read"):
             RecordingsFolder(tmp_path / "r", {}, resume=True)
+
+
+# --- clock --------------------------------------------------------------------------
+
+
+def test_time_is_that_of_the_device_and_never_goes_back():
+    """Frames that come all at once still take the time that they show."""
+    clock = DeviceClock()
+    times = [50.0, 50.01, 50.02, 50.5, 49.0, 49.01, 1e6, 1e6 + 0.01]
+    now = []
+    for k, device_time in enumerate(times):
+        clock.advance(Frame(k, device_time, 0.0, np.zeros((1, 3))))
+        now.append(clock.now)
+    # A clock set back, or ahead by more than anybody waited, is not followed; the time
+    # that really passed, below 1 s here, is.
+    assert_allclose(now[:4], [0.0, 0.01, 0.02, 0.5], atol=1e-9)
+    assert np.all(np.diff(now) >= 0)
+    assert now[-1] - now[3] < 1.0
+
+
+def test_time_goes_on_while_no_frame_comes():
+    clock = DeviceClock()
+    clock.advance(Frame(0, 0.0, 0.0, np.zeros((1, 3))))
+    time.sleep(0.02)
+    clock.advance(None)
+    assert clock.now >= 0.02
+    waited = clock.now
+    clock.advance(Frame(1, 0.01, 0.0, np.zeros((1, 3))))
+    assert clock.now >= waited

@@ -8,8 +8,8 @@ every recording; `procedure` ties them to a source of frames.
 from ikns.experiments.live_calibration.folder import RecordingsFolder
 from ikns.experiments.live_calibration.guide import Guide, in_words
 from ikns.experiments.live_calibration.judge import Judge
+from ikns.experiments.live_calibration.outlook import Status
 from ikns.experiments.live_calibration.procedure import (
-    Status,
     accepted_recordings,
     carry_out,
     check_labels,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns.clustering import box_surface_points, minimum_bounding_box
+from ikns.clustering import BoundingBox, box_surface_points, minimum_bounding_box
 from ikns.marker_ik import MarkerIK
 from ikns.motion import SIDES, chain_sides
 from ikns.skeleton import Skeleton
@@ -42,7 +42,7 @@ def in_words(way: ArrayLike) -> str:
     return ", ".join(said) or "stay"
 
 
-def suggested_places(explored: ArrayLike, n: int) -> Array:
+def suggested_places(explored: ArrayLike, box: BoundingBox, n: int) -> Array:
     """Places that the hand reached, each nearest to a place on the box around all.
 
     The box is that of minimum volume; its vertices come first, then the centers of its
@@ -53,6 +53,8 @@ def suggested_places(explored: ArrayLike, n: int) -> Array:
     ----------
     explored : (N, 3) array
         Hand positions in the thorax frame, m.
+    box : BoundingBox
+        Around them.
     n : int
         How many places.
 
@@ -61,7 +63,7 @@ def suggested_places(explored: ArrayLike, n: int) -> Array:
     (n, 3) array
     """
     places = np.asarray(explored, dtype=np.float64)
-    wanted = box_surface_points(minimum_bounding_box(places), n)
+    wanted = box_surface_points(box, n)
     nearest = [int(np.argmin(((places - w) ** 2).sum(axis=1))) for w in wanted]
     return places[nearest]
 
@@ -107,8 +109,9 @@ class Guide:
     """
 
     def __init__(self, explored: Array, n_points: int) -> None:
-        self.places = suggested_places(explored, n_points)
-        self._middle = minimum_bounding_box(explored).center
+        box = minimum_bounding_box(explored)
+        self.places = suggested_places(explored, box, n_points)
+        self._middle = box.center
 
     def words(self, point: int) -> str:
         """Where point number `point` (from 0) is, seen from the middle of the box."""

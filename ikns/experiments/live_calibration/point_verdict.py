@@ -126,30 +126,43 @@ def judge_point(
     near = min(apart, key=lambda name: apart[name]) if apart else ""
     values["nearest"] = near or None
     values["nearest_cm"] = 100 * apart[near] if near else None
-    if reason:
-        pass
-    elif steady < STEADY_SHARE:
-        reason = (
+    reason = reason or _fault(
+        float(steady), components, n_dof, float(width.min()), float(leak.max()), apart
+    )
+    words = reason or "The hand was steady and the elbow moved."
+    return Verdict(not reason, True, words, values, place=place)
+
+
+def _fault(
+    steady: float,
+    components: int,
+    n_dof: int,
+    width: float,
+    leak: float,
+    apart: Mapping[str, float],
+) -> str:
+    """Say what is wrong first of all; empty where nothing is."""
+    if steady < STEADY_SHARE:
+        return (
             f"The hand was steady in {100 * steady:.0f} % of the samples only, "
             f"expected {100 * STEADY_SHARE:.0f} % or more."
         )
-    elif width.min() < LEAST_RANGE:
-        reason = (
-            f"The elbow hardly moved: {math.degrees(width.min()):.0f} deg along Z, "
-            f"expected at least {math.degrees(LEAST_RANGE):.0f} deg."
+    if width < LEAST_RANGE:
+        return (
+            f"The elbow hardly moved: {math.degrees(width):.0f} deg along Z, expected "
+            f"at least {math.degrees(LEAST_RANGE):.0f} deg."
         )
-    elif components > n_dof:
-        reason = (
+    if components > n_dof:
+        return (
             f"It took {components} components, so more moved than the elbow: the hand "
             "turned or the shoulder went along."
         )
-    elif not leak.max() < ONE_PLACE:
-        travel = millimeters(leak.max())
-        reason = f"The hand went with the elbow, {travel:.0f} mm from end to end."
-    elif near and apart[near] < ONE_PLACE:
-        reason = (
-            f"It is the place of {near}, {100 * apart[near]:.0f} cm away, expected at "
-            f"least {100 * ONE_PLACE:.0f} cm."
-        )
-    words = reason or "The hand was steady and the elbow moved."
-    return Verdict(not reason, True, words, values, place=place)
+    if not leak < ONE_PLACE:
+        return f"The hand went with the elbow, {1e3 * leak:.0f} mm from end to end."
+    for name, distance in sorted(apart.items(), key=lambda item: item[1])[:1]:
+        if distance < ONE_PLACE:
+            return (
+                f"It is the place of {name}, {100 * distance:.0f} cm away, expected at "
+                f"least {100 * ONE_PLACE:.0f} cm."
+            )
+    return ""

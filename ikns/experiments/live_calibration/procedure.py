@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from ikns.calibration import sight_needs
 from ikns.errors import MarkerMismatch, NotEnoughData, StreamError
+from ikns.experiments.live_calibration.clock import DeviceClock
 from ikns.experiments.live_calibration.folder import RecordingsFolder
-from ikns.experiments.live_calibration.guide import Guide, HandTracker, in_words
 from ikns.experiments.live_calibration.judge import Judge
+from ikns.experiments.live_calibration.outlook import Outlook, Status
 from ikns.experiments.live_calibration.protocol import Change, Key, LiveProtocol, Step
 from ikns.experiments.live_calibration.verdict import Verdict
 from ikns.files import read
@@ -26,49 +24,13 @@ from ikns.marker_set import MarkerSet
 from ikns.skeleton import Skeleton
 from ikns.stream import Frame, Source
 
-__all__ = ["Status", "accepted_recordings", "carry_out", "check_labels", "recall"]
+__all__ = ["accepted_recordings", "carry_out", "check_labels", "recall"]
 
 #: Called with a change, the verdict where there is one, and where the hand should go.
 OnChange = Callable[[Change, Verdict | None, str], None]
 
 #: Seconds to wait for a frame before looking at the keys again.
 _WAIT = 0.05
-#: A device's clock that jumps by more between frames is not followed, s.
-_JUMP = 2.0
-
-
-@dataclass(frozen=True)
-class Status:
-    """How it stands, for a line on a screen.
-
-    Parameters
-    ----------
-    state : str
-        Of the protocol.
-    step : Step
-    seconds_left : float
-        Of the countdown or the recording.
-    seen, expected : int
-        Markers of the set in the last frame, and how many there are.
-    silence : float
-        Since the last frame, s.
-    hand_speed : float
-        Speed of the hand in the thorax frame, m/s; NaN while unknown.
-    to_go : float
-        Distance of the hand from the suggested place, m; NaN without one.
-    way : str
-        Which way the hand has to go, in words.
-    """
-
-    state: str
-    step: Step
-    seconds_left: float
-    seen: int
-    expected: int
-    silence: float
-    hand_speed: float
-    to_go: float
-    way: str
 
 
 def check_labels(
@@ -195,9 +157,9 @@ class _Run:
         self._judge, self._folder, self._n_points = judge, folder, n_points
         self._on_change = on_change
         self._verdict: Verdict | None = None
-        self._clock = _Clock()
+        self._clock = DeviceClock()
         self._frame: Frame | None = None
-        self._screen = _Screen(source, judge, n_points)
+        self._outlook = Outlook(source, judge, n_points)
 
     def go(
         self,
@@ -226,7 +188,8 @@ class _Run:
             if on_status and not protocol.over:
                 if time.monotonic() - shown >= status_every:
                     shown = time.monotonic()
-                    on_status(self._screen.status(protocol, self._frame, self._clock))
+                    silence = self._clock.silence
+                    on_status(self._outlook.status(protocol, self._frame, silence))
 
     def _wait(self, patience: float) -> None:
         protocol, source = self._protocol, self._source
@@ -255,7 +218,7 @@ class _Run:
                     self._folder.decide(step, change.what, self._verdict)
             if change.what == "stopped":
                 self._verdict = None
-            self._on_change(change, self._verdict, self._screen.where(step))
+            self._on_change(change, self._verdict, self._outlook.where(step))
             if change.what in ("accepted", "redo", "skipped"):
                 self._verdict = None
             if change.what == "judging":
@@ -273,104 +236,3 @@ class _Run:
         return protocol.judged(
             keep=verdict.keep, usable=verdict.usable, now=change.time
         )
-
-
-class _Clock:
-    """The device's clock from the first frame on, this machine's between frames."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-        self._frame: Frame | None = None
-        self._at_frame = 0.0
-        self._heard = time.monotonic()
-
-    @property
-    def silence(self) -> float:
-        """Since the last frame, s of this machine."""
-        return time.monotonic() - self._heard
-
-    def advance(self, frame: Frame | None) -> None:
-        """Go on to a frame, or to the present where none came."""
-        if frame is None:
-            self.now = max(self.now, self._at_frame + self.silence)
-            return
-        if self._frame is not None:
-            step = frame.device_time - self._frame.device_time
-            usual = 0 <= step <= max(_JUMP, 2 * self.silence)
-            passed = step if usual else self.silence
-            self.now = max(self.now, self._at_frame + passed)
-        self._frame, self._at_frame = frame, self.now
-        self._heard = time.monotonic()
-
-
-class _Screen:
-    """What the experimenter sees between changes."""
-
-    def __init__(self, source: Source, judge: Judge, n_points: int) -> None:
-        self._labels, self._judge, self._n_points = source.labels, judge, n_points
-        self._worn = MarkerSet.load(judge.marker_set).without_static()
-        self._tracker: tuple[Skeleton, HandTracker] | None = None
-        self._guide: tuple[object, Guide] | None = None
-        self._before: tuple[float, np.ndarray] | None = None
-
-    def guide(self) -> Guide | None:
-        """Places to suggest, once there was a free exploration."""
-        explored = self._judge.explored
-        if explored is None:
-            return None
-        if self._guide is None or self._guide[0] is not explored:
-            self._guide = (explored, Guide(explored, self._n_points))
-        return self._guide[1]
-
-    def where(self, step: Step | None) -> str:
-        """Where the hand should be, in words; empty where nobody knows."""
-        guide = self.guide()
-        if guide is None or step is None or step.kind != "point":
-            return ""
-        return guide.words(_number(step))
-
-    def status(
-        self, protocol: LiveProtocol, frame: Frame | None, clock: _Clock
-    ) -> Status:
-        """Look at the last frame."""
-        step = protocol.step
-        assert step is not None
-        seen, speed, to_go, way = 0, math.nan, math.nan, ""
-        if frame is not None:
-            markers = self._worn.pick(self._labels, frame.markers)
-            seen = int(np.isfinite(markers).all(axis=1).sum())
-            place = self._place(frame)
-            if place is not None:
-                if self._before and frame.device_time > self._before[0]:
-                    moved = float(np.linalg.norm(place - self._before[1]))
-                    speed = moved / (frame.device_time - self._before[0])
-                self._before = (frame.device_time, place)
-                guide = self.guide()
-                if guide is not None and step.kind == "point":
-                    offset = guide.places[_number(step)] - place
-                    to_go, way = float(np.linalg.norm(offset)), in_words(offset)
-        return Status(
-            protocol.state,
-            step,
-            protocol.seconds_left,
-            seen,
-            len(self._worn.labels),
-            clock.silence,
-            speed,
-            to_go,
-            way,
-        )
-
-    def _place(self, frame: Frame) -> np.ndarray | None:
-        skeleton = self._judge.skeleton
-        if skeleton is None:
-            return None
-        if self._tracker is None or self._tracker[0] is not skeleton:
-            tracker = HandTracker(skeleton, self._judge.chain, self._labels)
-            self._tracker = (skeleton, tracker)
-        return self._tracker[1].place(frame.markers)
-
-
-def _number(step: Step) -> int:
-    """Return the number of a point, from 0."""
-    return int(step.name.rsplit("_", 1)[-1]) - 1

@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 #: Markers of a person who stands still stray less than markers are misplaced on the
 #: skin (10 mm for most of a set), once the sway of the whole body is taken out, m. Two
-#: real static trials have 0.7 and 1.2 mm, simulated ones 2 to 4 mm.
+#: real static trials have 0.7 and 1.2 mm, simulated ones 2 to 7 mm.
 STILL_MARKERS = 0.010
 #: A hand that travels farther is not at one place, nor are two points that are nearer
 #: to each other two places, m (a fifth of a small workspace; our choice).
