@@ -341,6 +341,16 @@ ENDINGS = {
 }
 
 
+def start(program, wire):
+    """Run a program until it says that it is ready."""
+    command = [sys.executable, "-c", program, wire.port]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdout=pipe, stderr=pipe)
+    if process.stdout.readline() != b"ready\n":
+        pytest.fail(process.communicate(timeout=PATIENCE)[1].decode())
+    return process
+
+
 @pytest.mark.parametrize(
     ("ending", "number"),
     [
@@ -353,10 +363,7 @@ ENDINGS = {
 )
 def test_no_exit_leaves_torque_on(servo, wire, ending, number):
     program = LEAVES + ENDINGS[ending]
-    command = [sys.executable, "-c", program, wire.port]
-    pipe = subprocess.PIPE
-    process = subprocess.Popen(command, stdout=pipe, stderr=pipe)
-    assert process.stdout.readline() == b"ready\n"
+    process = start(program, wire)
     if number is not None:
         assert servo.torque
         os.kill(process.pid, number)
@@ -375,12 +382,7 @@ def test_no_exit_leaves_torque_on(servo, wire, ending, number):
 
 
 def test_impatience_does_not_leave_torque_on(servo, wire):
-    process = subprocess.Popen(
-        [sys.executable, "-c", LEAVES + ENDINGS["with"], wire.port],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    assert process.stdout.readline() == b"ready\n"
+    process = start(LEAVES + ENDINGS["with"], wire)
     wire.inject("mute", duration=0.3)  # relaxing takes a while
     for _ in range(3):
         os.kill(process.pid, signal.SIGINT)
@@ -391,11 +393,7 @@ def test_impatience_does_not_leave_torque_on(servo, wire):
 
 
 def test_after_a_kill_the_servos_own_watchdog_stops_it(servo, wire):
-    process = subprocess.Popen(
-        [sys.executable, "-c", LEAVES + ENDINGS["with"], wire.port],
-        stdout=subprocess.PIPE,
-    )
-    assert process.stdout.readline() == b"ready\n"
+    process = start(LEAVES + ENDINGS["with"], wire)
     process.kill()
     process.communicate(timeout=PATIENCE)
     took = wait_for(lambda: servo.watchdog_error)

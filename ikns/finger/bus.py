@@ -216,11 +216,12 @@ class Bus:
 
     def _talk(self, doing: str, instruction: int, data: bytes, count: int) -> bytes:
         """Say something until it is answered; return the bytes that came."""
-        for _ in range(self.tries - 1):
+        for attempt in range(self.tries - 1):
             try:
                 return self._once(doing, instruction, data, count)
             except NoAnswer:
-                pass
+                # A late answer must not be taken for one to the next question.
+                time.sleep(_LATE * 2**attempt)
         return self._once(doing, instruction, data, count)
 
     def _once(self, doing: str, instruction: int, data: bytes, count: int) -> bytes:

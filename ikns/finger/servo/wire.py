@@ -165,7 +165,8 @@ class Wire:
             if not self.plugged:
                 time.sleep(wait)
             elif select.select([self._master], [], [], wait)[0]:
-                with self._lock:
+                # What was there may have been flushed by the other end since.
+                with self._lock, contextlib.suppress(BlockingIOError):
                     self._receive(os.read(self._master, 4096))
 
     def _active(self, kind: str) -> Fault | None:
