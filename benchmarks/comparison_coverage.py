@@ -31,9 +31,11 @@ import sys
 import time
 import warnings
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import scipy
+from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 from scipy.stats import binomtest
 
@@ -62,6 +64,8 @@ from ikns.simulation.places import (
 from ikns.simulation.protocol import _RESTING, _STATIC_SD, _pose
 from ikns.simulation.wander import tremor, wander
 from ikns.skeleton import Skeleton
+from ikns.view.render import png
+from ikns.view.style import INK, PALE, RED, house_style, new_figure
 
 CHAIN, SIDE = "right_arm", "right"
 POINTS, RATE, TRUE_RATE = 3, 50.0, 25.0
@@ -324,6 +328,44 @@ def print_table(table: dict[str, dict]) -> None:
         )
 
 
+def figure(subjects: list[dict[str, list[list[float]]]]) -> Figure:
+    """Draw every interval beside its truth, in the order of the truth."""
+    with house_style():
+        drawn = new_figure(
+            f"Intervals that hold the truth, {len(subjects)} people",
+            simulated=True,
+            height=3.4,
+        )
+        panels = drawn.subplots(1, 2)
+        for axes, (name, unit, scale) in zip(
+            panels,
+            (
+                ("leak, each point", "leak (mm per unit of c)", 1000.0),
+                ("crosstalk, mean change", "change of c a reach", 1.0),
+            ),
+            strict=True,
+        ):
+            rows = scale * np.array([row for s in subjects for row in s[name]])
+            rows = rows[np.isfinite(rows).all(axis=1)]
+            rows = rows[np.argsort(rows[:, 3])]
+            at = np.arange(len(rows))
+            hit = (rows[:, 1] <= rows[:, 3]) & (rows[:, 3] <= rows[:, 2])
+            # Misses differ in width as well as in color.
+            for chosen, color, width in ((hit, PALE, 0.6), (~hit, RED, 1.4)):
+                axes.vlines(
+                    at[chosen], *rows[chosen, 1:3].T, color=color, lw=width, zorder=1
+                )
+            axes.plot(at, rows[:, 3], color=INK, lw=1.4, label="truth", zorder=2)
+            axes.set(
+                title=f"{hit.mean():.1%} of {len(hit)} hold it",
+                xlabel="interval, by its truth",
+                ylabel=unit,
+            )
+        panels[0].vlines([], [], [], color=RED, lw=1.4, label="95 % interval beside it")
+        panels[0].legend(loc="upper left")
+    return drawn
+
+
 def main() -> None:
     """Print one table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -332,6 +374,7 @@ def main() -> None:
     parser.add_argument("--resamples", type=int, default=400)
     parser.add_argument("--quick", action="store_true", help="2 subjects")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--figure", type=Path, help="picture to write, .png")
     parser.add_argument("--progress", action="store_true", help="on stderr")
     options = parser.parse_args()
     seeds = range(
@@ -353,6 +396,8 @@ def main() -> None:
         "cores": os.cpu_count(),
     }
     table = summary(subjects)
+    if options.figure:
+        options.figure.write_bytes(png(figure(subjects)))
     if options.json:
         result = {"about": about, "simulated": True, "coverage": table}
         print(json.dumps(result | {"subjects": subjects}, indent=1))
