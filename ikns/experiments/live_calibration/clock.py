@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 from ikns.stream import Frame
@@ -10,15 +11,28 @@ __all__ = ["DeviceClock"]
 
 #: A device's clock that jumps by more between frames is not followed, s.
 JUMP = 2.0
+#: Frames may be so late before time goes on without them, s.
+GRACE = 1.0
 
 
 class DeviceClock:
-    """The device's clock from the first frame on, this machine's between frames."""
+    """Seconds since the first frame, which never go back.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    grace : float
+        Frames may be so late before time goes on without them, s.
+
+    Attributes
+    ----------
+    now : float
+    """
+
+    def __init__(self, grace: float = GRACE) -> None:
         self.now = 0.0
-        self._frame: Frame | None = None
-        self._at_frame = 0.0
+        self._grace = grace
+        self._device = math.nan  # time of the last frame, by the device and by us
+        self._ours = 0.0
         self._heard = time.monotonic()
 
     @property
@@ -28,13 +42,15 @@ class DeviceClock:
 
     def advance(self, frame: Frame | None) -> None:
         """Go on to a frame, or to the present where none came."""
+        silence = self.silence
         if frame is None:
-            self.now = max(self.now, self._at_frame + self.silence)
+            self.now = max(self.now, self._ours + silence - self._grace)
             return
-        if self._frame is not None:
-            step = frame.device_time - self._frame.device_time
-            usual = 0 <= step <= max(JUMP, 2 * self.silence)
-            passed = step if usual else self.silence
-            self.now = max(self.now, self._at_frame + passed)
-        self._frame, self._at_frame = frame, self.now
+        if not math.isnan(self._device):
+            step = frame.device_time - self._device
+            # A frame out of order is a little earlier; a new clock is far off.
+            usual = -JUMP <= step <= max(JUMP, 2 * silence)
+            self._ours += step if usual else silence
+        self._device = frame.device_time
         self._heard = time.monotonic()
+        self.now = max(self.now, self._ours)
