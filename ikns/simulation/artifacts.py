@@ -98,11 +98,21 @@ class SoftTissue:
         rng : numpy.random.Generator
             Source of the random part.
         """
-        n, m = len(q), len(self.links)
-        local = self._moved(self._gains, q[:, -len(self.reference) :])
-        sd = self.size * np.sqrt(_RANDOM / 3)
+        local = self.with_posture(q) + self.at_random(len(q), rate=rate, rng=rng)
+        return self.in_world(q, local)
+
+    def with_posture(self, q: Array) -> Array:
+        """Return what the posture moves, in the segments' frames, (T, M, 3)."""
+        return self._moved(self._gains, q[:, -len(self.reference) :])
+
+    def at_random(self, n: int, *, rate: float, rng: np.random.Generator) -> Array:
+        """Return n samples of the random part, in the segments' frames, (n, M, 3)."""
+        m, sd = len(self.links), self.size * np.sqrt(_RANDOM / 3)
         slow = wander(rng, n, 3 * m, sd=sd, cutoff=_RANDOM_HZ, rate=rate)
-        local += slow.reshape(n, m, 3)
+        return slow.reshape(n, m, 3)
+
+    def in_world(self, q: Array, local: Array) -> Array:
+        """Turn displacements in the segments' frames into the world, (T, M, 3)."""
         in_world = np.empty_like(local)
         root = Rotation.from_quat(q[:, 3:7]).as_matrix()
         for link in np.unique(self.links):

@@ -60,6 +60,8 @@ class Protocol:
         frame, m.
     settings : dict
         Every setting, for the record.
+    skin : SoftTissue, optional
+        How this person's skin moves, where it does.
     """
 
     subject: VirtualSubject
@@ -69,6 +71,7 @@ class Protocol:
     points: Trial
     places: Array
     settings: dict[str, object]
+    skin: SoftTissue | None = None
 
     @property
     def trials(self) -> tuple[Trial, ...]:
@@ -255,6 +258,7 @@ def simulate_protocol(
         side=side,
         places=np.mean(positions, axis=0),
         settings=settings,
+        skin=skin,
         **trials,
     )
 

@@ -1,0 +1,37 @@
+"""Experiment 1: a pointer driven by c follows a curve. No screen, no clock."""
+
+from ikns.experiments.tracking.machine import TrackingRecord, TrialMachine, View
+from ikns.experiments.tracking.metrics import (
+    Metrics,
+    error_over_time,
+    lag,
+    measure,
+    overshoot,
+    spectral_arc_length,
+)
+from ikns.experiments.tracking.profiles import CHARACTERS, Profile, draw_profile
+from ikns.experiments.tracking.schedule import Step, schedule, williams
+from ikns.experiments.tracking.virtual import virtual_step, virtual_trial
+from ikns.experiments.tracking.visit import Attempt, Visit
+
+__all__ = [
+    "CHARACTERS",
+    "Attempt",
+    "Metrics",
+    "Profile",
+    "Step",
+    "TrackingRecord",
+    "TrialMachine",
+    "View",
+    "Visit",
+    "draw_profile",
+    "error_over_time",
+    "lag",
+    "measure",
+    "overshoot",
+    "schedule",
+    "spectral_arc_length",
+    "virtual_step",
+    "virtual_trial",
+    "williams",
+]

@@ -1,0 +1,195 @@
+"""One tracking trial: align, then follow. It has no clock: every call says the time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import InvalidInput
+from ikns.experiments.tracking.profiles import Profile
+
+__all__ = ["ALIGN", "TrackingRecord", "TrialMachine", "View"]
+
+Array = NDArray[np.float64]
+State = Literal["waiting", "align", "track", "done", "aborted"]
+
+#: Time to bring the pointer to the start of the profile, s: the paper's.
+ALIGN = 5.0
+#: A frame at the very end counts, whatever a clock of large numbers rounds, s.
+_ROUNDING = 1e-6
+
+
+class View(NamedTuple):
+    """What a screen would show.
+
+    Parameters
+    ----------
+    state : {"waiting", "align", "track", "done", "aborted"}
+    time : float
+        Since the profile began, s; negative while aligning.
+    x : float
+        Where the pointer is on its way across, 0 to 1, at constant speed.
+    y : float
+        Its height, 100 c, 0 to 100; NaN before the first c.
+    target : float
+        Height that it should have.
+    """
+
+    state: State
+    time: float
+    x: float
+    y: float
+    target: float
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingRecord:
+    """What a trial left.
+
+    Parameters
+    ----------
+    profile : Profile
+    time : (T,) array
+        Since the profile began, s, increasing; negative while aligning.
+    target : (T,) array
+        0 to 100.
+    c : (T,) array
+        As it came: not cut off, NaN where there was none.
+    state : {"done", "aborted"}
+    reason : str
+        Why it was aborted.
+    """
+
+    profile: Profile
+    time: Array
+    target: Array
+    c: Array
+    state: State
+    reason: str = ""
+
+    @property
+    def y(self) -> Array:
+        """Height of the pointer: 100 c within 0 to 100, the last one where c is NaN."""
+        known = np.isfinite(self.c)
+        last = np.maximum.accumulate(np.where(known, np.arange(len(self.c)), -1))
+        return np.where(last < 0, np.nan, 100.0 * np.clip(self.c[last], 0.0, 1.0))
+
+
+class TrialMachine:
+    """The trial as it goes.
+
+    Parameters
+    ----------
+    profile : Profile
+        What to follow.
+    align : float
+        Time before it begins, s.
+
+    Attributes
+    ----------
+    state : str
+
+    Examples
+    --------
+    >>> from ikns.experiments.tracking.profiles import draw_profile
+    >>> trial = TrialMachine(draw_profile("T1", seed=0))
+    >>> trial.start(100.0)
+    >>> for k in range(3001):
+    ...     view = trial.frame(100.0 + k / 100, c=0.5)
+    >>> trial.state, view.y, round(view.x, 9)
+    ('done', 50.0, 1.0)
+    """
+
+    def __init__(self, profile: Profile, *, align: float = ALIGN) -> None:
+        if not 0 <= align < math.inf:
+            raise InvalidInput(f"expected a time to align from 0 s, found {align:g} s.")
+        self.profile, self.align = profile, align
+        self.state: State = "waiting"
+        self._zero = self._now = -math.inf
+        self._y = math.nan
+        self._reason = ""
+        self._rows: list[tuple[float, float]] = []
+
+    def start(self, now: float) -> None:
+        """Begin to align.
+
+        Raises
+        ------
+        InvalidInput
+            When it was begun already, or the time is not finite.
+        """
+        if self.state != "waiting" or not math.isfinite(now):
+            raise InvalidInput(
+                f"expected to start a waiting trial at a finite time, found it "
+                f"{self.state} at {now:g} s."
+            )
+        self._now, self._zero = now, now + self.align
+        self.state = "align" if self.align else "track"
+
+    def frame(self, now: float, c: float) -> View:
+        """Take the control signal of a frame; NaN where it has none.
+
+        A time that is not later than the last frame's shows nothing new and is not
+        written down.
+        """
+        before = self._rows[-1][0] if self._rows else -math.inf
+        running = self.state in ("align", "track")
+        view = self.check(now)
+        if not running or view.time > self.profile.seconds + _ROUNDING:
+            return view
+        if math.isfinite(c):
+            self._y = 100.0 * min(max(c, 0.0), 1.0)
+        if view.time > before:
+            self._rows.append((view.time, float(c)))
+        return view._replace(y=self._y)
+
+    def check(self, now: float) -> View:
+        """Let time pass while no frame comes."""
+        if now > self._now and self.state in ("align", "track"):
+            self._now = now
+            time = now - self._zero
+            if time >= self.profile.seconds:
+                self.state = "done"
+            elif time >= 0:
+                self.state = "track"
+        time = self._now - self._zero if self.state != "waiting" else -self.align
+        seconds = self.profile.seconds
+        return View(
+            self.state,
+            time,
+            min(max(time / seconds, 0.0), 1.0),
+            self._y,
+            float(self.profile.at(time)),
+        )
+
+    def abort(self, now: float, reason: str) -> None:
+        """End it before its time; what was recorded stays."""
+        if self.state in ("waiting", "align", "track"):
+            self.check(now)
+        if self.state in ("waiting", "align", "track"):
+            self.state, self._reason = "aborted", reason
+
+    @property
+    def record(self) -> TrackingRecord:
+        """Of a trial that ended.
+
+        Raises
+        ------
+        InvalidInput
+            While it goes on.
+        """
+        if self.state not in ("done", "aborted"):
+            raise InvalidInput(f"expected a trial that ended, found it {self.state}.")
+        rows = np.array(self._rows, dtype=np.float64).reshape(-1, 2)
+        return TrackingRecord(
+            profile=self.profile,
+            time=rows[:, 0],
+            target=self.profile.at(rows[:, 0]),
+            c=rows[:, 1],
+            state=self.state,
+            reason=self._reason,
+        )

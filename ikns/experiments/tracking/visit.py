@@ -1,0 +1,193 @@
+"""A subject's visit: the steps of the schedule, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Literal, NamedTuple
+
+from ikns.errors import InvalidInput
+from ikns.experiments.tracking.machine import ALIGN, TrackingRecord, TrialMachine
+from ikns.experiments.tracking.profiles import draw_profile
+from ikns.experiments.tracking.schedule import Step
+
+__all__ = ["Attempt", "Visit"]
+
+
+class Attempt(NamedTuple):
+    """How a step went once.
+
+    Parameters
+    ----------
+    key : str
+        Of the step.
+    outcome : {"done", "aborted", "skipped", "again"}
+        An aborted trial comes again. "again": what was done before is to be repeated
+        and does not count.
+    reason : str
+    record : TrackingRecord or None
+        None where nothing was recorded or it was not kept in memory.
+    """
+
+    key: str
+    outcome: Literal["done", "aborted", "skipped", "again"]
+    reason: str = ""
+    record: TrackingRecord | None = None
+
+
+class Visit:
+    """Where a subject is in the schedule. No screen, no clock, no disk.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+        From :func:`ikns.experiments.tracking.schedule`.
+    attempts : iterable of Attempt
+        Of a visit that was broken off: it goes on where it stopped.
+    align : float
+        Time before each profile, s.
+
+    Attributes
+    ----------
+    attempts : list of Attempt
+        Everything that was tried, in order; nothing is ever taken out.
+    trial : TrialMachine or None
+        The trial that goes on.
+
+    Examples
+    --------
+    >>> from ikns.experiments.tracking.schedule import schedule
+    >>> visit = Visit(schedule(0, training=0))
+    >>> trial = visit.begin(0.0)
+    >>> visit.abort(2.0, "a marker fell off")
+    >>> trial = visit.begin(60.0)
+    >>> trial.check(90.0).state, visit.finish(), len(visit.remaining)
+    ('done', True, 18)
+    """
+
+    def __init__(
+        self,
+        steps: Sequence[Step],
+        attempts: Iterable[Attempt] = (),
+        *,
+        align: float = ALIGN,
+    ) -> None:
+        self.steps, self.align = tuple(steps), align
+        self.attempts = list(attempts)
+        self.trial: TrialMachine | None = None
+        self._rest_end: float | None = None
+        self._rested = {
+            i
+            for i, step in enumerate(self.steps)
+            if step.kind == "rest" and any(s.key in self.ended for s in self.steps[i:])
+        }
+        known = {step.key for step in self.steps}
+        strangers = sorted({a.key for a in self.attempts} - known)
+        if strangers:
+            raise InvalidInput(
+                f"expected attempts at steps of this schedule, found {strangers[0]}."
+            )
+
+    @property
+    def ended(self) -> dict[str, Attempt]:
+        """Last attempt at each step that counts as done or was skipped, by key."""
+        last = {a.key: a for a in self.attempts}
+        return {k: a for k, a in last.items() if a.outcome in ("done", "skipped")}
+
+    @property
+    def remaining(self) -> tuple[Step, ...]:
+        """Steps still to do, the current one first."""
+        return tuple(self.steps[i] for i in self._left())
+
+    @property
+    def current(self) -> Step | None:
+        """What is to be done now; None when all is."""
+        return self.remaining[0] if self.remaining else None
+
+    def begin(self, now: float) -> TrialMachine:
+        """Start the current trial.
+
+        Raises
+        ------
+        InvalidInput
+            When one goes on, a rest is due, or nothing is left.
+        """
+        step = self.current
+        if self.trial is not None or step is None or step.kind == "rest":
+            found = "one that goes on" if self.trial else "none"
+            found = "a rest" if step is not None and step.kind == "rest" else found
+            raise InvalidInput(f"expected a trial to begin, found {found}.")
+        profile = draw_profile(step.profile, step.seed, seconds=step.seconds)
+        self.trial = TrialMachine(profile, align=self.align)
+        self.trial.start(now)
+        return self.trial
+
+    def finish(self) -> bool:
+        """Put down the trial if it has come to its end; say whether it had."""
+        if self.trial is None or self.trial.state != "done":
+            return False
+        self._put("done", "")
+        return True
+
+    def abort(self, now: float, reason: str) -> None:
+        """Break the trial off; it comes again at once."""
+        if self.trial is not None:
+            self.trial.abort(now, reason)
+            self._put("done" if self.trial.state == "done" else "aborted", reason)
+
+    def skip(self, now: float, reason: str) -> None:
+        """Leave the current step out."""
+        if self.trial is not None:
+            self.trial.abort(now, reason)
+        step = self.current
+        if step is not None and step.kind == "rest":
+            self._rested.add(self._left()[0])
+        elif step is not None:
+            self._put("skipped", reason)
+
+    def repeat(self, reason: str) -> None:
+        """Have the last finished or skipped step again; what it gave does not count."""
+        if self.trial is not None:
+            raise InvalidInput("expected no trial going on, found one: abort it.")
+        ended = self.ended
+        for attempt in reversed(self.attempts):
+            if attempt.key in ended:
+                self.attempts.append(Attempt(attempt.key, "again", reason))
+                return
+        raise InvalidInput("expected a step that was done to repeat, found none.")
+
+    def rest(self, now: float) -> float:
+        """Time left of the rest that is due, s; 0 when none is, or it is over."""
+        step = self.current
+        if step is None or step.kind != "rest":
+            return 0.0
+        if self._rest_end is None:
+            self._rest_end = now + step.seconds
+        left = self._rest_end - now
+        if left <= 0:
+            self._rest_end = None
+            self._rested.add(self._left()[0])
+        return max(0.0, left)
+
+    def records(self) -> dict[str, TrackingRecord]:
+        """Return the records that count, by key."""
+        return {
+            key: a.record
+            for key, a in self.ended.items()
+            if a.outcome == "done" and a.record is not None
+        }
+
+    def _left(self) -> list[int]:
+        ended, rested = self.ended, self._rested
+        return [
+            i
+            for i, step in enumerate(self.steps)
+            if (i not in rested if step.kind == "rest" else step.key not in ended)
+        ]
+
+    def _put(self, outcome: Literal["done", "aborted", "skipped"], reason: str) -> None:
+        step, record = self.current, None
+        assert step is not None
+        if self.trial is not None:
+            record = self.trial.record
+        self.attempts.append(Attempt(step.key, outcome, reason, record))
+        self.trial = None

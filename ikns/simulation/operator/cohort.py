@@ -1,0 +1,213 @@
+"""Participants: a virtual body, calibrated, and an operator to move it; simulated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.calibration import calibrate
+from ikns.errors import InvalidInput
+from ikns.simulation.arm import Arm, girdle, self_motion
+from ikns.simulation.operator.ability import CONDITIONS, Ability, sample_abilities
+from ikns.simulation.operator.arm_loop import ArmLoop
+from ikns.simulation.places import GIRDLE_FOLLOW, Place, comfortable_posture
+from ikns.simulation.protocol import Protocol, simulate_protocol
+from ikns.simulation.subject import virtual_subject
+from ikns.skeleton import Skeleton
+from ikns.subject import Subject
+
+__all__ = ["Participant", "draw_participant", "tracking_place"]
+
+Array = NDArray[np.float64]
+
+#: Persons drawn until one can do the protocol.
+_TRIES = 20
+#: Turns of the forearm tried for room to swivel, and the least room, rad: as in the
+#: simulated protocol.
+_TURNS, _LEAST = np.radians([0.0, 25.0, -25.0]), np.radians(40.0)
+
+
+@dataclass(frozen=True)
+class Participant:
+    """A simulated person, calibrated and ready to track.
+
+    Parameters
+    ----------
+    number : int
+        In the cohort, from 0.
+    seed : int
+        Of the cohort.
+    abilities : dict of str to Ability
+        By condition; before practice.
+    protocol : Protocol
+        The calibration as it was recorded, with the true body.
+    subject : Subject
+        As calibrated.
+    angles : (18,) array
+        Joint angles of the rest of the body.
+    place : Place
+        Where the hand is held while tracking.
+    """
+
+    number: int
+    seed: int
+    abilities: dict[str, Ability]
+    protocol: Protocol
+    subject: Subject
+    angles: Array
+    place: Place
+
+    def arm_loop(
+        self, *, seconds: float, rate: float, seed: Any, **more: Any
+    ) -> ArmLoop:
+        """Arm, cameras and map of this person for so many seconds of frames.
+
+        `more` goes to :class:`ArmLoop`; noise and gaps are those of the calibration if
+        not given.
+        """
+        for key in ("marker_noise", "occluded"):
+            more.setdefault(key, self.protocol.settings[key])
+        arm = Arm(self.protocol.subject.skeleton, self.protocol.side)
+        return ArmLoop(
+            arm,
+            self.angles,
+            self.place,
+            self.subject,
+            frames=round(seconds * rate) + 1,
+            rate=rate,
+            seed=np.random.default_rng(seed),
+            skin=self.protocol.skin,
+            **more,
+        )
+
+
+def draw_participant(
+    number: int,
+    *,
+    seed: int,
+    soft_tissue: float = 3e-3,
+    latency: float = 0.05,
+    **protocol: Any,
+) -> Participant:
+    """Draw a person, let it go through the calibration, calibrate it.
+
+    Anthropometry is sampled from ANSUR II, ability from ``parameters.toml``. Who cannot
+    reach the points of the protocol is replaced by another person.
+
+    Parameters
+    ----------
+    number : int
+        In the cohort; the same number and seed give the same person.
+    seed : int
+        Of the cohort.
+    soft_tissue : float
+        Displacement of markers over bones, m, root mean square.
+    latency : float
+        See :func:`ikns.simulation.operator.sample_abilities`, s.
+    **protocol
+        Of :func:`ikns.simulation.simulate_protocol`. Free exploration, which no
+        calibration uses, is left out by default.
+
+    Raises
+    ------
+    InvalidInput
+        When nobody of 20 can do the protocol.
+    """
+    reason: InvalidInput | None = None
+    for attempt in range(_TRIES):
+        drawn = np.random.SeedSequence([seed, number, attempt]).generate_state(2)
+        body_seed, trial_seed = (int(word) for word in drawn)
+        try:
+            person = virtual_subject(body_seed)
+            run = simulate_protocol(
+                person,
+                seed=trial_seed,
+                soft_tissue=soft_tissue,
+                **({"free_seconds": 0.1} | protocol),
+            )
+            angles, place = tracking_place(run)
+        except InvalidInput as error:
+            reason = error
+            continue
+        adult = person.adult
+        subject = calibrate(
+            run.static.recording,
+            [run.points.recording],
+            generic=Skeleton.from_anthropometry(
+                adult.stature_m, adult.mass_kg, adult.sex
+            ),
+            chain=f"{run.side}_arm",
+        )
+        abilities = {
+            name: sample_abilities(
+                number + 1, seed=seed, condition=name, latency=latency
+            )[number]
+            for name in CONDITIONS
+        }
+        return Participant(number, seed, abilities, run, subject, angles, place)
+    raise InvalidInput(f"nobody of {_TRIES} can do the protocol: {reason}")
+
+
+def tracking_place(
+    protocol: Protocol, position: Array | None = None
+) -> tuple[Array, Place]:
+    """Find a hand pose to hold, as this person held the points of the calibration.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        Of one arm.
+    position : (3,) array, optional
+        In the thorax frame, m. Default: the middle of the points.
+
+    Returns
+    -------
+    angles : (18,) array
+        Joint angles of the rest of the body.
+    place : Place
+
+    Raises
+    ------
+    InvalidInput
+        When it is out of reach or leaves the elbow no room.
+    """
+    arm = Arm(protocol.subject.skeleton, protocol.side)
+    truth, point = protocol.points.truth, protocol.points.point
+    where = protocol.places.mean(axis=0) if position is None else np.array(position)
+    rows = [np.flatnonzero(point == k) for k in range(len(protocol.places))]
+    first = np.array([row[0] for row in rows])  # at rest, in the comfortable posture
+    angles = truth.angles[first].mean(axis=0)
+    postures = truth.angles[first][:, arm.columns]
+    rest = np.array(
+        [p[:2] - girdle(p, np.zeros(2), follow=GIRDLE_FOLLOW) for p in postures]
+    ).mean(axis=0)
+    swivel = float(protocol.points.swivel[first].mean())
+    half = float(np.mean([np.ptp(protocol.points.swivel[row]) for row in rows])) / 2
+    best: Place | None = None
+    for turn in _TURNS:
+        posture = comfortable_posture(
+            arm,
+            angles,
+            where,
+            swivel=swivel,
+            wrist=postures[:, 6:].mean(axis=0) + [turn, 0.0, 0.0],
+            girdle_rest=rest,
+        )
+        body = arm.put(angles, posture)
+        motion = self_motion(arm, body, lowest=swivel - half, highest=swivel + half)
+        here = Place(posture, *arm.hand(body), arm.swivel(body), motion)
+        if best is None or _room(here) > _room(best) + np.radians(3.0):
+            best = here
+    if best is None or _room(best) < _LEAST:
+        raise InvalidInput(
+            f"the elbow has no room to swivel with the {arm.side} hand at "
+            f"{np.round(where, 3)} m in the thorax frame; choose another place."
+        )
+    return angles, best
+
+
+def _room(place: Place) -> float:
+    return 0.0 if place.motion is None else float(np.ptp(place.motion.swivel))
