@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.errors import InvalidInput
+from ikns.errors import IknsError, InvalidInput
 from ikns.experiments.live_calibration.point_verdict import judge_point
 from ikns.experiments.live_calibration.protocol import Step
 from ikns.experiments.live_calibration.verdict import Verdict, judge_free, judge_static
@@ -77,6 +77,22 @@ class Judge:
         """Say what a recording of a step is good for; None stands for no frames."""
         if recording is None:
             return Verdict(False, False, "No frames came.", {})
+        try:
+            return self._judge(step, recording)
+        except (IknsError, np.linalg.LinAlgError) as error:
+            # The person is still there and can do it again.
+            return Verdict(False, False, f"It cannot be judged: {error}", {})
+
+    def accept(self, step: Step, verdict: Verdict) -> None:
+        """Learn from a step that was accepted."""
+        if verdict.skeleton is not None:
+            self.skeleton = verdict.skeleton
+        if verdict.explored is not None:
+            self.explored = verdict.explored
+        if verdict.place is not None:
+            self.places[step.name] = verdict.place
+
+    def _judge(self, step: Step, recording: Recording) -> Verdict:
         if step.kind == "static":
             return judge_static(
                 recording,
@@ -97,12 +113,3 @@ class Judge:
             min_still=self._min_still,
             earlier=self.places,
         )
-
-    def accept(self, step: Step, verdict: Verdict) -> None:
-        """Learn from a step that was accepted."""
-        if verdict.skeleton is not None:
-            self.skeleton = verdict.skeleton
-        if verdict.explored is not None:
-            self.explored = verdict.explored
-        if verdict.place is not None:
-            self.places[step.name] = verdict.place
