@@ -65,7 +65,7 @@ from ikns.simulation.protocol import _RESTING, _STATIC_SD, _pose
 from ikns.simulation.wander import tremor, wander
 from ikns.skeleton import Skeleton
 from ikns.view.render import png
-from ikns.view.style import INK, PALE, RED, house_style, new_figure
+from ikns.view.style import GREY, INK, RED, house_style, new_figure
 
 CHAIN, SIDE = "right_arm", "right"
 POINTS, RATE, TRUE_RATE = 3, 50.0, 25.0
@@ -351,7 +351,7 @@ def figure(subjects: list[dict[str, list[list[float]]]]) -> Figure:
             at = np.arange(len(rows))
             hit = (rows[:, 1] <= rows[:, 3]) & (rows[:, 3] <= rows[:, 2])
             # Misses differ in width as well as in color.
-            for chosen, color, width in ((hit, PALE, 0.6), (~hit, RED, 1.4)):
+            for chosen, color, width in ((hit, GREY, 0.5), (~hit, RED, 1.4)):
                 axes.vlines(
                     at[chosen], *rows[chosen, 1:3].T, color=color, lw=width, zorder=1
                 )
