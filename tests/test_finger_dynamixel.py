@@ -248,6 +248,18 @@ def test_a_port_that_comes_back_is_taken_up_again(servo, wire):
         assert finger.state().mode == "active"
 
 
+def test_a_port_that_comes_back_without_answers_is_told_to_let_go(servo, wire):
+    # Questions alone would keep the servo's watchdog content, and it under torque.
+    with finger_on(wire, watchdog=2.0) as finger:
+        stream(finger, 0.8, 0.1)
+        wire.inject("mute")
+        wire.inject("unplug", duration=0.1)
+        wait_for(lambda: not servo.torque)
+        assert not servo.watchdog_error
+        assert finger.state().mode == "safe"
+        wire.mend()
+
+
 def test_connecting_again_in_vain_leaves_it_doing_nothing(servo, wire):
     with finger_on(wire) as finger:
         stream(finger, 0.8, 0.1)

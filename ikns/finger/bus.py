@@ -241,6 +241,9 @@ class Bus:
         try:
             answer, result, error = self._packets.txRxPacket(self._port, packet)
         except _lost() as lost:
+            self._port.is_using = False
+            if "timeout" in type(lost).__name__.lower():  # of pyserial, for a write
+                raise silent from None
             raise Unplugged(f"{self.port}: {_why(lost)}.") from None
         except IndexError:  # from within the SDK: the answer is shorter than it says
             self._port.is_using = False

@@ -264,5 +264,7 @@ class Drive:
         try:
             self._bus.open()
             self._bus.check(diagnose=False)
+        except NoAnswer:
+            pass  # it may hear all the same, so it must be told to let go
         except FingerError:
             self._bus.close()
