@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
-from scipy.special import gammaln
+from scipy import stats
+from scipy.special import gammaln, nctdtrinc
 
 from ikns.experiments.statistics.pairs import Pairs
 from ikns.experiments.statistics.wording import interval_text, number
@@ -78,27 +78,13 @@ def cohens_dz(pairs: Pairs) -> Effect:
     n = len(d)
     dz = float(d.mean() / d.std(ddof=1))
     t = dz * math.sqrt(n)
-    low, high = (_noncentrality(t, n - 1, tail) for tail in (0.975, 0.025))
+    low, high = (float(nctdtrinc(n - 1, tail, t)) for tail in (0.975, 0.025))
     return _effect(
         "Cohen's dz",
         (dz, low / math.sqrt(n), high / math.sqrt(n)),
         "",
         "noncentral t",
         means,
-    )
-
-
-def _noncentrality(t: float, degrees: int, share: float) -> float:
-    """Noncentrality with which a share of all t is smaller than this."""
-    reach = abs(t) + 10.0
-    while stats.nct.cdf(t, degrees, -reach) < share:
-        reach *= 2
-    while stats.nct.cdf(t, degrees, reach) > share:
-        reach *= 2
-    return float(
-        optimize.brentq(
-            lambda shift: stats.nct.cdf(t, degrees, shift) - share, -reach, reach
-        )
     )
 
 

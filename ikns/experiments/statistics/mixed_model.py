@@ -172,7 +172,7 @@ def mixed_model(
         for name in names:
             if not np.any((place == at) & (side == name)):
                 raise NotEnoughData(
-                    f"expected trials of {name} at {level} {at!r}, found none."
+                    f"expected trials of {name} at {level} {str(at)!r}, found none."
                 )
     if np.ptp(y) <= 1e-12 * np.abs(y).max():
         raise NotEnoughData(
@@ -273,7 +273,7 @@ def _fit(y: Array, design: Array, x: Array, who: NDArray[np.str_]) -> Any:
             warnings.simplefilter("ignore")
             try:
                 fit = library.MixedLM(y, design, who, exog_re=random).fit(
-                    reml=True, free=keep
+                    reml=True, free=keep, method=["bfgs", "lbfgs"]
                 )
                 good = bool(fit.converged) and np.all(
                     np.diag(np.asarray(fit.cov_params()))[: design.shape[1]] > 0
