@@ -269,7 +269,7 @@ class SampleSize:
             if self.found.margin is not None
             else "a difference"
         )
-        given = f"with a true difference of {number(self.found.difference)}"
+        given = f"(true difference {number(self.found.difference)})"
         power = f"{100 * self.found.power:.1f} +- {100 * self.found.error:.1f} %"
         if self.subjects is None:
             return (
