@@ -1,0 +1,1 @@
+"""Parts of ``live_loop.py``."""

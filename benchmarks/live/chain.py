@@ -1,0 +1,199 @@
+"""What the loop does to a finger and a source, watched from outside."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from ikns.control.controller import Settings
+from ikns.errors import FileError
+from ikns.finger import Finger, FingerState, Limits
+from ikns.recording import Recording
+from ikns.runtime import replay_run
+from ikns.session import RunWriter, check_session, create_session, open_run, read_run
+from ikns.subject import FILES, Subject
+
+__all__ = ["Clock", "Told", "Watched", "session_for", "session_holds", "violations"]
+
+
+class Clock:
+    """`time.monotonic` that remembers what it said last."""
+
+    def __init__(self) -> None:
+        self.last = time.monotonic()
+
+    def __call__(self) -> float:
+        """Seconds."""
+        self.last = time.monotonic()
+        return self.last
+
+
+class Told(NamedTuple):
+    """A command.
+
+    Parameters
+    ----------
+    earliest, latest : float
+        Bounds of the finger's time, s.
+    sent, measured : float
+        Flexion.
+    """
+
+    earliest: float
+    latest: float
+    sent: float
+    measured: float
+
+
+class Watched:
+    """A finger, and when it was told what.
+
+    Parameters
+    ----------
+    finger : Finger
+    clock : Clock
+        The finger's own, where it takes one.
+
+    Attributes
+    ----------
+    told : list of Told
+    safe_at, relaxed_at : float
+        When it was told so first; NaN while not.
+    """
+
+    def __init__(self, finger: Finger, clock: Clock | None = None) -> None:
+        self.finger, self.clock = finger, clock
+        self.resolution = finger.resolution
+        self.told: list[Told] = []
+        self.safe_at = self.relaxed_at = float("nan")
+
+    @property
+    def stall(self) -> float:
+        """Longest time between two commands beyond the loop's 20 ms, s."""
+        pairs = pairwise(self.told)
+        return max((b.latest - a.latest for a, b in pairs), default=0.0) - 0.02
+
+    def connect(self) -> None:
+        """Connect."""
+        self.finger.connect()
+
+    def command(self, flexion: float) -> float:
+        """Tell the finger."""
+        before = time.monotonic()
+        sent = self.finger.command(flexion)
+        after = time.monotonic()
+        if self.clock is not None:
+            before = after = self.clock.last
+        measured = self.finger.state().flexion
+        self.told.append(Told(before, after, sent, measured))
+        return sent
+
+    def state(self) -> FingerState:
+        """Ask the finger."""
+        return self.finger.state()
+
+    def make_safe(self, reason: str) -> None:
+        """Make it safe."""
+        self.finger.make_safe(reason)
+        if self.safe_at != self.safe_at:
+            self.safe_at = time.monotonic()
+
+    def relax(self) -> None:
+        """Relax it."""
+        self.finger.relax()
+        if self.relaxed_at != self.relaxed_at:
+            self.relaxed_at = time.monotonic()
+
+    def __enter__(self) -> Self:
+        """Connect."""
+        self.connect()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Relax, as the finger itself does on its way out."""
+        self.finger.__exit__(*exception)
+        self.relax()
+
+
+def violations(told: list[Told], limits: Limits, resolution: float) -> int:
+    """Commands that were out of range, too fast, or accelerated too hard.
+
+    Times are known to their bounds, and flexion to the device's resolution, so a
+    velocity is an interval. Mean velocities of neighboring steps differ by at most the
+    acceleration times the longer of them, however often the limiter stepped in between.
+    After more than the limiter's longest step the finger has stood still, and motion
+    may start from rest as if that much time had passed. A finger that had let go and
+    takes hold again is told to stay where it is measured: that is no motion.
+    """
+    count = 0
+    before, speeds, length = None, None, 0.0
+    for now in told:
+        if not limits.lower - 1e-12 <= now.sent <= limits.upper + 1e-12:
+            count += now.sent == now.sent
+            before = speeds = None
+            continue
+        if before is None:
+            before = now
+            continue
+        moved, most = now.sent - before.sent, now.latest - before.earliest
+        if abs(moved) <= limits.rate * most + resolution + 1e-9:
+            least = now.earliest - before.latest
+            if least <= 0:
+                continue
+            if most > limits.longest_step and speeds is not None:
+                speeds = (min(speeds[0], 0.0), max(speeds[1], 0.0))
+                least = min(least, limits.longest_step)
+            ends = _speeds(moved, least, most, resolution)
+            if speeds is not None:
+                apart = max(ends[0] - speeds[1], speeds[0] - ends[1])
+                count += apart > limits.acceleration * max(most, length)
+            speeds, length = ends, most
+        else:
+            # From where it is measured it may already have made a step again.
+            near = resolution + 0.01 + limits.rate * most
+            count += not abs(now.sent - now.measured) <= near
+            speeds = None
+        before = now
+    return count
+
+
+def _speeds(
+    moved: float, least: float, most: float, resolution: float
+) -> tuple[float, float]:
+    off = resolution + 1e-9
+    ends = [(moved + by) / taken for by in (-off, off) for taken in (least, most)]
+    return min(ends), max(ends)
+
+
+def session_for(
+    folder: Path, subject: Subject, person: Path, recording: Recording, **more: object
+) -> RunWriter:
+    """Begin a session as `ikns run` does."""
+    return open_run(
+        create_session(folder),
+        labels=subject.skeleton.marker_set.labels,
+        joint_names=subject.skeleton.joint_names,
+        rate=recording.rate,
+        n_dof=subject.null_space_map.n_dof,
+        configuration={"settings": dataclasses.asdict(Settings())},
+        subject={name: (person / name).read_text("utf-8") for name in FILES},
+        **more,
+    )
+
+
+def session_holds(folder: Path, rows: int | None = None) -> str:
+    """Say what is wrong with a session: its rows, its contents, or its replay."""
+    try:
+        found = check_session(folder)
+        run = read_run(folder)
+        if rows is not None and len(run.frame) != rows:
+            found.append(f"{len(run.frame)} rows of {rows}.")
+        again = replay_run(run)
+    except FileError as error:
+        return str(error)
+    if not again.same:
+        found.append(f"the replay differs: {again.different}.")
+    return " ".join(found)
