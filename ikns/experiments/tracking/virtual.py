@@ -11,19 +11,19 @@ from ikns.experiments.tracking.machine import ALIGN, TrackingRecord, TrialMachin
 from ikns.experiments.tracking.profiles import Profile
 from ikns.experiments.tracking.schedule import Step
 from ikns.simulation.operator import CONDITIONS, Delay, Operator, Participant, track
-from ikns.simulation.operator.loop import Driven
+from ikns.simulation.operator.loop import Driven, Steering
 
 __all__ = ["virtual_step", "virtual_trial"]
 
 
 def virtual_trial(
-    operator: Operator, driven: Driven, profile: Profile, *, align: float = ALIGN
+    operator: Steering, driven: Driven, profile: Profile, *, align: float = ALIGN
 ) -> TrackingRecord:
     """Let an operator go through one trial.
 
     Parameters
     ----------
-    operator : Operator
+    operator : Operator or Copyist
         Fresh; it sets the rate.
     driven : Driven
         What it drives, fresh too.

@@ -50,6 +50,8 @@ class Participant:
         Joint angles of the rest of the body.
     place : Place
         Where the hand is held while tracking.
+    redrawn : int
+        Persons before this one who could not reach the points of the protocol.
     """
 
     number: int
@@ -59,6 +61,7 @@ class Participant:
     subject: Subject
     angles: Array
     place: Place
+    redrawn: int = 0
 
     def arm_loop(
         self, *, seconds: float, rate: float, seed: Any, **more: Any
@@ -115,6 +118,8 @@ def draw_participant(
     ------
     InvalidInput
         When nobody of 20 can do the protocol.
+    NotEnoughData
+        When the calibration fails, as it does with too short a stay at the points.
     """
     reason: InvalidInput | None = None
     for attempt in range(_TRIES):
@@ -140,6 +145,7 @@ def draw_participant(
                 adult.stature_m, adult.mass_kg, adult.sex
             ),
             chain=f"{run.side}_arm",
+            n_points=len(run.places),
         )
         abilities = {
             name: sample_abilities(
@@ -147,7 +153,9 @@ def draw_participant(
             )[number]
             for name in CONDITIONS
         }
-        return Participant(number, seed, abilities, run, subject, angles, place)
+        return Participant(
+            number, seed, abilities, run, subject, angles, place, redrawn=attempt
+        )
     raise InvalidInput(f"nobody of {_TRIES} can do the protocol: {reason}")
 
 

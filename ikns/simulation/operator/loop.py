@@ -11,11 +11,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
-from ikns.simulation.operator.model import Operator
 
-__all__ = ["Delay", "Driven", "Tracked", "track"]
+__all__ = ["Delay", "Driven", "Steering", "Tracked", "track"]
 
 Array = NDArray[np.float64]
+
+
+class Steering(Protocol):
+    """What an operator is: it looks ahead and at the pointer, and moves a limb.
+
+    `rate` in samples per second; `preview`, how far ahead it looks, s; `place`, where
+    the limb is at first, 0 to 1.
+    """
+
+    @property
+    def rate(self) -> float: ...  # noqa: D102
+
+    @property
+    def preview(self) -> float: ...  # noqa: D102
+
+    @property
+    def place(self) -> float: ...  # noqa: D102
+
+    def step(self, ahead: float, seen: float) -> float:
+        """Take what is seen now; give the limb of the next sample."""
+        ...
 
 
 class Driven(Protocol):
@@ -67,7 +87,7 @@ class Tracked(NamedTuple):
 
 
 def track(
-    operator: Operator,
+    operator: Steering,
     target: Callable[[ArrayLike], Array],
     driven: Driven,
     *,
@@ -78,7 +98,7 @@ def track(
 
     Parameters
     ----------
-    operator : Operator
+    operator : Operator or Copyist
         Fresh; it sets the rate.
     target : callable
         Curve of 0 to 1 at times (s); it is looked at ahead of time.
@@ -98,7 +118,7 @@ def track(
             f"expected an end after the start, found {start:g} to {end:g}."
         )
     time = start + np.arange(n) / operator.rate
-    ahead = target(time + operator.ability.preview)
+    ahead = target(time + operator.preview)
     limb, c = np.empty(n), np.empty(n)
     limb[0] = operator.place
     c[0] = driven.step(limb[0])

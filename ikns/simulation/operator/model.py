@@ -33,6 +33,8 @@ _BEYOND = 0.05
 #: Bandwidth of the signal-dependent noise, rad/s: that of the limb, beyond which none
 #: would show (assumption).
 _SIGNAL_BANDWIDTH = 10.0
+#: Samples of noise drawn at a time.
+_BLOCK = 256
 
 
 class Operator:
@@ -90,7 +92,14 @@ class Operator:
             math.exp(-w / rate) for w in (ability.remnant_bandwidth, _SIGNAL_BANDWIDTH)
         ]
         self._keep = np.array(keep)
+        self._fresh = np.sqrt(1 - self._keep**2)
         self._noise = self._rng.normal(size=2)
+        self._drawn: list[Array] = []
+
+    @property
+    def preview(self) -> float:
+        """How far ahead the person looks, s."""
+        return self.ability.preview
 
     @property
     def place(self) -> float:
@@ -119,8 +128,9 @@ class Operator:
         # The end of the coming sample, less the delay, lies between the oldest two.
         old, young = self._errors[0], self._errors[1]
         a = self.ability
-        fresh = self._rng.normal(size=2) * np.sqrt(1 - self._keep**2)
-        self._noise = self._keep * self._noise + fresh
+        if not self._drawn:  # many at a time, for speed
+            self._drawn = list(self._rng.normal(size=(_BLOCK, 2)))
+        self._noise = self._keep * self._noise + self._fresh * self._drawn.pop()
         late = (1 - self._part) * young + self._part * old
         late += a.remnant * self._noise[0]
         late *= 1 + a.signal_noise * self._noise[1]
