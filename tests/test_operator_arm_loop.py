@@ -200,6 +200,22 @@ def test_the_same_participant_step_and_settings_give_the_same_record(person):
     assert not (one.c == other.c).all()
 
 
+def test_a_direct_trial_is_the_same_person_without_the_chain(person):
+    step = replace(schedule(0, seed=2)[-1], condition="ikns", kind="trial")
+    profile = draw_profile(step.profile, step.seed)
+    direct, whole = (
+        measure(
+            virtual_step(
+                person, step, profile, practised=9, rate=RATE, direct=way, **more
+            )
+        )
+        for way, more in ((True, {}), (False, CLEAN | {"latency": 0.06}))
+    )
+    assert direct.unseen == whole.unseen == 0
+    # Same noise, about the same loop: the errors differ by what the map bends.
+    assert direct.rmse == pytest.approx(whole.rmse, rel=0.4)
+
+
 def test_a_condition_that_no_virtual_operator_knows_is_refused(person):
     step = replace(schedule(0)[0], condition="mouse")
     with pytest.raises(InvalidInput, match="mouse"):

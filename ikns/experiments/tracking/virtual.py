@@ -61,6 +61,7 @@ def virtual_step(
     profile: Profile,
     *,
     practised: int,
+    direct: bool = False,
     rate: float = 100.0,
     latency: float = 0.05,
     **arm_loop: Any,
@@ -78,6 +79,8 @@ def virtual_step(
         Of the step.
     practised : int
         Trials done in this condition before, training included.
+    direct : bool
+        Leave body, cameras and map out: c is where the limb is, for comparison.
     rate : float
         Frames per second.
     latency : float
@@ -95,7 +98,7 @@ def virtual_step(
     noise, body = (int(word) for word in seeds.generate_state(2, np.uint64))
     ability = participant.abilities[step.condition].practised(practised)
     driven: Driven
-    if step.condition == "ikns":
+    if step.condition == "ikns" and not direct:
         loop = participant.arm_loop(
             seconds=ALIGN + profile.seconds,
             rate=rate,
