@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+import urllib.request
 
 import pytest
 from command_line import check_refused, contents
@@ -126,3 +127,24 @@ def test_a_signal_ends_a_run_in_order(files, tmp_path, number):
     result = json.loads(out)
     assert result["transitions"][-1]["reason"] == "asked to stop"
     assert main(["replay", str(session)]) == 0
+
+
+def test_the_body_is_shown_live_on_this_machine(files, monkeypatch, capfd):
+    seen = {}
+
+    def look(url):
+        # What a browser would ask for first, while the command runs.
+        with urllib.request.urlopen(url, timeout=30) as page:
+            seen[url] = page.read().decode()
+        return True
+
+    monkeypatch.setattr("webbrowser.open", look)
+    argv = run_argv(files, "--dry-run", "--view", "--json")
+    argv[argv.index("--source") + 1] = f"replay:{files / 'free.c3d'}"
+    assert main(argv) == 0
+    out, err = capfd.readouterr()
+    assert json.loads(out)["frames"] == 50
+    ((url, page),) = seen.items()
+    assert url.startswith("http://127.0.0.1:")
+    assert url in err
+    assert "Live" in page

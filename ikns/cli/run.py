@@ -7,7 +7,7 @@ import math
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 import ikns
+from ikns.cli.live_window import live_window
 from ikns.cli.options import AsJson, SubjectFolder
 from ikns.cli.output import show, table
 from ikns.errors import InvalidInput
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from ikns.session import RunWriter
 
 __all__ = ["run"]
+
+#: How often the line on the terminal is written, s.
+_LINE_EVERY = 0.2
 
 
 def run(
@@ -60,6 +64,9 @@ def run(
         float | None,
         typer.Option(help="Hold the finger while the hand is faster, m/s."),
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show the body live in a browser.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
@@ -106,7 +113,9 @@ def run(
                 )
             )
         stop = stack.enter_context(_stopped_by_signals())
-        line = stack.enter_context(_status_line())
+        shown = stack.enter_context(_status_line())
+        if view:
+            shown.append(stack.enter_context(live_window(calibrated, subject)))
         report = drive(
             stream,
             calibrated,
@@ -115,7 +124,8 @@ def run(
             session=writer,
             duration=math.inf if duration is None else duration,
             stop=stop,
-            on_status=line,
+            on_status=_each(shown) if shown else None,
+            status_every=1 / 30 if view else _LINE_EVERY,
         )
     result = _result(report) | {"session": session}
     show(
@@ -185,18 +195,30 @@ def _stopped_by_signals() -> Iterator[threading.Event]:
 
 
 @contextmanager
-def _status_line() -> Iterator[Any]:
+def _status_line() -> Iterator[list[Callable[[Status], None]]]:
     """Write one line over and over, while stderr is a terminal."""
     if not sys.stderr.isatty():
-        yield None
+        yield []
         return
+    last = -math.inf
 
     def write(status: Status) -> None:
-        sys.stderr.write(f"\r\x1b[K{_line(status)}")
-        sys.stderr.flush()
+        nonlocal last
+        if status.time - last >= _LINE_EVERY:
+            last = status.time
+            sys.stderr.write(f"\r\x1b[K{_line(status)}")
+            sys.stderr.flush()
 
-    yield write
+    yield [write]
     sys.stderr.write("\n")
+
+
+def _each(shown: list[Callable[[Status], None]]) -> Callable[[Status], None]:
+    def show(status: Status) -> None:
+        for one in shown:
+            one(status)
+
+    return show
 
 
 def _say(sentence: str) -> None:

@@ -58,6 +58,8 @@ class Status:
     c, flexion, measured : float
         Raw signal, what is asked, what the finger measured.
     state : str
+    q : (nq,) array
+        Configuration of the last frame; NaN before the first.
     """
 
     time: float
@@ -71,6 +73,7 @@ class Status:
     flexion: float
     measured: float
     state: str
+    q: NDArray[np.float64]
 
 
 @dataclass
@@ -203,7 +206,7 @@ class _Loop:
         self._finger, self._session = finger, session
         pace = source.rate * source.speed
         self._period = 1 / pace if pace else math.inf
-        self._names = len(controller.solver.skeleton.joint_names)
+        self._nowhere = np.full(len(controller.solver.skeleton.neutral()), np.nan)
         self._measured = math.nan
         self._first = math.nan
         self._last: Decision | None = None
@@ -292,6 +295,7 @@ class _Loop:
             flexion=self._controller.flexion,
             measured=self._measured,
             state=self._controller.machine.state,
+            q=self._nowhere if last is None else last.solved.q,
         )
 
     def _command(self) -> float:
