@@ -34,7 +34,7 @@ from ikns.experiments.statistics import (
     subject_means_t,
     within_subject_anova,
 )
-from ikns.experiments.statistics.published_tracking import subject_spread_limit
+from ikns.experiments.statistics.printed_spread import subject_spread_limit
 
 SUBJECTS, TRAJECTORIES, REPEATS = 10, ("T1", "T2", "T3"), 3
 SKILL, TRIAL = 0.8, 0.9  # standard deviations of RMSE, as the paper's are about 1
@@ -129,7 +129,7 @@ def main() -> None:
             )
         for name, hits in found.items():
             print(f"| {taste} ", end="")
-            print(share(name, hits, "at most 5" if "edge" in name else "5"))
+            print(share(name, hits, "at most 5" if "equivalence" in name else "5"))
         for name in ("condition", "interaction"):
             found[name] = []
         simpler = 0

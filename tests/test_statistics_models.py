@@ -1,7 +1,10 @@
 """Mixed model, times with a limit, learning curves, and all of them together."""
 
+import ast
 import importlib
 import math
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from ikns.errors import InvalidInput, NotEnoughData
+from ikns.experiments import statistics
 from ikns.experiments.statistics import (
     analyze_picking,
     analyze_tracking,
@@ -205,6 +209,8 @@ def test_a_success_at_the_limit_comes_before_a_failure() -> None:
     ):
         with pytest.raises(InvalidInput, match=words):
             time_test(table, **bad)
+    with pytest.raises(InvalidInput, match="numbers as time, found 'soon'"):
+        time_test({**table, "time": ["soon"] * 4}, limit=20.0)
     lost = {**table, "time": [20.0, 1.0, 5.0, math.nan]}
     with pytest.raises(InvalidInput, match="time of successful trials"):
         time_test(lost, limit=20.0)
@@ -312,6 +318,49 @@ def test_a_pick_and_place_study_is_analyzed_in_sentences() -> None:
     assert found.paper_left_out == 100 - good.sum()
     assert all(line.endswith(".") for line in found.sentences())
     assert "left out, as the paper did" in found.sentences()[0]
+
+
+def test_a_lost_trial_is_refused_or_counted() -> None:
+    table = picking(4)
+    fewer = {name: values[1:] for name, values in table.items()}
+    with pytest.raises(InvalidInput, match="found 0 and 1 of subject '0' at object"):
+        analyze_picking(fewer, limit=20.0)
+    found = analyze_picking(fewer, limit=20.0, unequal="keep")
+    assert (found.success.pairs, found.time.pairs) == (99, 99)
+
+
+def test_a_condition_that_never_succeeds_is_compared_all_the_same() -> None:
+    table = picking(3)
+    side, good = np.array(table["condition"]), np.array(table["success"], dtype=bool)
+    found = analyze_picking({**table, "success": good & (side == "ring")}, limit=20.0)
+    assert found.paper is None
+    assert found.success.succeeded == (0, 100)
+    assert found.time.restricted_means[0] == 20.0
+    assert math.isnan(found.time.survivors[0])
+    assert "would leave none" in found.time.sentence()
+    alike = {**table, "time": [5.0] * 200, "success": [True] * 200}
+    even = analyze_picking(alike, limit=20.0)
+    assert (even.time.p, even.success.p, even.effects) == (1.0, 1.0, ())
+
+
+def test_statsmodels_and_pandas_are_loaded_only_when_asked() -> None:
+    files = sorted(Path(statistics.__file__).parent.glob("*.py"))
+    assert len(files) > 10
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, (ast.Import, ast.ImportFrom)):
+                text = ast.unparse(node)
+                assert "pandas" not in text
+                assert "import statsmodels." not in text
+                assert "from statsmodels" not in text
+
+
+def test_without_statsmodels_one_is_told_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "statsmodels.regression.mixed_linear_model", None)
+    with pytest.raises(InvalidInput, match=r"pip install 'ikns\[study\]' brings.$"):
+        mixed_model(tracking(0), "rmse")
 
 
 def test_impossible_tables_get_one_sentence() -> None:

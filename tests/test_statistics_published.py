@@ -10,7 +10,7 @@ from statsmodels.stats.weightstats import ttost_paired
 
 from ikns.experiments.statistics import Finding, paper_reexamined
 from ikns.experiments.statistics.printed import PAPER
-from ikns.experiments.statistics.published_tracking import (
+from ikns.experiments.statistics.printed_spread import (
     difference_range,
     spread_range,
     standard_error,

@@ -4,8 +4,8 @@
 with a ``sentence()`` in plain words, which never takes a difference that was not found
 for equality. `pairs` is what paired tests take; `paired_tests` repeats the paper;
 `equivalence`, `effects`, `mixed_model`, `within_subject_anova`, `success`, `times` and
-`learning` stand beside it; `power` says how many participants; `published` examines the
-paper's printed numbers. scipy and statsmodels compute.
+`learning` stand beside it; `power` and `sample_size` say how many participants;
+`published` examines the paper's printed numbers. scipy and statsmodels compute.
 """
 
 from ikns.experiments.statistics.analysis import (
@@ -47,12 +47,11 @@ from ikns.experiments.statistics.pairs import Pairs, pair_arrays, pair_trials
 from ikns.experiments.statistics.power import (
     Design,
     Power,
-    SampleSize,
     Spread,
-    sample_size,
     simulated_power,
 )
 from ikns.experiments.statistics.published import Finding, paper_reexamined
+from ikns.experiments.statistics.sample_size import SampleSize, sample_size
 from ikns.experiments.statistics.success import (
     SuccessTest,
     success_pairs,

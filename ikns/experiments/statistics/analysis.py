@@ -31,7 +31,7 @@ from ikns.experiments.statistics.success import (
     success_test,
 )
 from ikns.experiments.statistics.table import Table, column, labels, two_conditions
-from ikns.experiments.statistics.times import TimeTest, time_test
+from ikns.experiments.statistics.times import TimeTest, restricted_pairs, time_test
 from ikns.experiments.statistics.within_subject_anova import (
     VarianceTable,
     within_subject_anova,
@@ -226,6 +226,7 @@ def analyze_picking(
     success: str = "success",
     level: str = "object",
     conditions: Sequence[str] | None = None,
+    unequal: Literal["refuse", "keep"] = "refuse",
 ) -> PickAnalysis:
     """Run the paper's test of pick and place, and the right ones.
 
@@ -238,12 +239,16 @@ def analyze_picking(
         When a trial was ended, s.
     time, success, level, conditions
         Columns, and the order of the difference.
+    unequal : "refuse" or "keep"
+        What to do about trials without a partner, as in :func:`pair_trials`.
 
     Raises
     ------
     InvalidInput, NotEnoughData
     """
-    outcome = success_pairs(table, success=success, level=level, conditions=conditions)
+    outcome = success_pairs(
+        table, success=success, level=level, conditions=conditions, unequal=unequal
+    )
     timed = time_test(
         table,
         limit=limit,
@@ -251,11 +256,16 @@ def analyze_picking(
         success=success,
         level=level,
         conditions=outcome.names,
+        unequal=unequal,
     )
-    good = np.asarray(column(table, success), dtype=bool)
-    raw = np.where(good, np.asarray(column(table, time), dtype=np.float64), limit)
-    pairs = pair_trials(
-        {**table, time: raw}, time, level=level, conditions=outcome.names, unit="s"
+    pairs = restricted_pairs(
+        table,
+        limit=limit,
+        time=time,
+        success=success,
+        level=level,
+        conditions=outcome.names,
+        unequal=unequal,
     )
     both = (outcome.first == 1) & (outcome.second == 1)
     try:

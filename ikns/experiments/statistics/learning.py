@@ -99,7 +99,7 @@ class LearningCurves:
             "exponential": "an exponential describes it best",
             "power law": "a power law describes it best",
         }[self.best]
-        also = f", and {' and '.join(near)} nearly as well" if near else ""
+        also = f", with {' and '.join(near)} nearly as good" if near else ""
         gains = [c.gain for c in self.curves if c.model == self.best]
         gain = (
             ""

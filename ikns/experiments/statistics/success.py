@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy import stats
@@ -69,13 +69,14 @@ def success_pairs(
     success: str = "success",
     level: str | None = "object",
     conditions: Sequence[str] | None = None,
+    unequal: Literal["refuse", "keep"] = "refuse",
 ) -> Pairs:
     """Pairs of successes, 1 or 0, from a table of trials, one a subject and level.
 
     Raises
     ------
     InvalidInput
-        For values that are not true or false, or repeats.
+        For values that are not true or false, repeats, or trials without a partner.
     """
     values = column(table, success)
     plain: list[Any] = values.tolist()
@@ -83,12 +84,14 @@ def success_pairs(
         odd = next(item for item in plain if item not in (0, 1))
         raise InvalidInput(f"expected {success} to be true or false, found {odd!r}.")
     columns = {**table, success: np.asarray(values, dtype=np.float64)}
-    pairs = pair_trials(columns, success, level=level, conditions=conditions)
+    pairs = pair_trials(
+        columns, success, level=level, conditions=conditions, unequal=unequal
+    )
     rows = int(np.isin(labels(table, "condition"), pairs.names).sum())
-    if rows > 2 * len(pairs.first):
+    if rows > 2 * len(pairs.first) + pairs.dropped:
         raise InvalidInput(
             f"expected one trial per subject, condition and {level or 'study'}, found "
-            f"{rows} in {2 * len(pairs.first)}."
+            f"{rows} for {2 * len(pairs.first) + pairs.dropped}."
         )
     return pairs
 

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from ikns.errors import InvalidInput, NotEnoughData
 
-__all__ = ["Table", "column", "finite_values", "labels", "two_conditions"]
+__all__ = [
+    "Table",
+    "column",
+    "finite_values",
+    "labels",
+    "numbers",
+    "two_conditions",
+]
 
 Array = NDArray[np.float64]
 Table = Mapping[str, Sequence[Any] | NDArray[Any]]
@@ -32,12 +39,20 @@ def column(table: Table, name: str) -> NDArray[Any]:
     return np.asarray(table[name])
 
 
+def numbers(values: Any, name: str) -> Array:
+    """Convert to floating point; what is missing becomes NaN."""
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        first = np.ravel(np.asarray(values, dtype=object))[0]
+        raise InvalidInput(
+            f"expected numbers as {name}, found {str(first)!r} or the like."
+        ) from None
+
+
 def finite_values(values: Any, name: str) -> Array:
     """Numbers of one axis, none missing."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInput(f"expected numbers as {name}, found {values!r}.") from None
+    array = numbers(values, name)
     if array.ndim != 1:
         raise InvalidInput(
             f"expected one axis of {name}, found an array of shape {array.shape}."

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy import stats
@@ -18,12 +19,12 @@ from scipy import stats
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.experiments.statistics.library import statsmodels
 from ikns.experiments.statistics.paired_tests import PairedT, subject_means_t
-from ikns.experiments.statistics.pairs import pair_trials
+from ikns.experiments.statistics.pairs import Pairs, pair_trials
 from ikns.experiments.statistics.success import success_pairs
-from ikns.experiments.statistics.table import Table, column, finite_values
+from ikns.experiments.statistics.table import Table, column, finite_values, numbers
 from ikns.experiments.statistics.wording import interval_text, number, p_text
 
-__all__ = ["TimeTest", "restricted_mean", "time_test"]
+__all__ = ["TimeTest", "restricted_mean", "restricted_pairs", "time_test"]
 
 
 @dataclass(frozen=True)
@@ -128,6 +129,33 @@ def restricted_mean(times: np.ndarray, success: np.ndarray, limit: float) -> flo
     return float(np.sum(heights * np.diff(steps)))
 
 
+def restricted_pairs(
+    table: Table,
+    *,
+    limit: float,
+    time: str = "time",
+    success: str = "success",
+    level: str | None = "object",
+    conditions: Sequence[str] | None = None,
+    unequal: Literal["refuse", "keep"] = "refuse",
+) -> Pairs:
+    """Pairs of times, failures at the limit, s. As :func:`time_test`."""
+    if not (math.isfinite(limit) and limit > 0):
+        raise InvalidInput(f"expected a time limit above 0 s, found {limit:g}.")
+    good = np.asarray(column(table, success), dtype=bool)
+    raw = np.where(good, numbers(column(table, time), time), limit)
+    finite_values(raw, f"{time} of successful trials")
+    if np.any((raw < 0) | (raw > limit)):
+        bad = raw[(raw < 0) | (raw > limit)][0]
+        raise InvalidInput(
+            f"expected times of successful trials of 0 to {limit:g} s, found {bad:g}."
+        )
+    columns = {**table, time: raw}
+    return pair_trials(
+        columns, time, level=level, conditions=conditions, unit="s", unequal=unequal
+    )
+
+
 def time_test(
     table: Table,
     *,
@@ -136,6 +164,7 @@ def time_test(
     success: str = "success",
     level: str | None = "object",
     conditions: Sequence[str] | None = None,
+    unequal: Literal["refuse", "keep"] = "refuse",
 ) -> TimeTest:
     """Compare times to success with failures counted at the limit.
 
@@ -146,6 +175,8 @@ def time_test(
         subject, condition and level. The time of a failed trial may be missing (NaN).
     limit : float
         When a trial was ended, s.
+    unequal : "refuse" or "keep"
+        What to do about trials without a partner, as in :func:`pair_trials`.
 
     Raises
     ------
@@ -154,19 +185,17 @@ def time_test(
     NotEnoughData
         When every trial failed.
     """
-    if not (math.isfinite(limit) and limit > 0):
-        raise InvalidInput(f"expected a time limit above 0 s, found {limit:g}.")
-    done = success_pairs(table, success=success, level=level, conditions=conditions)
-    good = np.asarray(column(table, success), dtype=bool)
-    raw = np.where(good, np.asarray(column(table, time), dtype=np.float64), limit)
-    finite_values(raw, f"{time} of successful trials")
-    if np.any((raw < 0) | (raw > limit)):
-        bad = raw[(raw < 0) | (raw > limit)][0]
-        raise InvalidInput(
-            f"expected times of successful trials of 0 to {limit:g} s, found {bad:g}."
-        )
-    pairs = pair_trials(
-        {**table, time: raw}, time, level=level, conditions=done.names, unit="s"
+    done = success_pairs(
+        table, success=success, level=level, conditions=conditions, unequal=unequal
+    )
+    pairs = restricted_pairs(
+        table,
+        limit=limit,
+        time=time,
+        success=success,
+        level=level,
+        conditions=done.names,
+        unequal=unequal,
     )
     a, b = done.first == 1, done.second == 1
     if not (a | b).any():

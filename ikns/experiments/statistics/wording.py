@@ -14,7 +14,7 @@ def number(value: float, unit: str = "") -> str:
     '0.00667 s'
     """
     if not math.isfinite(value):
-        text = "unknown" if math.isnan(value) else ("-" * (value < 0) + "infinite")
+        text = "unknown" if math.isnan(value) else "-" * (value < 0) + "infinity"
     else:
         text = f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
     return f"{text} {unit}".strip()
