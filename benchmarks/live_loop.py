@@ -116,7 +116,10 @@ def killed(pool: Executor, folder: Path, kills: int, seed: int) -> dict[str, Any
         "sessions": kills - len(wrong),
         "wrong": wrong,
         "validator": validated(seed, folder),
-        "motor_still_max_s": max(outcome.seconds["safe"] for outcome, _ in found),
+        "motor_still_max_s": max(
+            (one.seconds["safe"] for one, _ in found if one.stall <= LONGEST_STALL),
+            default=float("nan"),
+        ),
     }
 
 

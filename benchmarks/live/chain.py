@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -16,7 +17,15 @@ from ikns.runtime import replay_run
 from ikns.session import RunWriter, check_session, create_session, open_run, read_run
 from ikns.subject import FILES, Subject
 
-__all__ = ["Clock", "Told", "Watched", "session_for", "session_holds", "violations"]
+__all__ = [
+    "Canary",
+    "Clock",
+    "Told",
+    "Watched",
+    "session_for",
+    "session_holds",
+    "violations",
+]
 
 
 class Clock:
@@ -118,12 +127,40 @@ class Watched:
         self.relax()
 
 
-def violations(told: list[Told], limits: Limits, resolution: float) -> int:
+class Canary:
+    """A thread that does nothing but see how late the machine lets it run."""
+
+    def __init__(self) -> None:
+        self.stall = 0.0
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def _run(self) -> None:
+        before = time.monotonic()
+        while not self._done.wait(0.01):
+            now = time.monotonic()
+            self.stall, before = max(self.stall, now - before - 0.01), now
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """End."""
+        self._done.set()
+        self._thread.join()
+
+
+def violations(
+    told: list[Told], limits: Limits, resolution: float, *, between: bool = False
+) -> int:
     """Commands that were out of range, too fast, or accelerated too hard.
 
     Times are known to their bounds, and flexion to the device's resolution, so a
     velocity is an interval. Mean velocities of neighboring steps differ by at most the
-    acceleration times the longer of them, however often the limiter stepped in between.
+    acceleration times the longer of them; where the limiter steps `between` commands as
+    well, by that times the later and half of the earlier.
     After more than the limiter's longest step the finger has stood still, and motion
     may start from rest as if that much time had passed. A finger that had let go and
     takes hold again is told to stay where it is measured: that is no motion.
@@ -149,7 +186,8 @@ def violations(told: list[Told], limits: Limits, resolution: float) -> int:
             ends = _speeds(moved, least, most, resolution)
             if speeds is not None:
                 apart = max(ends[0] - speeds[1], speeds[0] - ends[1])
-                count += apart > limits.acceleration * max(most, length)
+                lasts = most + length / 2 if between else max(most, length)
+                count += apart > limits.acceleration * lasts
             speeds, length = ends, most
         else:
             # From where it is measured it may already have made a step again.

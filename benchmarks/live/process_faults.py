@@ -23,7 +23,7 @@ from ikns.session import mend_session, read_run
 from ikns.stream import Source
 from ikns.stream.replay import Replay
 from live import person
-from live.chain import Clock, Watched, session_for, session_holds, violations
+from live.chain import Canary, Clock, Watched, session_for, session_holds, violations
 from live.outcome import Outcome
 from live.servo_faults import WATCHDOG, still_at
 from live.stream_faults import BEAT, Struck
@@ -68,6 +68,7 @@ def _exception(seed: int, folder: Path) -> Outcome:
         session = Path(scratch) / "session"
         servo = Servo("xl430")
         with (
+            Canary() as canary,
             Wire(servo) as wire,
             session_for(session, subject, folder / "person", recording) as writer,
         ):
@@ -92,9 +93,11 @@ def _exception(seed: int, folder: Path) -> Outcome:
         "under torque" if left else "relaxed",
         {"safe": still_at(servo, raised) - raised},
         {"safe": _LEAVE},
-        violations(finger.told, finger.finger.safety.limits, finger.resolution),
+        violations(
+            finger.told, finger.finger.safety.limits, finger.resolution, between=True
+        ),
         wrong,
-        stall=finger.stall,
+        stall=max(finger.stall, canary.stall),
     )
 
 
@@ -170,7 +173,7 @@ def kill(
     with tempfile.TemporaryDirectory() as scratch:
         session = Path(scratch) / "session" if session is None else session
         servo = Servo("xl430")
-        with Wire(servo) as wire:
+        with Canary() as canary, Wire(servo) as wire:
             ours, theirs = context.Pipe()
             child = context.Process(
                 target=_drive, args=(folder, session, wire.port, theirs)
@@ -179,6 +182,8 @@ def kill(
             theirs.close()
             began = ours.recv()
             time.sleep(rng.uniform(0.3, 2.5))
+            # A child that the machine kept from running is safe before it is struck.
+            early = not servo.torque or servo.watchdog_error
             struck = time.monotonic()
             os.kill(child.pid, number)
             if number == signal.SIGSTOP:
@@ -210,6 +215,7 @@ def kill(
         outside,
         wrong,
         remarks,
+        stall=math.inf if early else canary.stall,
     )
     return outcome, lost
 

@@ -16,7 +16,7 @@ from ikns.runtime import run
 from ikns.stream import Frame, Source
 from ikns.stream.replay import Replay
 from live import person
-from live.chain import Watched, session_for, session_holds, violations
+from live.chain import Canary, Watched, session_for, session_holds, violations
 from live.outcome import Outcome
 from live.stream_faults import BEAT
 
@@ -113,6 +113,7 @@ def strike(name: str, seed: int, folder: Path) -> Outcome:
         session = Path(scratch) / "session"
         servo = Servo("xl430")
         with (
+            Canary() as canary,
             Wire(servo, link=Path(scratch) / "servo") as wire,
             session_for(session, subject, folder / "person", recording) as writer,
         ):
@@ -144,9 +145,9 @@ def strike(name: str, seed: int, folder: Path) -> Outcome:
         after[-2],
         seconds,
         promised,
-        violations(finger.told, limits, inner.resolution) + outside,
+        violations(finger.told, limits, inner.resolution, between=True) + outside,
         wrong,
         tuple(remarks),
         "holding" in after,
-        finger.stall,
+        max(finger.stall, canary.stall),
     )
