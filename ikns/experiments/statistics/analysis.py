@@ -45,6 +45,9 @@ __all__ = [
     "analyze_tracking",
 ]
 
+#: statsmodels' table takes minutes for a thousand subjects, as their number cubed.
+_MOST_ANOVA = 200
+
 
 @dataclass(frozen=True)
 class TrackingAnalysis:
@@ -58,7 +61,8 @@ class TrackingAnalysis:
     effects : tuple of Effect
     model : MixedModel
     anova : VarianceTable or None
-        None when a subject lacks a trajectory, or there is one only.
+        None when a subject lacks a trajectory, there is one only, or there are more
+        than 200 subjects.
     equivalence : Equivalence or None
         None without a declared margin.
     learning : dict
@@ -166,10 +170,12 @@ def analyze_tracking(
         table, value, level=level, conditions=names, unit=unit, unequal=unequal
     )
     means = pairs.subject_means()
-    try:
-        anova: VarianceTable | None = within_subject_anova(pairs)
-    except NotEnoughData:
-        anova = None
+    anova: VarianceTable | None = None
+    if pairs.subject_count <= _MOST_ANOVA:
+        try:
+            anova = within_subject_anova(pairs)
+        except NotEnoughData:
+            anova = None
     return TrackingAnalysis(
         paper=(pooled_t(pairs), normality(pairs)),
         subjects=subject_means_t(pairs),

@@ -94,7 +94,8 @@ def hedges_g_av(pairs: Pairs, *, seed: int = 0, resamples: int = 4999) -> Effect
     Comparable to designs with two groups, unlike dz, which grows with the correlation
     of the conditions. The correction is exact, for 2 (n - 1) degrees of freedom (Hedges
     1981, J Educ Stat 6:107; g_av as in Lakens 2013, Front Psychol 4:863). Its interval
-    is a bootstrap over subjects (BCa, scipy).
+    is a bootstrap over subjects (BCa, scipy), which with ten misses the truth in 7 % of
+    simulated studies instead of 5 (`benchmarks/paper_statistics.py`).
 
     Raises
     ------
@@ -120,6 +121,7 @@ def hedges_g_av(pairs: Pairs, *, seed: int = 0, resamples: int = 4999) -> Effect
             paired=True,
             vectorized=True,
             n_resamples=resamples,
+            batch=max(1_000_000 // n, 1),  # flat memory for large cohorts
             random_state=np.random.default_rng(seed),
         ).confidence_interval
     value = float(statistic(means.first, means.second))

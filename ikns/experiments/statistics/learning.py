@@ -180,18 +180,31 @@ def learning_curves(
 def _fit(
     model: str, k: Array, y: Array, who: NDArray[np.str_], name: str
 ) -> LearningCurve:
-    """Least squares: levels and gain are linear, the rate is searched on its log."""
-    levels = (who[:, None] == np.unique(who)).astype(np.float64)
-    people, rate = levels.shape[1], math.nan
+    """Least squares: levels and gain are linear, the rate is searched on its log.
 
-    def solve(design: Array) -> tuple[Array, float]:
-        found = np.asarray(np.linalg.lstsq(design, y, rcond=None)[0], dtype=np.float64)
-        return found, float(np.sum((y - design @ found) ** 2))
+    Levels drop out where every person's mean is taken away (Frisch and Waugh 1933).
+    """
+    _, person = np.unique(who, return_inverse=True)
+    counts = np.bincount(person)
+    people, gain, rate = len(counts), 0.0, math.nan
 
+    def centered(values: Array) -> Array:
+        means = np.bincount(person, values) / counts
+        return np.asarray(values - means[person], dtype=np.float64)
+
+    def curve(log_rate: float) -> Array:
+        r = math.exp(log_rate)
+        return np.exp(-(k - 1) / r) if model == "exponential" else k**-r
+
+    def solve(log_rate: float) -> tuple[float, float]:
+        x = centered(curve(log_rate))
+        b = float(x @ rest / (x @ x))
+        return b, float(np.sum((rest - b * x) ** 2))
+
+    rest = centered(y)
     if model == "constant":
-        coefficients, left = solve(levels)
-        coefficients = np.append(coefficients, 0.0)
-        parameters = people + 1  # with the noise
+        left, parameters = float(rest @ rest), people + 1  # with the noise
+        final = y
     else:
         # From a gain that is over within a trial to one still going on at the end.
         low, high = (
@@ -199,22 +212,17 @@ def _fit(
             if model == "exponential"
             else (math.log(0.05), math.log(8.0))
         )
-
-        def design(log_rate: float) -> Array:
-            r = math.exp(log_rate)
-            shape = np.exp(-(k - 1) / r) if model == "exponential" else k**-r
-            return np.column_stack([levels, shape])
-
         grid = np.linspace(low, high, 25)
-        at = int(np.argmin([solve(design(r))[1] for r in grid]))
+        at = int(np.argmin([solve(r)[1] for r in grid]))
         found = optimize.minimize_scalar(
-            lambda r: solve(design(r))[1],
+            lambda r: solve(r)[1],
             bounds=(grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]),
             method="bounded",
             options={"xatol": 1e-8},
         )
-        coefficients, left = solve(design(float(found.x)))
+        gain, left = solve(float(found.x))
         rate, parameters = math.exp(float(found.x)), people + 3
+        final = y - gain * curve(float(found.x))
     n = len(y)
     # A perfect fit has no noise to weigh it by: rounding stands in for it.
     noise = max(left / n, (1e-12 * float(np.abs(y).max())) ** 2)
@@ -222,8 +230,8 @@ def _fit(
     return LearningCurve(
         model,
         name,
-        float(coefficients[:people].mean()),
-        float(coefficients[people]),
+        float(np.mean(np.bincount(person, final) / counts)),
+        gain,
         rate,
         math.sqrt(left / n),
         aicc,
