@@ -57,6 +57,7 @@ def test_every_command_line_shown_is_one_that_the_program_knows(
         "control",
         "ik",
         "replay",
+        "robot",
         "run",
         "scale",
         "servo",

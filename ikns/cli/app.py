@@ -15,6 +15,7 @@ from ikns.cli.control import control
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
 from ikns.cli.replay import replay
+from ikns.cli.robot import robot
 from ikns.cli.run import run
 from ikns.cli.scale import scale
 from ikns.cli.servo import servo
@@ -37,6 +38,7 @@ for command in (
     ik,
     control,
     compare,
+    robot,
     ucm,
     view,
     run,
