@@ -11,7 +11,6 @@ from command_line import check_refused, contents
 
 from ikns.cli import main
 
-
 PROGRAM = "import sys; from ikns.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
