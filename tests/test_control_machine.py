@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ikns.control.controller import Settings
 from ikns.control.machine import SafetyMachine
 from ikns.control.smoothing import OneEuro
 from ikns.errors import InvalidInput
@@ -182,6 +183,26 @@ def test_delay_is_how_far_a_ramp_is_behind():
         value = smooth.step(slope * k * dt, dt)
     # After 30 s the ramp is followed steadily: what is left of the start is exp(-100).
     assert slope * 2999 * dt - value == pytest.approx(slope * smooth.delay, rel=1e-9)
+
+
+def test_what_the_live_defaults_cost_is_what_their_docstring_says():
+    dt, cutoff, beta = 0.01, Settings().cutoff, Settings().beta
+    resting = OneEuro(cutoff=cutoff, beta=0.0)
+    rng = np.random.default_rng(0)
+    noise = np.array([resting.step(x, dt) for x in rng.normal(size=20_000)])
+    # A quarter: the noise of 20 000 samples, some 9 of them alike, is known to 2 %.
+    assert noise.std() == pytest.approx(0.243, rel=0.08)
+    assert resting.delay == pytest.approx(0.080, abs=0.0005)
+    moving = OneEuro(cutoff=cutoff, beta=beta)
+    for k in range(3000):
+        moving.step(k * dt, dt)
+    # A delay L at speed 1 is seen as a speed of 1 + L / dt, and L = 1 / w:
+    # 2 pi L (cutoff + beta (1 + L / dt)) = 1.
+    rest, bend = cutoff + beta, beta / dt
+    L = (np.sqrt(rest**2 + 4 * bend / (2 * np.pi)) - rest) / (2 * bend)
+    # After 30 s the start is forgotten.
+    assert moving.delay == pytest.approx(L, rel=1e-6)
+    assert pytest.approx(0.016, abs=0.0005) == L
 
 
 def test_fast_signals_are_less_delayed():

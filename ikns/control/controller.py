@@ -34,9 +34,10 @@ class Settings:
     ----------
     cutoff, beta : float
         Of the smoothing, Hz and Hz per (unit of c / s); see
-        :class:`ikns.control.smoothing.OneEuro`. At rest 1 mm of camera noise moves c by
-        about 0.01; 2 Hz leave a third of it and cost 80 ms, a c that moves by 1 per
-        second costs 30 ms.
+        :class:`ikns.control.smoothing.OneEuro`. The defaults are ours: with a share
+        ``a = w dt / (1 + w dt)`` of each innovation (w = 2 pi times the cut-off) they
+        leave ``sqrt(a / (2 - a))``, a quarter, of white noise of 100 Hz at rest and
+        cost ``dt (1 - a) / a = 1 / w``, 80 ms; where c moves by 1 per second, 16 ms.
     dead_band : float
         Smaller changes of flexion are not passed on.
     hold_speed : float, optional

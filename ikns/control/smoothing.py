@@ -22,7 +22,9 @@ class OneEuro:
     cutoff : float
         Of a signal at rest, Hz.
     beta : float
-        How much the cut-off rises with the signal's speed, Hz per (unit / s).
+        How much the cut-off rises with the signal's speed, Hz per (unit / s). The speed
+        is that from the last output to the new input, as in the publication, so a
+        signal that runs ahead counts as faster than it is.
     speed_cutoff : float
         Of the low-pass on the speed itself, Hz; 1 in the publication.
 

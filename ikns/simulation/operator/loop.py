@@ -18,20 +18,22 @@ Array = NDArray[np.float64]
 
 
 class Steering(Protocol):
-    """What an operator is: it looks ahead and at the pointer, and moves a limb.
-
-    `rate` in samples per second; `preview`, how far ahead it looks, s; `place`, where
-    the limb is at first, 0 to 1.
-    """
+    """What an operator is: it looks ahead and at the pointer, and moves a limb."""
 
     @property
-    def rate(self) -> float: ...  # noqa: D102
+    def rate(self) -> float:
+        """Samples per second."""
+        ...
 
     @property
-    def preview(self) -> float: ...  # noqa: D102
+    def preview(self) -> float:
+        """How far ahead it looks, s."""
+        ...
 
     @property
-    def place(self) -> float: ...  # noqa: D102
+    def place(self) -> float:
+        """Where the limb is at first, 0 to 1."""
+        ...
 
     def step(self, ahead: float, seen: float) -> float:
         """Take what is seen now; give the limb of the next sample."""
