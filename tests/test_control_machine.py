@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ikns.control.controller import Settings
@@ -151,6 +151,8 @@ STEPS = st.lists(
 
 
 @given(STEPS)
+@example([(0.0, 0.0), (1.0, 5e-324)])
+@example([(0.0, 0.0), (1e300, 1e-12), (1.0, 0.01)])
 def test_smoothing_stays_between_what_came_in(steps):
     smooth = OneEuro()
     seen = []
@@ -160,7 +162,8 @@ def test_smoothing_stays_between_what_came_in(steps):
             seen.append(x)
         if seen:
             # A convex combination, rounded at each of 50 steps.
-            assert min(seen) - 1e-13 <= value <= max(seen) + 1e-13
+            off = 1e-14 * max(1.0, *map(abs, seen))
+            assert min(seen) - 10 * off <= value <= max(seen) + 10 * off
             assert smooth.delay >= 0
         else:
             assert math.isnan(value)

@@ -79,8 +79,11 @@ class OneEuro:
         if not 0 < dt < math.inf:
             return self.value
         speed = (x - self.value) / dt
-        self._speed += _share(self._speed_cutoff, dt) * (speed - self._speed)
-        share = _share(self._cutoff + self._beta * abs(self._speed), dt)
+        speed = self._speed + _share(self._speed_cutoff, dt) * (speed - self._speed)
+        share = _share(self._cutoff + self._beta * abs(speed), dt)
+        if not share > 0:  # in next to no time a jump beyond all numbers, or no step
+            return self.value
+        self._speed = speed
         self.value += share * (x - self.value)
         self.delay = dt * (1 - share) / share
         return self.value
