@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
-from ikns.errors import InvalidInput
+from ikns.experiments.progress import Progress
 from ikns.experiments.tracking.machine import ALIGN, TrackingRecord, TrialMachine
 from ikns.experiments.tracking.profiles import draw_profile
 from ikns.experiments.tracking.schedule import Step
@@ -71,37 +71,25 @@ class Visit:
         *,
         align: float = ALIGN,
     ) -> None:
-        self.steps, self.align = tuple(steps), align
-        self.attempts = list(attempts)
+        self._progress = Progress(steps, attempts, final=("done", "skipped"))
+        self.steps, self.attempts = self._progress.steps, self._progress.attempts
+        self.align = align
         self.trial: TrialMachine | None = None
-        self._rest_end: float | None = None
-        self._rested = {
-            i
-            for i, step in enumerate(self.steps)
-            if step.kind == "rest" and any(s.key in self.ended for s in self.steps[i:])
-        }
-        known = {step.key for step in self.steps}
-        strangers = sorted({a.key for a in self.attempts} - known)
-        if strangers:
-            raise InvalidInput(
-                f"expected attempts at steps of this schedule, found {strangers[0]}."
-            )
 
     @property
     def ended(self) -> dict[str, Attempt]:
         """Last attempt at each step that counts as done or was skipped, by key."""
-        last = {a.key: a for a in self.attempts}
-        return {k: a for k, a in last.items() if a.outcome in ("done", "skipped")}
+        return self._progress.ended
 
     @property
     def remaining(self) -> tuple[Step, ...]:
         """Steps still to do, the current one first."""
-        return tuple(self.steps[i] for i in self._left())
+        return self._progress.remaining
 
     @property
     def current(self) -> Step | None:
         """What is to be done now; None when all is."""
-        return self.remaining[0] if self.remaining else None
+        return self._progress.current
 
     def begin(self, now: float) -> TrialMachine:
         """Start the current trial.
@@ -111,11 +99,7 @@ class Visit:
         InvalidInput
             When one goes on, a rest is due, or nothing is left.
         """
-        step = self.current
-        if self.trial is not None or step is None or step.kind == "rest":
-            found = "one that goes on" if self.trial else "none"
-            found = "a rest" if step is not None and step.kind == "rest" else found
-            raise InvalidInput(f"expected a trial to begin, found {found}.")
+        step = self._progress.to_begin(going_on=self.trial is not None)
         profile = draw_profile(step.profile, step.seed, seconds=step.seconds)
         self.trial = TrialMachine(profile, align=self.align)
         self.trial.start(now)
@@ -138,35 +122,17 @@ class Visit:
         """Leave the current step out."""
         if self.trial is not None:
             self.trial.abort(now, reason)
-        step = self.current
-        if step is not None and step.kind == "rest":
-            self._rested.add(self._left()[0])
-        elif step is not None:
+        if self.current is not None and not self._progress.end_rest():
             self._put("skipped", reason)
 
     def repeat(self, reason: str) -> None:
         """Have the last finished or skipped step again; what it gave does not count."""
-        if self.trial is not None:
-            raise InvalidInput("expected no trial going on, found one: abort it.")
-        ended = self.ended
-        for attempt in reversed(self.attempts):
-            if attempt.key in ended:
-                self.attempts.append(Attempt(attempt.key, "again", reason))
-                return
-        raise InvalidInput("expected a step that was done to repeat, found none.")
+        key = self._progress.to_repeat(going_on=self.trial is not None)
+        self.attempts.append(Attempt(key, "again", reason))
 
     def rest(self, now: float) -> float:
         """Time left of the rest that is due, s; 0 when none is, or it is over."""
-        step = self.current
-        if step is None or step.kind != "rest":
-            return 0.0
-        if self._rest_end is None:
-            self._rest_end = now + step.seconds
-        left = self._rest_end - now
-        if left <= 0:
-            self._rest_end = None
-            self._rested.add(self._left()[0])
-        return max(0.0, left)
+        return self._progress.rest(now)
 
     def records(self) -> dict[str, TrackingRecord]:
         """Return the records that count, by key."""
@@ -175,14 +141,6 @@ class Visit:
             for key, a in self.ended.items()
             if a.outcome == "done" and a.record is not None
         }
-
-    def _left(self) -> list[int]:
-        ended, rested = self.ended, self._rested
-        return [
-            i
-            for i, step in enumerate(self.steps)
-            if (i not in rested if step.kind == "rest" else step.key not in ended)
-        ]
 
     def _put(self, outcome: Literal["done", "aborted", "skipped"], reason: str) -> None:
         step, record = self.current, None

@@ -1,0 +1,146 @@
+"""Which object with which condition, in which order: drawn beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ikns.errors import InvalidInput
+from ikns.experiments.picking.objects import OBJECT_IDS
+from ikns.experiments.tracking.schedule import williams
+
+__all__ = ["LIMIT", "PickStep", "pick_schedule"]
+
+#: Time for one object, s: the paper's.
+LIMIT = 20.0
+
+
+@dataclass(frozen=True)
+class PickStep:
+    """One thing to do.
+
+    Parameters
+    ----------
+    kind : {"training", "trial", "rest"}
+    condition : str
+        What drives the finger; empty at a rest.
+    object : str
+        Its code; empty at a rest.
+    repeat : int
+        Which time the object comes in this condition, from 0; in training its number.
+    limit : float
+        Time allowed, or of the rest, s.
+    """
+
+    kind: Literal["training", "trial", "rest"]
+    condition: str = ""
+    object: str = ""
+    repeat: int = 0
+    limit: float = LIMIT
+
+    @property
+    def key(self) -> str:
+        """Name that no other step of a schedule has; rests have none."""
+        return (
+            ""
+            if self.kind == "rest"
+            else f"{self.condition}/{self.kind}/{self.object}/{self.repeat}"
+        )
+
+    @property
+    def seconds(self) -> float:
+        """The limit, under the name that every kind of step has for its time, s."""
+        return self.limit
+
+
+def pick_schedule(
+    subject: int,
+    *,
+    conditions: Sequence[str] = ("ikns", "ring"),
+    objects: Sequence[str] = OBJECT_IDS,
+    repeats: int = 1,
+    seed: int = 0,
+    limit: float = LIMIT,
+    training: int = 10,
+    rest: float = 120.0,
+) -> list[PickStep]:
+    """All steps of one subject: per condition training, then all objects.
+
+    The order of the conditions changes with every subject. That of the objects is drawn
+    anew for every subject, condition and repeat.
+
+    Parameters
+    ----------
+    subject : int
+        Number, from 0.
+    conditions : sequence of str
+    objects : sequence of str
+        Codes of :func:`ikns.experiments.picking.load_objects`.
+    repeats : int
+        Blocks in each condition; each holds every object once.
+    seed : int
+        Of the orders.
+    limit : float
+        Time allowed for an object, s.
+    training : int
+        Objects to train with before each condition: 10, each put back within 10 s, are
+        at most the paper's 5 min.
+    rest : float
+        Between conditions, s.
+
+    Raises
+    ------
+    InvalidInput
+        When something is twice, missing or unknown.
+
+    Examples
+    --------
+    >>> steps = pick_schedule(0, training=0)
+    >>> len(steps), steps[0].condition, steps[11].kind, steps[12].condition
+    (23, 'ikns', 'rest', 'ring')
+    """
+    for name, words in (("conditions", conditions), ("objects", objects)):
+        if isinstance(words, str) or not words or len(set(words)) != len(words):
+            found = repr(words) if isinstance(words, str) else list(words)
+            raise InvalidInput(f"expected {name} that differ, found {found}.")
+    strangers = [code for code in objects if code not in OBJECT_IDS]
+    if strangers:
+        raise InvalidInput(
+            f"expected objects of {', '.join(OBJECT_IDS)}, found '{strangers[0]}'."
+        )
+    if repeats < 1 or training < 0 or subject < 0 or seed < 0:
+        raise InvalidInput(
+            "expected a subject, a seed and training from 0 and repeats from 1, found "
+            f"{subject}, {seed}, {training} and {repeats}."
+        )
+    if not (0 < limit < np.inf and 0 <= rest < np.inf):
+        raise InvalidInput(
+            f"expected a limit above 0 s and a rest from 0 s, found {limit:g} and "
+            f"{rest:g} s."
+        )
+    ways = williams(len(conditions))
+    steps: list[PickStep] = []
+    for place, number in enumerate(ways[subject % len(ways)]):
+        # A stream of its own: more training or repeats leave the earlier orders alone.
+        orders = np.random.default_rng([seed, subject, int(number), 0])
+        trained = np.random.default_rng([seed, subject, int(number), 1])
+        condition = conditions[number]
+        if place:
+            steps.append(PickStep("rest", limit=rest))
+        order: list[str] = []
+        for k in range(training):
+            order = order or _shuffled(objects, trained)
+            steps.append(PickStep("training", condition, order.pop(), k, limit))
+        for block in range(repeats):
+            steps.extend(
+                PickStep("trial", condition, code, block, limit)
+                for code in _shuffled(objects, orders)
+            )
+    return steps
+
+
+def _shuffled(objects: Sequence[str], rng: np.random.Generator) -> list[str]:
+    return [objects[i] for i in rng.permutation(len(objects))]
