@@ -336,3 +336,22 @@ def test_the_collector_is_as_it_was(subject, exploring):
         run(stream, subject)
     assert gc.isenabled()
     assert gc.get_freeze_count() == 0
+
+
+def test_every_decision_is_handed_on_with_its_time(subject, exploring, tmp_path):
+    told = []
+    with session_for(subject, tmp_path / "session", tmp_path) as writer:
+        begun = time.monotonic()
+        run(
+            source(exploring, speed=0),
+            subject,
+            session=writer,
+            on_decision=lambda *what: told.append(what),
+        )
+    record = read_run(tmp_path / "session")
+    when, flexion, decisions = zip(*told, strict=True)
+    assert len(told) == len(exploring.time)
+    assert begun <= when[0] <= when[-1] <= time.monotonic()
+    assert list(when) == sorted(when)
+    np.testing.assert_array_equal(flexion, record.model["flexion_asked"])
+    np.testing.assert_array_equal([d.flexion for d in decisions], flexion)

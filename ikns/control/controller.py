@@ -119,8 +119,8 @@ class Controller:
         self._smooth = OneEuro(cutoff=s.cutoff, beta=s.beta)
         self._speed = OneEuro(cutoff=_SPEED_CUTOFF, beta=0.0)
         self._device_time = -math.inf
-        self._hand = np.full(3, np.nan)
-        self._markers = np.empty((0, 3))
+        self._hand = (math.nan,) * 3
+        self._markers = b""
 
     @property
     def smoothing_delay(self) -> float:
@@ -146,11 +146,12 @@ class Controller:
         if device_time < self._device_time - _RESTART:
             self._device_time = -math.inf
         dt = device_time - self._device_time
-        new = dt > 0 and not _same(markers, self._markers)  # never with NaN
+        seen = markers.tobytes()
+        new = dt > 0 and seen != self._markers  # never with NaN
         if not new:
             dt = math.nan
         else:
-            self._device_time, self._markers = device_time, markers.copy()
+            self._device_time, self._markers = device_time, seen
         solved = self.solver.solve(markers)
         c = float(solved.c[0])
         valid = bool(
@@ -170,9 +171,10 @@ class Controller:
         return self.machine.check(now)
 
     def _follow(self, c: float, hand: NDArray[np.float64], dt: float) -> None:
-        step = float(np.linalg.norm(hand - self._hand))
+        place = tuple(hand.tolist())
+        step = math.dist(place, self._hand)
         speed = self._speed.step(step / dt if math.isfinite(dt) else math.nan, dt)
-        self._hand = hand
+        self._hand = place
         wanted = min(max(self._smooth.step(c, dt), 0.0), 1.0)
         if math.isnan(self.flexion):
             self.flexion = wanted
@@ -182,6 +184,3 @@ class Controller:
         if abs(wanted - self.flexion) > self.settings.dead_band or wanted in (0.0, 1.0):
             self.flexion = wanted
 
-
-def _same(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
-    return a.shape == b.shape and bool(((a == b) | ((a != a) & (b != b))).all())

@@ -124,6 +124,7 @@ def run(
     stop: threading.Event | None = None,
     on_status: Callable[[Status], None] | None = None,
     status_every: float = 0.2,
+    on_decision: Callable[[float, float, Decision], None] | None = None,
 ) -> Report:
     """Drive a finger with a person's null space until the source ends.
 
@@ -148,6 +149,10 @@ def run(
         Called with a :class:`Status` from the loop, so it must not wait.
     status_every : float
         How often, s.
+    on_decision : callable, optional
+        Called after each frame's command with the time of its receipt (s, of
+        `time.monotonic`), the flexion asked and the :class:`Decision`, from the loop,
+        so it must not wait.
 
     Returns
     -------
@@ -170,7 +175,7 @@ def run(
     columns = marker_set.columns(source.labels)
     solver = FrameSolver(subject.skeleton, subject.null_space_map, subject.chain)
     controller = Controller(solver, settings)
-    loop = _Loop(source, controller, finger, session)
+    loop = _Loop(source, controller, columns, finger, session)
     # What compiles or loads on first use does so before anybody waits.
     solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     solver.reset()
@@ -184,7 +189,10 @@ def run(
                 if frame is None:
                     loop.beat()
                 else:
-                    loop.take(frame, columns)
+                    decision = loop.take(frame)
+                    if on_decision:
+                        received = frame.receive_time
+                        on_decision(received, decision.flexion, decision)
                 if on_status and loop.due(status_every):
                     on_status(loop.status())
         finally:
@@ -199,10 +207,12 @@ class _Loop:
         self,
         source: Source,
         controller: Controller,
+        columns: NDArray[np.int64],
         finger: Finger | None,
         session: RunWriter | None,
     ) -> None:
         self._source, self._controller = source, controller
+        self._columns, self._absent = columns, np.flatnonzero(columns < 0)
         self._finger, self._session = finger, session
         pace = source.rate * source.speed
         self._period = 1 / pace if pace else math.inf
@@ -222,15 +232,16 @@ class _Loop:
         """Since the start, s."""
         return time.monotonic() - self._start
 
-    def take(self, frame: Frame, columns: NDArray[np.int64]) -> None:
+    def take(self, frame: Frame) -> Decision:
         """Take one frame all the way to the finger, then write it down."""
         report, received = self.report, frame.receive_time
         if math.isnan(self._first):
             self._first = frame.device_time
         # As on disk, so that a replay computes with the very numbers.
-        seen = micro(np.where(columns[:, None] < 0, np.nan, frame.markers[columns]))
-        device_time = float(micro(frame.device_time - self._first))
-        receive_time = float(micro(received - self._start))
+        seen = micro(frame.markers[self._columns])
+        seen[self._absent] = np.nan
+        device_time = round(frame.device_time - self._first, 6)
+        receive_time = round(received - self._start, 6)
         began = time.monotonic()
         decision = self._controller.frame(seen, device_time, receive_time)
         decided = time.monotonic()
@@ -257,6 +268,7 @@ class _Loop:
                 (decided - began, done - received),
             )
         report.stages["loop"].add(time.monotonic() - began)
+        return decision
 
     def beat(self) -> None:
         """No frame came: ask the watchdog, and let the finger hear from us."""

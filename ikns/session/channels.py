@@ -54,7 +54,8 @@ def micro(values: ArrayLike) -> NDArray[np.float64]:
 
     What is printed with six decimals then reads back as the same number, so a session
     replayed from disk computes with the very numbers that it computed with live. A
-    micrometer is a hundredth of what cameras resolve.
+    micrometer is a hundredth of what cameras resolve. Every NaN becomes the same one,
+    as reading makes it, so that equal frames are equal bytes.
 
     Examples
     --------
@@ -62,7 +63,11 @@ def micro(values: ArrayLike) -> NDArray[np.float64]:
     True
     """
     # Dividing an integer by a power of ten rounds correctly, as reading decimals does.
-    return np.asarray(np.rint(np.asarray(values, dtype=np.float64) * 1e6) / 1e6 + 0.0)
+    rounded = np.asarray(
+        np.rint(np.asarray(values, dtype=np.float64) * 1e6) / 1e6 + 0.0
+    )
+    rounded[rounded != rounded] = np.nan
+    return rounded
 
 
 def marker_channels(labels: Sequence[str]) -> list[Channel]:
