@@ -1,0 +1,196 @@
+"""What a visit comes to, computed again from its attempts; nothing stored is believed.
+
+One visit is in memory at a time. What is kept of it does not hold its traces.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import IknsError, NotEnoughData
+from ikns.experiments.tracking import error_over_time, measure
+from ikns.experiments.visits import (
+    VisitRecord,
+    counting,
+    read_visit,
+    tracking_record,
+)
+
+__all__ = [
+    "METRICS",
+    "PICKING",
+    "RATE",
+    "TEXTS",
+    "TRACKING",
+    "WHOLE",
+    "Digest",
+    "LeftOut",
+    "digest_visit",
+]
+
+Array = NDArray[np.float64]
+
+#: Of :class:`ikns.experiments.tracking.Metrics`.
+METRICS = (
+    "rmse",
+    "mae",
+    "lag",
+    "correlation",
+    "overshoot",
+    "smoothness",
+    "target_smoothness",
+    "unseen",
+    "samples",
+)
+_WHO = ("subject", "variation", "condition", "kind", "repeat", "number", "practised")
+#: Columns of the tables of trials.
+TRACKING = (*_WHO, "trajectory", "trial", "seconds", *METRICS)
+PICKING = (*_WHO, "object", "trial", "success", "outcome", "time", "limit", "comment")
+#: Which of them hold text, and which whole numbers.
+TEXTS = (*_WHO[:4], "trajectory", "object", "outcome", "comment")
+WHOLE = ("repeat", "number", "practised", "trial", "samples")
+#: Samples per second of the error over time.
+RATE = 20.0
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A visit that could not be used, and why."""
+
+    folder: Path
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Digest:
+    """What is kept of a visit.
+
+    Parameters
+    ----------
+    folder : Path
+    about : dict
+        Of ``visit.json``.
+    table : dict of str to list
+        The trials that count and could be measured, training among them, by column.
+    attempts : Counter
+        How many, by (condition, kind, outcome).
+    errors : dict of (condition, trajectory, seconds) to (T,) array
+        Pointer less target at ``RATE``, of 100, mean over repeats.
+    unmeasured : list of str
+        Trials that were done but hold no second of control signal.
+    """
+
+    folder: Path
+    about: dict[str, Any]
+    table: dict[str, list[Any]]
+    attempts: Counter[tuple[str, str, str]]
+    errors: dict[tuple[str, str, float], Array] = field(default_factory=dict)
+    unmeasured: list[str] = field(default_factory=list)
+
+    @property
+    def experiment(self) -> str:
+        """``tracking`` or ``picking``."""
+        return str(self.about["experiment"])
+
+    @property
+    def variation(self) -> str:
+        """Empty for the study as it was planned."""
+        return str(self.about.get("variation") or "")
+
+
+def digest_visit(folder: Path) -> Digest | LeftOut:
+    """Read a visit, measure its trials, and let the rest go."""
+    try:
+        visit = read_visit(folder)
+        if visit.about["experiment"] == "tracking":
+            return _tracking(visit)
+        return _picking(visit)
+    except IknsError as error:
+        return LeftOut(folder, str(error))
+
+
+def _tracking(visit: VisitRecord) -> Digest:
+    digest = _begun(visit, TRACKING)
+    traces: dict[tuple[str, str, float], list[Array]] = {}
+    for row, trial in _trials(visit, ("done",)):
+        record = tracking_record(row)
+        try:
+            found = measure(record)
+        except NotEnoughData:
+            digest.unmeasured.append(str(row["key"]))
+            continue
+        _append(
+            digest.table,
+            _who(digest, row)
+            | {"trajectory": row["trajectory"], "seconds": row["seconds"]}
+            | {"trial": trial}
+            | {name: getattr(found, name) for name in METRICS},
+        )
+        if row["kind"] == "trial":
+            key = (row["condition"], row["trajectory"], row["seconds"])
+            _, (error,) = error_over_time([record], rate=RATE)
+            traces.setdefault(key, []).append(error)
+    for key, errors in traces.items():
+        digest.errors[key] = _mean(np.array(errors))
+    return digest
+
+
+def _picking(visit: VisitRecord) -> Digest:
+    digest = _begun(visit, PICKING)
+    for row, trial in _trials(visit, ("success", "dropped", "timeout")):
+        _append(
+            digest.table,
+            _who(digest, row)
+            | {name: row[name] for name in ("object", "outcome", "time", "limit")}
+            | {"comment": row["comment"], "trial": trial}
+            | {"success": row["outcome"] == "success"},
+        )
+    return digest
+
+
+def _begun(visit: VisitRecord, columns: tuple[str, ...]) -> Digest:
+    attempts = Counter(
+        (str(row["condition"]), str(row["kind"]), str(row["outcome"]))
+        for row in visit.attempts
+    )
+    return Digest(visit.folder, visit.about, {name: [] for name in columns}, attempts)
+
+
+def _trials(
+    visit: VisitRecord, outcomes: tuple[str, ...]
+) -> list[tuple[dict[str, Any], int]]:
+    """List the attempts that count, each with its number among those of its kind."""
+    seen: Counter[tuple[str, str]] = Counter()
+    found = []
+    for row in counting(visit.attempts):
+        if row["outcome"] in outcomes:
+            seen[row["condition"], row["kind"]] += 1
+            found.append((row, seen[row["condition"], row["kind"]]))
+    return found
+
+
+def _who(digest: Digest, row: dict[str, Any]) -> dict[str, Any]:
+    same = ("condition", "kind", "repeat", "number", "practised")
+    return {
+        "subject": digest.about["participant"],
+        "variation": digest.variation,
+    } | {name: row[name] for name in same}
+
+
+def _append(table: dict[str, list[Any]], row: dict[str, Any]) -> None:
+    for name, values in table.items():
+        values.append(row[name])
+
+
+def _mean(errors: Array) -> Array:
+    """Mean over the first axis of what is there."""
+    known = np.isfinite(errors)
+    count = known.sum(axis=0)
+    total = np.where(known, errors, 0.0).sum(axis=0)
+    return np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
