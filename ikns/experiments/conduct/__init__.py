@@ -1,0 +1,25 @@
+"""Conduct a visit: commands and control signals in, what screens show out.
+
+`conductor` is one visit as it goes on; `tracking` and `picking` are what it has to know
+of an experiment; `book` keeps every attempt on disk; `inputs` are where a control
+signal comes from; `carry` ties them to the clock. There is no screen here.
+"""
+
+from ikns.experiments.conduct.book import VisitBook
+from ikns.experiments.conduct.conductor import Conductor
+from ikns.experiments.conduct.desk import COMMANDS, Command, Desk
+from ikns.experiments.conduct.inputs import HeldInput, Input, Sample, VirtualInput
+from ikns.experiments.conduct.tracking import TrackingDesk
+
+__all__ = [
+    "COMMANDS",
+    "Command",
+    "Conductor",
+    "Desk",
+    "HeldInput",
+    "Input",
+    "Sample",
+    "TrackingDesk",
+    "VirtualInput",
+    "VisitBook",
+]
