@@ -355,3 +355,18 @@ def test_every_decision_is_handed_on_with_its_time(subject, exploring, tmp_path)
     assert list(when) == sorted(when)
     np.testing.assert_array_equal(flexion, record.model["flexion_asked"])
     np.testing.assert_array_equal([d.flexion for d in decisions], flexion)
+
+
+def test_rehearsals_change_nothing(subject, exploring, tmp_path):
+    found = []
+    for speed in (1, 0):  # with a pace there are pauses to rehearse in, without none
+        folder = tmp_path / str(speed)
+        folder.mkdir()
+        with session_for(subject, folder / "session", folder) as writer:
+            report = run(source(exploring, speed=speed), subject, session=writer)
+        found.append((report.rehearsals, read_run(folder / "session")))
+    (some, paced), (none, fast) = found
+    assert some > 0
+    assert none == 0
+    np.testing.assert_array_equal(paced.model["c"], fast.model["c"])
+    assert replay_run(paced).same

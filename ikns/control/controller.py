@@ -183,4 +183,3 @@ class Controller:
             return
         if abs(wanted - self.flexion) > self.settings.dead_band or wanted in (0.0, 1.0):
             self.flexion = wanted
-
