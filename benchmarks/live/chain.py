@@ -65,6 +65,8 @@ class Watched:
     finger : Finger
     clock : Clock
         The finger's own, where it takes one.
+    canary : Canary
+        Told when the finger is connected.
 
     Attributes
     ----------
@@ -73,8 +75,13 @@ class Watched:
         When it was told so first; NaN while not.
     """
 
-    def __init__(self, finger: Finger, clock: Clock | None = None) -> None:
-        self.finger, self.clock = finger, clock
+    def __init__(
+        self,
+        finger: Finger,
+        clock: Clock | None = None,
+        canary: Canary | None = None,
+    ) -> None:
+        self.finger, self.clock, self.canary = finger, clock, canary
         self.resolution = finger.resolution
         self.told: list[Told] = []
         self.safe_at = self.relaxed_at = float("nan")
@@ -88,6 +95,8 @@ class Watched:
     def connect(self) -> None:
         """Connect."""
         self.finger.connect()
+        if self.canary is not None:
+            self.canary.begin()
 
     def command(self, flexion: float) -> float:
         """Tell the finger."""
@@ -128,7 +137,13 @@ class Watched:
 
 
 class Canary:
-    """A thread that does nothing but see how late the machine lets it run."""
+    """A thread that does nothing but see how late the machine lets it run.
+
+    Attributes
+    ----------
+    stall : float
+        Longest delay since :meth:`begin`, s.
+    """
 
     def __init__(self) -> None:
         self.stall = 0.0
@@ -136,13 +151,18 @@ class Canary:
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def _run(self) -> None:
-        before = time.monotonic()
         while not self._done.wait(0.01):
             now = time.monotonic()
-            self.stall, before = max(self.stall, now - before - 0.01), now
+            self.stall = max(self.stall, now - self._before - 0.01)
+            self._before = now
+
+    def begin(self) -> None:
+        """Forget what was before, when nobody was to be quick yet."""
+        self._before, self.stall = time.monotonic(), 0.0
 
     def __enter__(self) -> Self:
-        """Begin."""
+        """Start."""
+        self.begin()
         self._thread.start()
         return self
 

@@ -72,7 +72,7 @@ def _exception(seed: int, folder: Path) -> Outcome:
             Wire(servo) as wire,
             session_for(session, subject, folder / "person", recording) as writer,
         ):
-            finger = Watched(DynamixelFinger(wire.port))
+            finger = Watched(DynamixelFinger(wire.port), canary=canary)
             try:
                 with Source(Replay(recording, loop=True)) as source:
                     run(
@@ -181,6 +181,7 @@ def kill(
             child.start()
             theirs.close()
             began = ours.recv()
+            canary.begin()
             time.sleep(rng.uniform(0.3, 2.5))
             # A child that the machine kept from running is safe before it is struck.
             early = not servo.torque or servo.watchdog_error

@@ -118,7 +118,7 @@ def strike(name: str, seed: int, folder: Path) -> Outcome:
             session_for(session, subject, folder / "person", recording) as writer,
         ):
             inner = DynamixelFinger(wire.port, safety=Safety(safe_state=safe_state))
-            finger = Watched(inner)
+            finger = Watched(inner, canary=canary)
             at = int(rng.integers(40, 90))
             feed = _Playing(Replay(piece), at, wire, fault)
             try:
