@@ -1,0 +1,118 @@
+"""``ikns report``: a study's visits as one page, figures and numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ikns.cli.options import AsJson, Force
+from ikns.cli.output import notes, progress, show, table
+from ikns.output_folder import check_output_folder, output_folder
+
+__all__ = ["report"]
+
+
+def report(
+    study: Annotated[
+        Path, typer.Argument(help="Study folder, or the folder of one visit.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder to write; by default `report` in the study."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processes that read visits; same result with any."),
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Turn visits into tables, figures, statistics and one page that says it all.
+
+    Everything is computed again from the recorded attempts. People and simulated
+    participants are never mixed; the page says which is which.
+    """
+    from ikns.experiments.summary import summarize
+    from ikns.experiments.summary.numbers import numbers
+    from ikns.view.study_report import report_files, write_study_report
+
+    place = study / "report" if out is None else out
+    if study.is_dir():  # else it is the study that is missing, not where to write
+        check_output_folder(place, report_files(), force=force)
+    with progress() as told:
+        summary = summarize(study, workers=workers, progress=told)
+        with output_folder(place) as folder:
+            write_study_report(folder, summary, progress=told)
+    page = place / "report.html"
+    result = {"report": page} | numbers(summary)
+    parts: list[Any] = []
+    for group in result["groups"]:
+        said = "Simulated participants" if group["simulated"] else "Participants"
+        parts += _tables(group, said)
+        for each in group["answers"]:
+            parts += [each["question"], *(f"  {a}" for a in each["answer"]), ""]
+    show(
+        result,
+        *parts,
+        *notes(each["reason"] for each in result["left_out"]),
+        f"Open {page}; figures for print are in {place / 'figures'}",
+        as_json=as_json,
+    )
+
+
+def _tables(group: dict[str, Any], whose: str) -> list[Any]:
+    """Short tables for the terminal."""
+    made = []
+    if group["tracking"] is not None:
+        made.append(
+            table(
+                f"{whose}: RMSE of tracking, of 100",
+                {
+                    "condition": "s",
+                    "trajectory": "s",
+                    "mean": ".2f",
+                    "SD": ".2f",
+                    "n": "d",
+                    "trials": "d",
+                },
+                [
+                    [
+                        cell["condition"],
+                        cell["level"] or "all",
+                        cell["over"]["mean"],
+                        cell["over"]["deviation"],
+                        cell["over"]["subjects"],
+                        cell["trials"],
+                    ]
+                    for cell in group["tracking"]["rmse"]
+                ],
+            )
+        )
+    if group["picking"] is not None:
+        made.append(
+            table(
+                f"{whose}: pick and place",
+                {
+                    "condition": "s",
+                    "object": "s",
+                    "succeeded": "d",
+                    "trials": "d",
+                    "median s": ".2f",
+                    "with failures s": ".2f",
+                },
+                [
+                    [
+                        cell["condition"],
+                        cell["object"] or "all",
+                        cell["succeeded"],
+                        cell["trials"],
+                        cell["median"],
+                        cell["restricted"],
+                    ]
+                    for cell in group["picking"]["objects_by_condition"]
+                ],
+            )
+        )
+    return made

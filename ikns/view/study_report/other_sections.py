@@ -1,0 +1,192 @@
+"""What was done, variations, methods, the paper examined again, what is left out."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from ikns.experiments.statistics import paper_reexamined
+from ikns.experiments.summary import (
+    Group,
+    PickingSummary,
+    StudySummary,
+    TrackingSummary,
+    Varied,
+)
+from ikns.experiments.summary.methods import methods, setting_text
+from ikns.view.parts import Cell, Section, Table
+
+__all__ = [
+    "done_section",
+    "left_out_section",
+    "methods_section",
+    "paper_section",
+    "variation_section",
+]
+
+_OUTCOMES = {
+    "tracking": ("done", "aborted", "skipped", "again"),
+    "pick and place": (
+        "success",
+        "dropped",
+        "timeout",
+        "aborted",
+        "skipped",
+        "again",
+    ),
+}
+
+
+def done_section(group: Group) -> Section:
+    """How many attempts were made, and how they ended."""
+    tables = []
+    for name, each in (
+        ("tracking", group.tracking),
+        ("pick and place", group.picking),
+    ):
+        if each is not None:
+            tables.append(_attempts(name, each))
+    return Section(
+        "What was done",
+        [
+            "Every attempt that was made, training included. An aborted attempt comes "
+            "again; a skipped one was left out for good; `again` marks that what was "
+            "done before does not count."
+        ],
+        tables=tables,
+    )
+
+
+def _attempts(name: str, found: TrackingSummary | PickingSummary) -> Table:
+    outcomes = _OUTCOMES[name]
+    sums: dict[tuple[str, str], Counter[str]] = {}
+    for (condition, kind, outcome), n in found.attempts.items():
+        sums.setdefault((condition, kind), Counter())[outcome] += n
+    other = sorted({o for c in sums.values() for o in c} - set(outcomes))
+    who = len({person for _, person in found.folders})
+    rows: list[list[Cell]] = []
+    for condition in found.conditions:
+        for kind in ("training", "trial"):
+            count = sums.get((condition, kind), Counter())
+            rows.append(
+                [
+                    condition,
+                    kind,
+                    *(count[outcome] for outcome in (*outcomes, *other)),
+                    count.total(),
+                ]
+            )
+    return Table(
+        ["condition", "kind", *outcomes, *other, "attempts"],
+        rows,
+        f"Attempts at {name}, {who} participants, all variations.",
+    )
+
+
+def variation_section(group: Group) -> Section | None:
+    """Variations against the study as planned; None where there are none."""
+    tables = []
+    if group.tracking is not None and group.tracking.varied:
+        tables.append(_varied("RMSE", "of 100", group.tracking.varied))
+    if group.picking is not None and group.picking.varied:
+        tables.append(_varied("trials that succeeded", "%", group.picking.varied))
+    if not tables:
+        return None
+    return Section(
+        "Variations",
+        [
+            "The same participants with other settings. Differences are from the "
+            "first row of each condition, paired over the participants that have "
+            "both; no correction was made for the number of variations."
+        ],
+        tables=tables,
+    )
+
+
+def _varied(quantity: str, unit: str, found: list[Varied]) -> Table:
+    rows: list[list[Cell]] = []
+    for each in found:
+        against = each.against
+        row: list[Cell] = [
+            each.condition,
+            each.name or "as planned",
+            setting_text(each.settings),
+            each.over.mean,
+            each.over.low,
+            each.over.high,
+            each.over.subjects,
+        ]
+        row += (
+            [None, None, None, None]
+            if against is None
+            else [against.mean, against.low, against.high, against.subjects]
+        )
+        rows.append(row)
+    return Table(
+        [
+            "condition",
+            "variation",
+            "settings",
+            f"{quantity} ({unit})",
+            "95 % from",
+            "to",
+            "n",
+            f"difference ({unit})",
+            "95 % from",
+            "to",
+            "n pairs",
+        ],
+        rows,
+        f"{quantity} by variation: mean over n participants.",
+    )
+
+
+def methods_section(group: Group) -> Section:
+    """Paragraphs to paste."""
+    return Section(
+        "Methods, from the configuration",
+        [
+            "Written from what the visits and the study file hold; to be pasted and "
+            "shortened.",
+            *methods(group),
+        ],
+    )
+
+
+def paper_section() -> Section:
+    """Examine the paper from nothing but what it prints."""
+    return Section(
+        "The paper's own figures, examined again",
+        [
+            "No raw data of the paper are published. This asks what its printed "
+            "numbers (arXiv 2012.03600) imply together, within their rounding; it is "
+            "about the paper's participants, not about those of this study."
+        ],
+        tables=[
+            Table(
+                ["the paper says", "verdict", "what its numbers imply"],
+                [
+                    [finding.claim, finding.verdict, finding.implies]
+                    for finding in paper_reexamined()
+                ],
+                "Claims of the paper.",
+            )
+        ],
+    )
+
+
+def left_out_section(summary: StudySummary, *, most: int = 50) -> Section | None:
+    """Visits that could not be used, each with its reason; None without any."""
+    if not summary.left_out:
+        return None
+    said = [each.reason for each in summary.left_out[:most]]
+    if len(summary.left_out) > most:
+        said.append(f"And {len(summary.left_out) - most} more.")
+    count = len(summary.left_out)
+    return Section(
+        "Left out",
+        [
+            f"{count} of {summary.visits + count} visits could not be used; nothing "
+            "of them is in this report.",
+            *said,
+        ],
+    )

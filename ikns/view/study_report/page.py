@@ -1,0 +1,156 @@
+"""The page of a study: answers first, simulated parts labelled, nothing loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from typing import NamedTuple
+
+from ikns.experiments.summary import Group, StudySummary
+from ikns.experiments.summary.answers import people, picking_answer, tracking_answer
+from ikns.view.parts import Cell, Page, Section, Step, facts_html, inline, steps_html
+from ikns.view.study_report.words import BANNER, CANNOT
+
+__all__ = ["Part", "study_html"]
+
+
+class Part(NamedTuple):
+    """What a report says of the people, or of the simulated participants."""
+
+    group: Group
+    sections: Sequence[Section]
+
+
+def study_html(
+    summary: StudySummary,
+    parts: Sequence[Part],
+    *,
+    about_paper: Section,
+    left_out: Section | None,
+    next_steps: Sequence[Step],
+) -> str:
+    """Return the page; same input, same text."""
+    css = "".join(
+        files(package).joinpath(name).read_text(encoding="utf-8")
+        for package, name in (
+            ("ikns.view", "report.css"),
+            ("ikns.view.study_report", "study.css"),
+        )
+    )
+    simulated = all(part.group.simulated for part in parts)
+    several = len(parts) > 1
+    page = _StudyPage()
+    title = f"Study {summary.name}"
+    body = [
+        f'<p class="banner">{BANNER}</p>' if simulated else "",
+        f"<h1>{inline(title)}</h1>",
+        f'<p class="lead">{inline(_lead(summary, parts))}</p>',
+        facts_html(_facts(summary, parts)),
+        *(_answers(part.group, several=several) for part in parts),
+        "</header><main>",
+    ]
+    for part in parts:
+        page.of(simulated=part.group.simulated)
+        if several:
+            name = "Simulated participants" if part.group.simulated else "People"
+            body.append(f'<section class="part"><h1>{name}</h1>')
+            if part.group.simulated:
+                body.append(f'<p class="banner">{BANNER}</p>')
+            body.append("</section>")
+        if part.group.simulated:
+            cannot = Section("What such a simulation can and cannot show", list(CANNOT))
+            body.append(page.section(cannot))
+        body += [page.section(section) for section in part.sections]
+    page.of(simulated=False)
+    body.append(page.section(about_paper))
+    if left_out is not None:
+        body.append(page.section(left_out))
+    head = [
+        "<!DOCTYPE html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        # The browser itself refuses whatever the page would load.
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
+        "img-src data:; style-src 'unsafe-inline'\">",
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        '<meta name="color-scheme" content="light dark">',
+        f"<title>{escape(title)}{' (simulated)' if simulated else ''}</title>",
+        f"<style>\n{css}</style></head><body>",
+        "<header>",
+    ]
+    tail = [steps_html(next_steps), "</main></body></html>"]
+    return "\n".join(part for part in [*head, *body, *tail] if part) + "\n"
+
+
+class _StudyPage(Page):
+    """A page whose parts differ in whether they are simulated."""
+
+    def __init__(self) -> None:
+        super().__init__(simulated=False)
+
+    def of(self, *, simulated: bool) -> None:
+        """Label what follows."""
+        self.suffix = Page(simulated).suffix
+
+    def section(self, section: Section) -> str:
+        """Say in the heading too that it is simulated."""
+        html = super().section(section)
+        return html.replace("</h2>", f"{self.suffix}</h2>", 1)
+
+
+def _lead(summary: StudySummary, parts: Sequence[Part]) -> str:
+    who = [people(_count(part.group), simulated=part.group.simulated) for part in parts]
+    apart = (
+        " People and simulated participants are analyzed apart, people first."
+        if len(parts) > 1
+        else ""
+    )
+    return (
+        f"Results of {' and '.join(who)}, computed again from the recorded attempts "
+        f"of {summary.visits} visits.{apart}"
+    )
+
+
+def _count(group: Group) -> int:
+    """How many came to any experiment."""
+    who: set[str] = set()
+    for each in (group.tracking, group.picking):
+        who |= set() if each is None else {name for _, name in each.folders}
+    return len(who)
+
+
+def _facts(summary: StudySummary, parts: Sequence[Part]) -> dict[str, Cell]:
+    facts: dict[str, Cell] = {}
+    for part in parts:
+        kind = "simulated" if part.group.simulated else "people"
+        for name, each in (
+            ("tracking", part.group.tracking),
+            ("pick and place", part.group.picking),
+        ):
+            if each is None:
+                continue
+            facts[f"{name}, {kind}"] = f"n = {len(each.participants)}"
+            facts[f"conditions of {name}"] = ", ".join(each.conditions)
+    facts["visits used"] = summary.visits
+    facts["visits left out"] = len(summary.left_out)
+    return facts
+
+
+def _answers(group: Group, *, several: bool) -> str:
+    questions = [
+        *tracking_answer(group.tracking, simulated=group.simulated),
+        *picking_answer(group.picking, simulated=group.simulated),
+    ]
+    tag = Page(group.simulated).suffix
+    whose = ""
+    if several:
+        whose = ": simulated participants" if group.simulated else ": people"
+    parts = [f'<section class="answers"><h2>Answers{whose}{tag}</h2>']
+    for question, said in questions:
+        parts.append(f"<h3>{inline(question)}</h3>")
+        parts += [f"<p>{inline(sentence)}</p>" for sentence in said]
+    if group.simulated:
+        parts.append(
+            "<p>These are answers about a model of people, not about people.</p>"
+        )
+    return "\n".join([*parts, "</section>"])

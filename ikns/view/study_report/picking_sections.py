@@ -1,0 +1,161 @@
+"""Experiment 2 as sections of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ikns.experiments.picking import load_objects
+from ikns.experiments.summary import PickComparison, PickingSummary
+from ikns.experiments.summary.answers import worded
+from ikns.view.parts import Cell, Picture, Section, Table
+from ikns.view.study_report.effect_figure import effect_figure
+from ikns.view.study_report.picking_figures import picking_figure
+from ikns.view.study_report.tests_table import effects_table, tests_table
+from ikns.view.study_report.tracking_sections import Drawn
+
+__all__ = ["picking_drawn", "picking_sections"]
+
+
+def picking_drawn(found: PickingSummary) -> list[Drawn]:
+    """All figures of experiment 2; none without a trial."""
+    if not len(found.trials()["success"]):
+        return []
+    drawn = [
+        Drawn(
+            "picking_objects",
+            picking_figure(found),
+            "Above: share of trials that succeeded, with 95 % intervals (Clopper and "
+            "Pearson). Below: time of every trial; crosses failed and stand at the "
+            "limit; black bars: mean time with failures counted at the limit.",
+            "Success and time by object and condition",
+        )
+    ]
+    for k, compared in enumerate(found.comparisons):
+        if compared.analysis is None or not compared.analysis.effects:
+            continue
+        drawn.append(
+            Drawn(
+                "picking_difference" + (f"_{k + 1}" if k else ""),
+                effect_figure(
+                    compared.equivalence,
+                    compared.analysis.effects,
+                    quantity="time to success",
+                    simulated=found.simulated,
+                ),
+                f"{compared.names[0]} minus {compared.names[1]}, failures counted at "
+                "the limit, over participants.",
+                "Intervals of the difference and of standardized effects",
+            )
+        )
+    return drawn
+
+
+def picking_sections(found: PickingSummary, drawn: list[Drawn]) -> Iterator[Section]:
+    """Pictures, tables and tests; what is not tested says why."""
+    pictures = {each.name: each.picture for each in drawn}
+    text = [
+        f"Trials of {len(found.participants)} participants"
+        f"{' (simulated)' if found.simulated else ''}. A trial succeeds, or the "
+        "object is dropped, or time runs out."
+    ]
+    if not drawn:
+        text.append("No trial was finished, so there is nothing to draw or to test.")
+    yield Section(
+        "Pick and place",
+        text,
+        [pictures["picking_objects"]] if drawn else [],
+        [_object_table(found)] if drawn else [],
+    )
+    for k, compared in enumerate(found.comparisons):
+        name = "picking_difference" + (f"_{k + 1}" if k else "")
+        yield _comparison(compared, [pictures[name]] if name in pictures else [])
+
+
+def _comparison(compared: PickComparison, pictures: list[Picture]) -> Section:
+    a, b = compared.names
+    title = f"Pick and place: {a} against {b}"
+    found = compared.analysis
+    if found is None:
+        tables = (
+            []
+            if compared.success is None
+            else [tests_table([], [("success", compared.success)])]
+        )
+        return Section(title, [compared.why], tables=tables)
+    text = [
+        f"Every difference is {worded(a)} minus {worded(b)}. The paper's sign test "
+        f"leaves pairs with a failure out ({found.paper_left_out} of "
+        f"{found.success.pairs} here), which favors the condition that fails more; "
+        "the other tests keep them."
+    ]
+    if found.paper is None:
+        text.append("Fewer than two pairs without a failure: no sign test.")
+    if compared.equivalence is None:
+        text.append("No margin was declared beforehand, so equivalence was not tested.")
+    beside = [
+        ("success", found.success),
+        ("time", found.time),
+        ("time, over participants", found.ranks),
+        ("equivalence of time", compared.equivalence),
+    ]
+    return Section(
+        title,
+        text,
+        pictures,
+        [
+            tests_table([("paper", found.paper)], beside),
+            *([effects_table(found.effects)] if found.effects else []),
+        ],
+    )
+
+
+def _object_table(found: PickingSummary) -> Table:
+    known = load_objects()
+    rows: list[list[Cell]] = []
+    for cell in found.cells:
+        name = cell.object or "all"
+        if cell.object in known:
+            each = known[cell.object]
+            name = f"{cell.object} {each.name}, {1000 * each.mass_kg:.0f} g"
+        share = 100 * cell.succeeded / cell.trials if cell.trials else np.nan
+        rows.append(
+            [
+                cell.condition,
+                name,
+                cell.trials,
+                cell.succeeded,
+                cell.dropped,
+                cell.late,
+                float(share),
+                f"{100 * cell.low:.0f} to {100 * cell.high:.0f}"
+                if cell.trials
+                else None,
+                cell.median,
+                cell.mean,
+                cell.deviation,
+                cell.restricted,
+                cell.subjects,
+            ]
+        )
+    return Table(
+        [
+            "condition",
+            "object",
+            "n trials",
+            "succeeded",
+            "dropped",
+            "out of time",
+            "success (%)",
+            "95 %",
+            "median time (s)",
+            "mean (s)",
+            "SD (s)",
+            "with failures (s)",
+            "n participants",
+        ],
+        rows,
+        "Success and time by object. Median, mean and SD are of successful trials "
+        "alone, as the paper's; the column with failures counts them at the limit.",
+    )

@@ -1,0 +1,280 @@
+"""Experiment 1 as sections of a report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from ikns.experiments.statistics.printed import PAPER
+from ikns.experiments.statistics.wording import p_text
+from ikns.experiments.summary import Comparison, TrackingSummary
+from ikns.experiments.summary.answers import worded
+from ikns.experiments.summary.tracking import UNITS
+from ikns.view.parts import Cell, Picture, Section, Table
+from ikns.view.study_report.effect_figure import effect_figure
+from ikns.view.study_report.learning_figure import learning_figure
+from ikns.view.study_report.tests_table import effects_table, tests_table
+from ikns.view.study_report.tracking_figures import (
+    error_figure,
+    rmse_figure,
+    trace_figure,
+)
+
+__all__ = ["Drawn", "tracking_figures", "tracking_sections"]
+
+_NAMES = {
+    "mae": "mean absolute error",
+    "lag": "lag",
+    "overshoot": "overshoot",
+    "smoothness": "smoothness (SPARC)",
+    "unseen": "samples without c",
+}
+
+
+class Drawn(NamedTuple):
+    """A figure with the name of its file, what it says, and what it shows."""
+
+    name: str
+    figure: Figure
+    caption: str
+    alt: str
+
+    @property
+    def picture(self) -> Picture:
+        """As a part of the page."""
+        return Picture(self.figure, self.caption, self.alt)
+
+
+def tracking_figures(found: TrackingSummary) -> list[Drawn]:
+    """All figures of experiment 1; none without a trial."""
+    if not len(found.trials()["rmse"]):
+        return []
+    drawn = [
+        Drawn(
+            "tracking_traces",
+            trace_figure(found),
+            "Target (grey) and pointer of the trial whose RMSE is the median of its "
+            "cell, for each condition and trajectory; the paper shows such traces "
+            "without saying how they were chosen.",
+            "Grid of time series: target and pointer by condition and trajectory",
+        ),
+        Drawn(
+            "tracking_error",
+            error_figure(found),
+            "Error over time: pointer less target, a participant's repeats averaged "
+            "first. Line: mean over participants; band: 10th to 90th percentile.",
+            "Grid of time series of the error by condition and trajectory",
+        ),
+        Drawn(
+            "tracking_rmse",
+            rmse_figure(found),
+            "RMSE: a dot is a participant's mean over repeats, a line joins the same "
+            "participant; black: mean over participants with its 95 % interval.",
+            "Dots by condition, one panel per trajectory and one for all",
+        ),
+        Drawn(
+            "tracking_learning",
+            learning_figure(found),
+            "RMSE over trials, mean and standard deviation over participants, with "
+            "the trajectories' own difficulty taken out; lines: the fitted models with "
+            "their share of the evidence (Akaike weights).",
+            "RMSE against the number of the trial, one panel per condition",
+        ),
+    ]
+    for k, compared in enumerate(found.comparisons):
+        if compared.analysis is None or not compared.analysis.effects:
+            continue
+        drawn.append(
+            Drawn(
+                "tracking_difference" + (f"_{k + 1}" if k else ""),
+                effect_figure(
+                    compared.analysis.equivalence,
+                    compared.analysis.effects,
+                    quantity="RMSE",
+                    simulated=found.simulated,
+                ),
+                f"{compared.names[0]} minus {compared.names[1]}. Equivalence is shown "
+                "where the interval lies inside of the margin altogether; where it "
+                "does not, it is not shown, whatever the test of a difference says.",
+                "Intervals of the difference and of standardized effects",
+            )
+        )
+    return drawn
+
+
+def tracking_sections(found: TrackingSummary, drawn: list[Drawn]) -> Iterator[Section]:
+    """Pictures, tables and tests; what is not tested says why."""
+    pictures = {each.name: each.picture for each in drawn}
+    text = [
+        f"Trials of {len(found.participants)} participants"
+        f"{' (simulated)' if found.simulated else ''}, everything computed from the "
+        "recorded control signal. RMSE and error are of 100, the height of the screen."
+    ]
+    if not drawn:
+        text.append("No trial was finished, so there is nothing to draw or to test.")
+    if found.unmeasured:
+        text.append(
+            f"{len(found.unmeasured)} finished trials hold less than a second of "
+            f"control signal and were not measured: {_some(found.unmeasured)}."
+        )
+    shown = [k for k in ("tracking_traces", "tracking_error", "tracking_rmse")]
+    yield Section(
+        "Tracking",
+        text,
+        [pictures[k] for k in shown if k in pictures],
+        [_rmse_table(found), _metric_table(found)] if drawn else [],
+    )
+    if "tracking_learning" in pictures:
+        yield Section(
+            "Tracking: learning", _learning(found), [pictures["tracking_learning"]]
+        )
+    for k, compared in enumerate(found.comparisons):
+        name = "tracking_difference" + (f"_{k + 1}" if k else "")
+        yield _comparison(
+            compared,
+            [pictures[name]] if name in pictures else [],
+            many=len(found.comparisons) > 1,
+        )
+
+
+def _comparison(
+    compared: Comparison, pictures: list[Picture], *, many: bool
+) -> Section:
+    a, b = compared.names
+    title = f"Tracking: {a} against {b}"
+    found = compared.analysis
+    if found is None:
+        return Section(title, [compared.why])
+    beside = [
+        ("over participants", found.subjects),
+        ("over participants", found.ranks),
+        ("mixed model", found.model),
+        ("analysis of variance", found.anova),
+        ("equivalence", found.equivalence),
+    ]
+    text = [
+        f"Every difference is {worded(a)} minus {worded(b)}. The paper's tests count "
+        "each trajectory of a participant as independent; beside them are tests with "
+        "one vote a person."
+    ]
+    if many:
+        text.append("No correction was made for comparing several conditions.")
+    if found.equivalence is None:
+        text.append("No margin was declared beforehand, so equivalence was not tested.")
+    if found.anova is None:
+        text.append(
+            "The analysis of variance was left out: it needs two trajectories, all of "
+            "them from every participant, and at most 200 participants."
+        )
+    return Section(
+        title,
+        text,
+        pictures,
+        [
+            tests_table([("paper", each) for each in found.paper], beside),
+            effects_table(found.effects),
+        ],
+    )
+
+
+def _rmse_table(found: TrackingSummary) -> Table:
+    """Mean and spread by cell, beside what the paper prints of its people."""
+    printed = {
+        (condition, trajectory): value
+        for condition, values in (("ikns", PAPER.ikns), ("gamepad", PAPER.gamepad))
+        for trajectory, value in zip(PAPER.trajectories, values, strict=True)
+    }
+    rows: list[list[Cell]] = []
+    for cell in found.rmse:
+        of = printed.get((cell.condition, cell.level))
+        rows.append(
+            [
+                cell.condition,
+                cell.level or "all",
+                cell.over.mean,
+                cell.over.deviation,
+                cell.over.low,
+                cell.over.high,
+                cell.over.subjects,
+                cell.trials,
+                "" if of is None else f"{of[0].text} +- {of[1].text}",
+            ]
+        )
+    return Table(
+        [
+            "condition",
+            "trajectory",
+            "RMSE (of 100)",
+            "SD",
+            "95 % from",
+            "to",
+            "n participants",
+            "n trials",
+            "paper's people (n = 10)",
+        ],
+        rows,
+        "RMSE, mean over participants' means, their standard deviation, and the "
+        "interval of the mean. The paper's curves are unknown, so only the order of "
+        "size can be compared with its column.",
+    )
+
+
+def _metric_table(found: TrackingSummary) -> Table:
+    rows: list[list[Cell]] = []
+    names = list(found.metrics)
+    for k, cell in enumerate(found.rmse):
+        row: list[Cell] = [cell.condition, cell.level or "all", cell.over.subjects]
+        for name in names:
+            over = found.metrics[name][k].over
+            row.append(_with_spread(over.mean, over.deviation))
+        rows.append(row)
+    return Table(
+        [
+            "condition",
+            "trajectory",
+            "n",
+            *(f"{_NAMES[name]} ({UNITS[name]})" for name in names),
+        ],
+        rows,
+        "Mean +- standard deviation over n participants. The lag is how far the "
+        "pointer is behind; smoothness is negative, nearer to 0 is smoother.",
+    )
+
+
+def _with_spread(mean: float, deviation: float) -> str:
+    if math.isnan(mean):
+        return "–"
+    if math.isnan(deviation):
+        return f"{mean:.3f}"
+    return f"{mean:.3f} +- {deviation:.3f}"
+
+
+def _learning(found: TrackingSummary) -> list[str]:
+    said = []
+    told = set()
+    for compared in found.comparisons:
+        for name, curves in (
+            {} if compared.analysis is None else compared.analysis.learning
+        ).items():
+            if name not in told:
+                said.append(f"{name}: {curves.sentence()}")
+                told.add(name)
+        model = None if compared.analysis is None else compared.analysis.model
+        if model is not None and model.trial is not None:
+            said.append(
+                f"Mixed model of {' and '.join(compared.names)}: RMSE changes by "
+                f"{model.trial.estimate:+.3f} of 100 a trial "
+                f"({p_text(model.trial.p)})."
+            )
+    return said or [
+        "No learning curve was fitted: that needs at least 6 trials of every "
+        "participant in a condition, and two participants with both conditions."
+    ]
+
+
+def _some(names: list[str], most: int = 5) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -1,0 +1,26 @@
+"""What a report says of simulation, once, and of what it leaves out."""
+
+from __future__ import annotations
+
+__all__ = ["BANNER", "CANNOT", "NO_MAP"]
+
+BANNER = "Simulated: no person took part"
+
+#: What a simulation can and cannot show.
+CANNOT = (
+    "What such a simulation can show: that design, recording, map, control signal and "
+    "statistics work together from end to end; how error, noise, delay and gaps pass "
+    "through that chain; how many participants a real study would need; which settings "
+    "matter to the method itself.",
+    "What it cannot show: how well people do. The operators follow a model of human "
+    "tracking whose free parameters were taken from the literature, and many settings "
+    "of them fit the paper's figures as well; the difference between two devices is "
+    "to a good part what was put into the model. Comfort, fatigue, attention, "
+    "embodiment and learning by understanding are not in it. A difference between "
+    "conditions here, or none, is no evidence about people.",
+)
+
+NO_MAP = (
+    "Clusters and interpolation volume are left out: no subject folder (as `ikns "
+    "calibrate` writes it) named `subject` is inside or beside a visit."
+)
