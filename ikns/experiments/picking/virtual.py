@@ -1,0 +1,261 @@
+"""Picks of virtual participants, with contact physics: simulated."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.control.controller import Settings
+from ikns.errors import InvalidInput
+from ikns.experiments.picking.objects import PickObject, load_objects
+from ikns.experiments.picking.schedule import PickStep
+from ikns.motion import chain_joints
+from ikns.simulation.grasp import (
+    CarriedArm,
+    Elbow,
+    Grasp,
+    Person,
+    Picked,
+    Ring,
+    Route,
+    Solid,
+    arch_length,
+    draw_habits,
+    grip_height,
+    hand_drift,
+    hand_route,
+    pick,
+)
+from ikns.simulation.grasp.route import BEYOND, DOWN, LIFT
+from ikns.simulation.movement import Unsteadiness
+from ikns.simulation.operator import Operator, Participant
+
+__all__ = ["VIRTUAL_CONDITIONS", "virtual_pick", "virtual_pick_step"]
+
+Array = NDArray[np.float64]
+
+#: What a virtual participant can drive the finger with.
+VIRTUAL_CONDITIONS = ("ikns", "ring")
+#: An unhurried reach: so long plus so much per meter, s (the simulated calibration's).
+_REACH_S, _REACH_S_PER_M = 0.6, 1.2
+#: Height of the table under the hand at the lowest grip, m: the usual way of the hand.
+_USUAL = 0.045
+
+
+def virtual_pick_step(
+    participant: Participant,
+    step: PickStep,
+    *,
+    practised: int,
+    rate: float = 100.0,
+    latency: float = 0.05,
+    **more: Any,
+) -> dict[str, Any]:
+    """Let a participant do one step of a schedule; give a row of a visit.
+
+    Same participant, step and settings, same row, whatever was done before.
+
+    Parameters
+    ----------
+    participant : Participant
+    step : PickStep
+        Training or trial.
+    practised : int
+        Picks done in this condition before, training included.
+    rate : float
+        Frames per second.
+    latency : float
+        Of the system, s.
+    **more
+        Of :func:`virtual_pick`.
+
+    Returns
+    -------
+    dict
+        The columns of a picking attempt and, in SI units: `why`; `peak_grip_N`, the
+        finger's largest force on the object; `slip_m`, how far the object moved in the
+        hand while carried; `c_drift`, by how much the way to the goal alone changes c,
+        the elbow held (signed, the largest; 0 for a ring); `hold_share`, share of the
+        carrying in which the finger touched the object; `contact_c`, flexion at which
+        it stopped the finger. NaN where there was none.
+    """
+    picked, drift = virtual_pick(
+        participant, step, practised=practised, rate=rate, latency=latency, **more
+    )
+    carried = picked.carried
+    force = picked.trace[:, 3]
+    held = picked.in_hand[carried]
+    began = int(np.argmax(carried)) if carried.any() else -1
+    return {
+        "key": step.key,
+        "kind": step.kind,
+        "condition": step.condition,
+        "object": step.object,
+        "repeat": step.repeat,
+        "outcome": picked.outcome,
+        "reason": "",
+        "practised": practised,
+        "time": picked.time,
+        "limit": step.limit,
+        "comment": "",
+        "why": picked.why,
+        "peak_grip_N": float(force.max()),
+        "slip_m": _farthest(held),
+        "c_drift": drift,
+        "hold_share": float(np.mean(force[carried] > 0)) if len(held) else math.nan,
+        "contact_c": float(picked.trace[began, 2]) if began >= 0 else math.nan,
+    }
+
+
+def virtual_pick(
+    participant: Participant,
+    step: PickStep,
+    *,
+    practised: int,
+    rate: float = 100.0,
+    latency: float = 0.05,
+    settings: Settings | None = None,
+    unsteadiness: Unsteadiness | None = None,
+    sees: Literal["finger", "signal"] = "finger",
+    squeeze: float | None = None,
+    objects: dict[str, PickObject] | None = None,
+    **model: Any,
+) -> tuple[Picked, float]:
+    """Let a participant pick and place one object; simulated.
+
+    With "ikns" through the whole chain: what the person wants -> limb -> elbow along
+    the Jacobian's self-motion at the travelling hand -> markers with noise, skin and
+    gaps -> IK -> map -> controller -> finger. With "ring" a button.
+
+    Parameters
+    ----------
+    participant : Participant
+    step : PickStep
+    practised : int
+    rate, latency : float
+        See :func:`virtual_pick_step`.
+    settings : Settings, optional
+        Of the controller.
+    unsteadiness : Unsteadiness, optional
+        How straight the hand keeps to its way.
+    sees : {"finger", "signal"}
+        What the person goes by, see :class:`ikns.simulation.grasp.Elbow`.
+    squeeze : float, optional
+        Instead of what this person does, see :class:`ikns.simulation.grasp.Habits`.
+    objects : dict of str to PickObject, optional
+        Default: :func:`ikns.experiments.picking.load_objects`.
+    **model
+        Of :class:`ikns.simulation.grasp.Grasp`.
+
+    Returns
+    -------
+    picked : Picked
+    drift : float
+        Change of c by the way alone.
+    """
+    if step.condition not in VIRTUAL_CONDITIONS or step.kind == "rest":
+        raise InvalidInput(
+            f"expected a trial with {' or '.join(VIRTUAL_CONDITIONS)} for a virtual "
+            f"participant, found a {step.kind} with '{step.condition}'."
+        )
+    known = load_objects() if objects is None else objects
+    if step.object not in known:
+        raise InvalidInput(
+            f"expected an object of {', '.join(known)}, found '{step.object}'."
+        )
+    thing = known[step.object]
+    solid = Solid(thing.shape, thing.size_m, thing.mass_kg)
+    person_seed = np.random.SeedSequence([participant.seed, participant.number, 2])
+    habits = draw_habits(person_seed)
+    name = f"{participant.number}/{step.key}".encode()
+    seeds = np.random.SeedSequence([participant.seed, *name]).generate_state(
+        3, np.uint64
+    )
+    noise, body, shake = (int(word) for word in seeds)
+    height = round(grip_height(solid) - _USUAL, 6)
+    route = _route(_Same(participant), height)
+    n = round(step.limit * rate) + 1
+    steady = Unsteadiness() if unsteadiness is None else unsteadiness
+    drift = hand_drift(n, rate=rate, seed=shake, steady=steady)
+    span = arch_length(float(np.linalg.norm(route.goal - route.start)), LIFT)
+    person = Person(
+        habits if squeeze is None else habits.aiming(squeeze),
+        down=_REACH_S + _REACH_S_PER_M * DOWN,
+        across=_REACH_S + _REACH_S_PER_M * span,
+    )
+    drive: Elbow | Ring
+    if step.condition == "ikns":
+        ability = participant.abilities["ikns"].practised(practised)
+        limits = (-BEYOND, 1 + BEYOND)
+        operator = Operator(ability, rate=rate, seed=noise, start=0.0, limits=limits)
+        arm = CarriedArm(
+            participant,
+            route,
+            drift,
+            rate=rate,
+            seed=body,
+            latency=latency,
+            settings=settings,
+        )
+        drive = Elbow(operator, arm, sees=sees)
+    else:
+        drive = Ring(reaction=habits.reaction, latency=latency, rate=rate)
+    side = participant.protocol.side
+    picked = pick(
+        Grasp(solid, rate=rate, side=side, **model),
+        person,
+        drive,
+        lambda s: (_in_world(route.hand(s) - route.start), route.turn(s)),
+        drift=np.hstack([_in_world(drift[:, :3]), _in_world(drift[:, 3:])]),
+        limit=step.limit,
+    )
+    crosstalk = _crosstalk(participant, route) if step.condition == "ikns" else 0.0
+    return picked, crosstalk
+
+
+class _Same:
+    """A participant that equals itself only: participants hold arrays."""
+
+    def __init__(self, participant: Participant) -> None:
+        self.participant = participant
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.participant is other.participant
+
+    def __hash__(self) -> int:
+        return id(self.participant)
+
+
+@lru_cache(maxsize=8)
+def _route(same: _Same, height: float) -> Route:
+    return hand_route(same.participant, height=height)
+
+
+def _in_world(v: Array) -> Array:
+    """Thorax axes (forward, up, right) as those of the world (forward, left, up)."""
+    return np.stack([v[..., 0], -v[..., 2], v[..., 1]], axis=-1)
+
+
+def _crosstalk(participant: Participant, route: Route) -> float:
+    """Largest change of c on the way to the goal with the elbow held, signed.
+
+    By the calibrated map at the true postures: no noise, no limb.
+    """
+    subject = participant.subject
+    columns = subject.skeleton.columns(chain_joints(subject.chain)) - 6
+    places = np.linspace(0.0, 1.0, 21)
+    q = np.array([route.posture(float(s), 0.5)[columns] for s in places])
+    x = np.array([route.hand(float(s)) for s in places])
+    c = np.ravel(subject.null_space_map.control_signal(q, x))
+    change = c - c[0]
+    return float(change[np.argmax(np.abs(change))])
+
+
+def _farthest(path: Array) -> float:
+    if not len(path):
+        return math.nan
+    return float(np.linalg.norm(path - path[0], axis=1).max())

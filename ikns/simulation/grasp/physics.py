@@ -1,0 +1,204 @@
+"""Hand, finger and object in motion, one control frame at a time."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from ikns.errors import InvalidInput
+
+# The simulated finger's motor is this one's, too.
+from ikns.finger.guard import Guard, Safety
+from ikns.finger.simulated import _FOLLOW as FOLLOW
+from ikns.finger.simulated import _SPEED as SPEED
+from ikns.finger.simulated import _SPIN as SPIN
+from ikns.simulation.grasp.parts import Solid, constant, finger_parts
+from ikns.simulation.grasp.world import world_model
+
+__all__ = ["Grasp", "Seen"]
+
+Array = NDArray[np.float64]
+
+
+class Seen(NamedTuple):
+    """What there is to see and to feel after a frame.
+
+    Parameters
+    ----------
+    flexion : float
+        Of the finger, mean over its joints, 0 to 1.
+    load : float
+        Share of its full effort that the tendon pulls with.
+    place : (3,) array
+        Middle of the object in the world, m.
+    in_hand : (3,) array
+        The same in the gripper's frame.
+    speed : float
+        Of the object's middle, m/s.
+    finger, hand, table : float
+        Sum of the normal forces on the object from each, N.
+    """
+
+    flexion: float
+    load: float
+    place: Array
+    in_hand: Array
+    speed: float
+    finger: float
+    hand: float
+    table: float
+
+
+class Grasp:
+    """The physics of one pick.
+
+    The finger is told through the same guard as every finger (limits of range, rate and
+    acceleration; after a long push it pushes less), its motor is that of
+    :class:`ikns.finger.SimulatedFinger`, and its tendon pulls on all joints alike.
+
+    Parameters
+    ----------
+    solid : Solid
+    rate : float
+        Control frames per second.
+    safety : Safety, optional
+        Of the finger.
+    **model
+        Of :func:`ikns.simulation.grasp.world.world_model`.
+
+    Examples
+    --------
+    >>> grasp = Grasp(Solid("cylinder", (0.075, 0.068), 0.021))
+    >>> for _ in range(150):
+    ...     seen = grasp.frame(1.0)
+    >>> seen.flexion < 0.9 and seen.finger > 1.0  # it holds the cup
+    True
+    """
+
+    def __init__(
+        self,
+        solid: Solid,
+        *,
+        rate: float = 100.0,
+        safety: Safety | None = None,
+        **model: Any,
+    ) -> None:
+        import mujoco
+
+        self.steps = round(1 / (rate * constant("timestep")))
+        if self.steps < 1 or abs(self.steps * rate * constant("timestep") - 1) > 1e-9:
+            raise InvalidInput(
+                f"expected a rate that divides {1 / constant('timestep'):g} steps per "
+                f"second, found {rate:g}."
+            )
+        self.solid, self.rate, self.frames = solid, rate, 0
+        self.model = world_model(solid, **model)
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, self.data)
+        self._step, self._force = mujoco.mj_step, mujoco.mj_contactForce
+        self._motor = self._spin = 0.0
+        self.guard = Guard(Safety() if safety is None else safety)
+        self.guard.start(0.0, 0.0)
+        self._home = self.data.mocap_pos[0].copy()
+        self._middle = np.array([0.0, 0.0, self._home[2]])
+        self._facing = Rotation.from_quat(self.data.mocap_quat[0], scalar_first=True)
+        self._hand = self.model.body("hand").id
+        self._object = self.model.body("object").id
+        thing = self.model.geom("object").id
+        self._thing = thing
+        kinds = {"table": 2, "palm": 1, "heel": 1}
+        kinds |= {part.name: 0 for part in finger_parts()}
+        self._kind = {self.model.geom(name).id: kind for name, kind in kinds.items()}
+        # One unit of the tendon's force is 1 / full N m at each joint.
+        modules = finger_parts()[1:]
+        full = sum(module.upper for module in modules)
+        self._full_force = modules[0].effort * full
+
+    @property
+    def time(self) -> float:
+        """Of the frames done, s."""
+        return self.frames / self.rate
+
+    def frame(
+        self, flexion: float, shift: ArrayLike = (0, 0, 0), turn: ArrayLike = (0, 0, 0)
+    ) -> Seen:
+        """Go on by a frame.
+
+        Parameters
+        ----------
+        flexion : float
+            What the finger is told, 0 to 1; NaN: nothing.
+        shift : (3,) array
+            Where the hand is to be at the end of the frame, from where it would grip
+            the object, m in the world.
+        turn : (3,) array
+            How it is to be turned about the object's middle, a rotation vector, rad in
+            the world.
+        """
+        data = self.data
+        now = self.time
+        self.guard.command(now, flexion)
+        goal = self.guard.goal
+        start = data.mocap_pos[0].copy()
+        way = Rotation.from_rotvec(np.asarray(turn, dtype=np.float64))
+        arm = self._home - self._middle
+        end = self._middle + np.asarray(shift, dtype=np.float64) + way.apply(arm)
+        turned = way * self._facing
+        if self.frames == 0:  # the hand begins there, it does not fly there
+            start = end
+            data.qpos[7:10] = end
+            data.qpos[10:14] = turned.as_quat(scalar_first=True)
+        data.mocap_quat[0] = turned.as_quat(scalar_first=True)
+        for k in range(self.steps):
+            data.mocap_pos[0] = start + (end - start) * ((k + 1) / self.steps)
+            data.ctrl[0] = self._turn_motor(goal)
+            self._step(self.model, data)
+        self.frames += 1
+        self.guard.measured(self.time, self.flexion)
+        return self.seen()
+
+    @property
+    def flexion(self) -> float:
+        """Mean of the joints' shares of full flexion."""
+        return float(self.data.ten_length[0])
+
+    def seen(self) -> Seen:
+        """Read what there is to see now."""
+        data = self.data
+        place = data.xpos[self._object].copy()
+        axes = data.xmat[self._hand].reshape(3, 3)
+        finger, hand, table = self._pressing()
+        return Seen(
+            flexion=self.flexion,
+            load=float(data.actuator_force[0]) / self._full_force,
+            place=place,
+            in_hand=(place - data.xpos[self._hand]) @ axes,
+            speed=float(np.linalg.norm(data.qvel[:3])),
+            finger=finger,
+            hand=hand,
+            table=table,
+        )
+
+    def _pressing(self) -> list[float]:
+        total, wrench = [0.0, 0.0, 0.0], np.zeros(6)
+        pairs = self.data.contact.geom.tolist()
+        for i, (one, other) in enumerate(pairs):
+            if self._thing not in (one, other):
+                continue
+            self._force(self.model, self.data, i, wrench)
+            total[self._kind[other if one == self._thing else one]] += wrench[0]
+        return [float(force) for force in total]
+
+    def _turn_motor(self, goal: float) -> float:
+        dt = constant("timestep")
+        if math.isnan(goal):  # the gear brakes it
+            self._spin = 0.0
+        else:
+            wanted = min(max((goal - self._motor) / FOLLOW, -SPEED), SPEED)
+            self._spin += (wanted - self._spin) * min(dt / SPIN, 1.0)
+            self._motor += self._spin * dt
+        return self._motor
