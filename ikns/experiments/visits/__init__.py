@@ -19,7 +19,9 @@ from ikns.experiments.visits.folder import (
     list_visits,
     read_visit,
     write_attempts,
+    write_visit,
 )
+from ikns.experiments.visits.parquet import table_bytes
 from ikns.experiments.visits.rows import (
     EXPERIMENTS,
     counting,
@@ -36,7 +38,9 @@ __all__ = [
     "create_visit",
     "list_visits",
     "read_visit",
+    "table_bytes",
     "tracking_record",
     "tracking_row",
     "write_attempts",
+    "write_visit",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ __all__ = [
     "list_visits",
     "read_visit",
     "write_attempts",
+    "write_visit",
 ]
 
 #: Version of a visit's files.
@@ -130,6 +132,41 @@ def write_attempts(folder: str | Path, rows: Iterable[Mapping[str, Any]]) -> Pat
     path = Path(folder)
     content = table_bytes(_about(path)["experiment"], list(rows))
     return _new(path / _ALL, content)
+
+
+def write_visit(folder: str | Path, about: Mapping[str, Any], attempts: bytes) -> Path:
+    """Write a visit that is over: the folder appears whole or not at all.
+
+    Parameters
+    ----------
+    folder : str or Path
+        New; folders above it are made. What a killed run left of the same visit, which
+        has another name, is removed.
+    about : mapping
+        See :func:`create_visit`.
+    attempts : bytes
+        Of :func:`ikns.experiments.visits.table_bytes`.
+
+    Raises
+    ------
+    InvalidInput
+        When the folder exists, or `about` is not what a visit is.
+    FileError
+        When it cannot be written.
+    """
+    path = Path(folder)
+    if path.exists():
+        raise InvalidInput(f"{path}: is there already, and no visit is overwritten.")
+    part = path.with_name(f".{path.name}{_PART}")
+    shutil.rmtree(part, ignore_errors=True)
+    create_visit(part, about)
+    _write(part / _ALL, attempts)
+    try:
+        part.rename(path)
+        _sync(path.parent)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
+    return path
 
 
 def read_visit(folder: str | Path, *, experiment: str | None = None) -> VisitRecord:
@@ -244,13 +281,18 @@ def _write(path: Path, content: bytes) -> Path:
             file.flush()
             os.fsync(file.fileno())
         part.replace(path)
-        descriptor = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        _sync(path.parent)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
     finally:
         part.unlink(missing_ok=True)
     return path
+
+
+def _sync(folder: Path) -> None:
+    """Bring the names in a folder to the disk."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,131 @@
+"""``ikns study``: declare a study, and simulate it where it is not done yet."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ikns.cli.options import AsJson, Force
+from ikns.cli.output import notes, progress, show
+
+__all__ = ["study_app"]
+
+study_app = typer.Typer(
+    help="Declare a study, simulate it, plan its size.", no_args_is_help=True
+)
+
+#: Between two lines of progress where there is no terminal, s.
+_EVERY = 30.0
+#: Failed cells that are named.
+_NAMED = 5
+
+StudyFolder = Annotated[Path, typer.Argument(help="Folder of the study.")]
+
+
+@study_app.command()
+def init(folder: StudyFolder, force: Force = False, as_json: AsJson = False) -> None:
+    """Write a study folder with a commented example: both experiments, 10 people."""
+    from ikns.experiments.study import init_study, read_study
+
+    path = init_study(folder, force=force)
+    study = read_study(folder)
+    show(
+        {"study": path, "name": study.name, "participants": study.participants},
+        f"{path}: {study.participants} simulated participants, "
+        f"{' and '.join(study.designs)}",
+        f"Change it as you like, then: ikns study run {folder}",
+        as_json=as_json,
+    )
+
+
+@study_app.command()
+def run(
+    folder: StudyFolder,
+    jobs: Annotated[int, typer.Option(help="Processes; -1: one for each core.")] = -1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Dask scheduler that computes instead, tcp://HOST:PORT."),
+    ] = None,
+    participants: Annotated[
+        int | None, typer.Option(help="Only the first so many.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate what a study lacks; a run that was stopped goes on where it was.
+
+    The results are the same bits with any number of processes, here or on a cluster.
+    """
+    from ikns.experiments.study import read_study, run_study
+
+    study = read_study(folder)
+    with _told() as report:
+        done = run_study(
+            folder,
+            n_jobs=jobs,
+            scheduler=scheduler,
+            participants=participants,
+            on_progress=report,
+        )
+    result: dict[str, Any] = {
+        "study": folder,
+        "name": study.name,
+        "simulated": True,
+        "cells": done.cells,
+        "found": done.found,
+        "simulated_now": done.simulated,
+        "failed": done.failed,
+        "seconds": done.seconds,
+    }
+    warned = []
+    if done.failed:
+        few = list(done.failed.items())[:_NAMED]
+        named = "; ".join(f"{name}: {reason}" for name, reason in few)
+        warned = [
+            f"{len(done.failed)} of {done.simulated} cells have no attempts: {named}"
+        ]
+    show(
+        result | {"warnings": warned},
+        f"{study.name}: {done.cells} cells, {done.simulated} simulated now in "
+        f"{done.seconds:.0f} s, {done.found} there before",
+        *notes(warned),
+        f"All participants are simulated. Now: ikns report {folder}",
+        as_json=as_json,
+    )
+
+
+@contextmanager
+def _told() -> Iterator[Callable[[str, int, int], None]]:
+    """Report progress: as a bar on a terminal, elsewhere as a line now and then."""
+    if sys.stderr.isatty():
+        with progress() as report:
+            yield report
+        return
+    began = last = time.monotonic()
+    first: int | None = None
+
+    def line(step: str, done: int, total: int) -> None:
+        nonlocal first, last
+        if step != "simulating":
+            return
+        now = time.monotonic()
+        first = done if first is None else first
+        if now - last < _EVERY or done == first:
+            return
+        last = now
+        left = (now - began) / (done - first) * (total - done)
+        sys.stderr.write(f"{done} of {total} cells, about {_minutes(left)} left\n")
+        sys.stderr.flush()
+
+    yield line
+
+
+def _minutes(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

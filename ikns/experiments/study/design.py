@@ -1,0 +1,252 @@
+"""What is declared of a study: the two experiments and the simulation's settings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ikns.errors import InvalidInput
+from ikns.experiments.picking.objects import OBJECT_IDS
+from ikns.experiments.picking.schedule import LIMIT, PickStep, pick_schedule
+from ikns.experiments.study.tables import choice, positive
+from ikns.experiments.tracking.machine import ALIGN
+from ikns.experiments.tracking.profiles import CHARACTERS, draw_profile
+from ikns.experiments.tracking.schedule import Step, schedule
+
+__all__ = ["LAYOUTS", "Parameters", "PickingDesign", "TrackingDesign"]
+
+#: Points of the calibration's box, by their numbers there, that make the map.
+LAYOUTS = {
+    "box": tuple(range(10)),
+    "corners": tuple(range(8)),
+    # Every second corner: no two of them share an edge of the box.
+    "tetrahedron": (0, 2, 5, 7),
+}
+_INTERPOLATIONS = ("natural", "laplace", "nearest")
+_OUTSIDE = ("nearest", "project", "nan")
+
+
+@dataclass(frozen=True)
+class TrackingDesign:
+    """Experiment 1, as declared; see :func:`ikns.experiments.tracking.schedule`.
+
+    Parameters
+    ----------
+    conditions, profiles : tuple of str
+        At least two conditions.
+    repeats, training : int
+    seconds, align, rest : float
+        s.
+    margin : float, optional
+        Difference of RMSE, of 100, that does not matter: for the equivalence test.
+        Without it none is made.
+    """
+
+    conditions: tuple[str, ...] = ("ikns", "gamepad")
+    profiles: tuple[str, ...] = ("T1", "T2", "T3")
+    repeats: int = 3
+    seconds: float = 25.0
+    align: float = ALIGN
+    training: int = 10
+    rest: float = 120.0
+    margin: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be done or compared."""
+        _check_blocks("tracking", self.conditions, self.repeats, self.training)
+        _check_different("tracking", "profiles", self.profiles)
+        for name in self.profiles:
+            choice("tracking", "profiles", name, CHARACTERS)
+        _check_times("tracking", align=self.align, rest=self.rest)
+        draw_profile(self.profiles[0], 0, seconds=self.seconds)
+        if self.margin is not None:
+            positive("tracking", margin=self.margin)
+
+    def arguments(self, *, seed: int) -> dict[str, Any]:
+        """Return what the schedule depends on besides the participant's number."""
+        return {
+            "conditions": list(self.conditions),
+            "profiles": list(self.profiles),
+            "repeats": self.repeats,
+            "seed": seed,
+            "seconds": self.seconds,
+            "training": self.training,
+            "rest": self.rest,
+        }
+
+    def steps(self, number: int, *, seed: int) -> list[Step]:
+        """Return the schedule of a participant, counted from 0."""
+        return schedule(number, **self.arguments(seed=seed))
+
+
+@dataclass(frozen=True)
+class PickingDesign:
+    """Experiment 2, as declared; see :func:`pick_schedule`.
+
+    Parameters
+    ----------
+    conditions, objects : tuple of str
+        At least two conditions.
+    repeats, training : int
+    limit, rest : float
+        s.
+    margin_s : float, optional
+        Difference of time that does not matter, s.
+    """
+
+    conditions: tuple[str, ...] = ("ikns", "ring")
+    objects: tuple[str, ...] = OBJECT_IDS
+    repeats: int = 1
+    limit: float = LIMIT
+    training: int = 10
+    rest: float = 120.0
+    margin_s: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be done or compared."""
+        _check_blocks("picking", self.conditions, self.repeats, self.training)
+        _check_different("picking", "objects", self.objects)
+        for code in self.objects:
+            choice("picking", "objects", code, OBJECT_IDS)
+        _check_times("picking", rest=self.rest)
+        positive("picking", limit=self.limit)
+        if self.margin_s is not None:
+            positive("picking", margin_s=self.margin_s)
+
+    def arguments(self, *, seed: int) -> dict[str, Any]:
+        """Return what the schedule depends on besides the participant's number."""
+        return {
+            "conditions": list(self.conditions),
+            "objects": list(self.objects),
+            "repeats": self.repeats,
+            "seed": seed,
+            "limit": self.limit,
+            "training": self.training,
+            "rest": self.rest,
+        }
+
+    def steps(self, number: int, *, seed: int) -> list[PickStep]:
+        """Return the schedule of a participant, counted from 0."""
+        return pick_schedule(number, **self.arguments(seed=seed))
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """How virtual participants are filmed, calibrated and connected.
+
+    Parameters
+    ----------
+    rate : float
+        Frames per second.
+    max_hand_speed : float
+        Gate of the calibration, m/s.
+    n_points : int
+        Points of the box that are visited, 5 to 10.
+    layout : {"box", "corners", "tetrahedron"}
+        Which of them make the map: all, the eight corners, every second corner.
+    interpolation : {"natural", "laplace", "nearest"}
+        Between the points: natural neighbors by volume or by area, or the nearest one.
+    outside : {"nearest", "project", "nan"}
+        Of the map. While tracking, the hand is held in the middle of the points, so
+        this matters in picking only.
+    point_seconds : float
+        Stay at each point, s.
+    marker_noise : float
+        Of the cameras, m, standard deviation per axis.
+    occluded : float
+        Share of marker frames that the cameras miss.
+    soft_tissue : float
+        Displacement of the markers over the bones, m, root mean square.
+    latency : float
+        From a posture to its c, s.
+    smoothing : bool
+        Whether c is smoothed as the live loop does it.
+    """
+
+    rate: float = 100.0
+    max_hand_speed: float = 0.05
+    n_points: int = 10
+    layout: str = "box"
+    interpolation: str = "natural"
+    outside: str = "nearest"
+    point_seconds: float = 5.0
+    marker_noise: float = 1e-3
+    occluded: float = 0.03
+    soft_tissue: float = 3e-3
+    latency: float = 0.05
+    smoothing: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what nothing can be simulated with."""
+        where = "parameters"
+        positive(
+            where,
+            rate=self.rate,
+            max_hand_speed=self.max_hand_speed,
+            point_seconds=self.point_seconds,
+        )
+        for name in ("marker_noise", "soft_tissue", "latency", "occluded"):
+            value = getattr(self, name)
+            if not 0 <= value < (0.5 if name == "occluded" else math.inf):
+                raise InvalidInput(
+                    f"expected {name} of at least 0 in [{where}]"
+                    f"{' and below 0.5' * (name == 'occluded')}, found {value:g}."
+                )
+        if not 20.0 <= self.rate <= 1000.0:
+            raise InvalidInput(
+                f"expected a rate of 20 to 1000 in [{where}], found {self.rate:g}."
+            )
+        if not 5 <= self.n_points <= 10:
+            raise InvalidInput(
+                f"expected n_points of 5 to 10 in [{where}], found {self.n_points}."
+            )
+        choice(where, "layout", self.layout, LAYOUTS)
+        choice(where, "interpolation", self.interpolation, _INTERPOLATIONS)
+        choice(where, "outside", self.outside, _OUTSIDE)
+        if self.layout != "box" and self.n_points <= max(LAYOUTS[self.layout]):
+            raise InvalidInput(
+                f"expected n_points above {max(LAYOUTS[self.layout])} in [{where}] for "
+                f"the layout '{self.layout}', found {self.n_points}."
+            )
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """Numbers of the points that make the map, from 0."""
+        return tuple(k for k in LAYOUTS[self.layout] if k < self.n_points)
+
+
+def _check_blocks(
+    where: str, conditions: Sequence[str], repeats: int, training: int
+) -> None:
+    _check_different(where, "conditions", conditions)
+    if len(conditions) < 2:
+        raise InvalidInput(
+            f"expected at least two conditions to compare in [{where}], found "
+            f"{', '.join(conditions)}."
+        )
+    if repeats < 1:
+        raise InvalidInput(
+            f"expected at least one repeat in [{where}], found {repeats}: no trial "
+            "would be left."
+        )
+    if training < 0:
+        raise InvalidInput(
+            f"expected training from 0 trials in [{where}], found {training}."
+        )
+
+
+def _check_different(where: str, key: str, words: Sequence[str]) -> None:
+    if not words or "" in words or len(set(words)) != len(words):
+        raise InvalidInput(
+            f"expected {key} that differ in [{where}], found {list(words)}."
+        )
+
+
+def _check_times(where: str, **numbers: Any) -> None:
+    for name, value in numbers.items():
+        if not 0 <= value < math.inf:
+            raise InvalidInput(
+                f"expected {name} from 0 s in [{where}], found {value:g}."
+            )

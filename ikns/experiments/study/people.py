@@ -1,0 +1,119 @@
+"""Virtual participants of a study: drawn, and calibrated under its parameters."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+
+import numpy as np
+
+from ikns.calibration import calibrate
+from ikns.experiments.study.design import Parameters
+from ikns.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace_map import NullSpaceMap
+from ikns.nullspace_map.between import NearestPoint
+from ikns.recording import Recording
+from ikns.simulation.operator import Participant, draw_participant
+from ikns.simulation.protocol import Protocol
+from ikns.skeleton import Skeleton
+from ikns.subject import Subject
+
+__all__ = ["recalibrated", "study_participant"]
+
+#: Parameters that change what is made of the recordings, not the recordings.
+_OF_CALIBRATION = ("max_hand_speed", "layout", "outside")
+
+
+def study_participant(number: int, *, seed: int, parameters: Parameters) -> Participant:
+    """Draw a participant and calibrate it as the parameters say.
+
+    The same number and seed give the same body, ability, habits and luck under any
+    parameters. Only where another number of points makes the protocol possible or not
+    may another person take a place; `redrawn` then differs.
+
+    Raises
+    ------
+    InvalidInput
+        When nobody of 20 can do the protocol.
+    NotEnoughData
+        When the calibration fails.
+    """
+    person = draw_participant(
+        number,
+        seed=seed,
+        soft_tissue=parameters.soft_tissue,
+        latency=parameters.latency,
+        n_points=parameters.n_points,
+        point_seconds=parameters.point_seconds,
+        marker_noise=parameters.marker_noise,
+        occluded=parameters.occluded,
+        rate=parameters.rate,
+    )
+    return recalibrated(person, parameters)
+
+
+def recalibrated(person: Participant, parameters: Parameters) -> Participant:
+    """Return the same participant with a map made of the same recordings otherwise.
+
+    Raises
+    ------
+    NotEnoughData
+        When the calibration fails.
+    """
+    usual = Parameters()
+    if any(getattr(parameters, k) != getattr(usual, k) for k in _OF_CALIBRATION):
+        subject = _calibrated(person.protocol, parameters)
+        person = dataclasses.replace(person, subject=subject)
+    if parameters.interpolation != "natural":
+        learned = _between(
+            person.subject.null_space_map,
+            parameters.interpolation,
+            outside=parameters.outside,
+        )
+        subject = dataclasses.replace(person.subject, null_space_map=learned)
+        person = dataclasses.replace(person, subject=subject)
+    return person
+
+
+def _calibrated(protocol: Protocol, parameters: Parameters) -> Subject:
+    """Calibrate anew from the same recordings."""
+    adult, points = protocol.subject.adult, parameters.points
+    recordings = [protocol.points.recording]
+    if len(points) < len(protocol.places):
+        recordings = [_at_point(protocol, k) for k in points]
+    return calibrate(
+        protocol.static.recording,
+        recordings,
+        generic=Skeleton.from_anthropometry(adult.stature_m, adult.mass_kg, adult.sex),
+        chain=f"{protocol.side}_arm",
+        n_points=len(points),
+        max_hand_speed=parameters.max_hand_speed,
+        outside=parameters.outside,  # type: ignore[arg-type]
+    )
+
+
+def _at_point(protocol: Protocol, point: int) -> Recording:
+    """Cut out the stay at one point."""
+    rows = np.flatnonzero(protocol.points.point == point)
+    whole = protocol.points.recording
+    return Recording(
+        whole.time[rows],
+        whole.markers[rows],
+        whole.labels,
+        f"{whole.source}, point {point + 1}",
+    )
+
+
+def _between(learned: NullSpaceMap, method: str, *, outside: str) -> NullSpaceMap:
+    """Return the map with other weights between its points."""
+    changed = copy.copy(learned)
+    changed.interpolator_ = (
+        NearestPoint(learned.centers_)
+        if method == "nearest"
+        else NaturalNeighborInterpolator(
+            learned.centers_,
+            outside=outside,  # type: ignore[arg-type]
+            method=method,  # type: ignore[arg-type]
+        )
+    )
+    return changed

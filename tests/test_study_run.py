@@ -1,0 +1,218 @@
+"""Running a study: the same bits whoever computes them, and nothing done twice."""
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import tomli_w
+from distributed import LocalCluster
+
+from ikns.errors import FileError, InvalidInput, StreamError
+from ikns.experiments.study import read_study, run_study, workers
+from ikns.experiments.study.people import study_participant
+from ikns.experiments.tracking import draw_profile, measure, virtual_step
+from ikns.experiments.visits import list_visits, read_visit, tracking_record
+
+#: Quick people: a coarse clock, one profile, short stays.
+STUDY = {
+    "study": {"name": "quick", "seed": 5},
+    "cohort": {"participants": 3},
+    "tracking": {"profiles": ["T1"], "repeats": 1, "training": 2, "seconds": 15},
+    "parameters": {"rate": 50, "point_seconds": 2},
+}
+#: No hand is as still as that.
+STRICT = {"max_hand_speed": 1e-6}
+RUN = """
+import sys
+from ikns.experiments.study import run_study
+if __name__ == "__main__":
+    run_study(sys.argv[1], n_jobs=2)
+"""
+
+
+def make(folder: Path, **tables: dict) -> Path:
+    folder.mkdir()
+    (folder / "study.toml").write_text(tomli_w.dumps(STUDY | tables))
+    return folder
+
+
+def contents(study: Path) -> dict[str, bytes]:
+    """Everything that a run leaves, by name; the lock is empty."""
+    visits = study / "visits"
+    return {
+        path.relative_to(visits).as_posix(): path.read_bytes()
+        for path in sorted(visits.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="session")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The study as one process makes it."""
+    study = make(tmp_path_factory.mktemp("one") / "study")
+    run_study(study, n_jobs=1)
+    return study
+
+
+def test_two_dask_workers_make_the_bits_of_one(done: Path, tmp_path: Path) -> None:
+    study = make(tmp_path / "dask")
+    # Its workers complain of the scheduler's leaving when the cluster is closed.
+    with LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        dashboard_address=None,
+        silence_logs=logging.CRITICAL,
+    ) as cluster:
+        run_study(study, scheduler=cluster.scheduler_address)
+    assert contents(study) == contents(done)
+
+
+def test_a_killed_run_goes_on_and_two_processes_make_the_bits_of_one(
+    done: Path, tmp_path: Path
+) -> None:
+    study = make(tmp_path / "killed")
+    first = study / "visits" / "sub-01_tracking"
+    with subprocess.Popen([sys.executable, "-c", RUN, str(study)]) as running:
+        while not list_visits(study) and running.poll() is None:
+            time.sleep(0.01)
+        with pytest.raises(InvalidInput, match="found another run"):
+            run_study(study)
+        running.send_signal(signal.SIGKILL)
+    found = list_visits(study)
+    assert 1 <= len(found) < 3
+    assert not any("part" in path.name for path in found)
+    # What a kill may leave beside it: a visit that has no name yet, a torn declaration.
+    torn = study / "visits" / ".sub-03_tracking.part"
+    torn.mkdir(exist_ok=True)
+    (torn / "attempts.parquet").write_bytes(b"PAR1 half")
+    foreign = study / "visits" / "notes.txt"
+    foreign.write_text("mine")
+    before = {path: path.stat().st_mtime_ns for path in found}
+    told: list[tuple] = []
+    run = run_study(study, n_jobs=2, on_progress=lambda *row: told.append(row))
+    assert (run.cells, run.found, run.failed) == (3, len(found), {})
+    assert run.simulated == 3 - len(found)
+    assert told == [("simulating", k, 3) for k in range(len(found), 4)]
+    assert {path: path.stat().st_mtime_ns for path in found} == before
+    assert foreign.read_text() == "mine"
+    foreign.unlink()
+    assert contents(study) == contents(done)
+    assert first.is_dir()
+
+
+def test_a_cohort_grows_without_doing_anything_twice(
+    done: Path, tmp_path: Path
+) -> None:
+    study = make(tmp_path / "part")
+    one = run_study(study, n_jobs=1, participants=1)
+    assert (one.cells, one.simulated) == (1, 1)
+    more = run_study(study, n_jobs=1, participants=2)
+    assert (more.cells, more.found, more.simulated) == (2, 1, 1)
+    for path in list_visits(study):
+        name = path.relative_to(study).as_posix()
+        for file in path.iterdir():
+            assert file.read_bytes() == (done / name / file.name).read_bytes()
+    with pytest.raises(InvalidInput, match="expected 1 to 3 participants, found 4"):
+        run_study(study, participants=4)
+
+
+def test_a_cell_is_what_the_participant_does(done: Path) -> None:
+    study = read_study(done)
+    assert study.tracking is not None
+    visit = read_visit(done / "visits" / "sub-02_tracking", experiment="tracking")
+    person = study_participant(1, seed=5, parameters=study.parameters)
+    trials = [s for s in study.tracking.steps(1, seed=5) if s.kind == "trial"]
+    assert [row["key"] for row in visit.attempts] == [step.key for step in trials]
+    for row, step in zip(visit.attempts, trials, strict=True):
+        assert row["practised"] == 2  # of training, which is counted
+        record = virtual_step(
+            person,
+            step,
+            draw_profile("T1", step.seed, seconds=15.0),
+            practised=2,
+            rate=50.0,
+        )
+        kept = tracking_record(row)
+        assert kept.c.tobytes() == record.c.tobytes()
+        assert kept.time.tobytes() == record.time.tobytes()
+        assert measure(kept) == measure(record)
+    about = visit.about
+    assert (about["simulated"], about["participant"], about["seed"]) == (True, "02", 5)
+    assert "simulated" in about["input"]["ikns"]
+    assert about["design"] == study.tracking.arguments(seed=5)
+    assert about["subject"]["stature_m"] == person.protocol.subject.adult.stature_m
+
+
+def test_who_cannot_be_calibrated_is_told_and_stops_nobody(tmp_path: Path) -> None:
+    study = make(
+        tmp_path / "strict",
+        cohort={"participants": 1},
+        parameters=STUDY["parameters"] | STRICT,
+        variations={"usual": {"max_hand_speed": 0.05}},
+    )
+    run = run_study(study, n_jobs=1)
+    assert (run.cells, run.simulated) == (2, 2)
+    assert list(run.failed) == ["sub-01_tracking"]
+    strict, usual = (read_visit(path) for path in list_visits(study))
+    assert strict.attempts == []
+    assert strict.about["reason"] == run.failed["sub-01_tracking"]
+    assert "hand slower than 1e-06 m/s" in strict.about["reason"]
+    assert len(usual.attempts) == 2
+    assert usual.about["reason"] == ""
+    assert usual.about["variation_settings"] == {"max_hand_speed": 0.05}
+    assert run_study(study, n_jobs=1).simulated == 0
+
+
+def test_a_changed_study_is_not_mixed_with_its_results(
+    done: Path, tmp_path: Path
+) -> None:
+    study = make(tmp_path / "changed")
+    (study / "visits").mkdir()
+    for name, content in contents(done).items():
+        path = study / "visits" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)
+    before = contents(study)
+    table = STUDY | {"study": {"name": "quick", "seed": 6}}
+    (study / "study.toml").write_text(tomli_w.dumps(table))
+    with pytest.raises(InvalidInput, match="there are results with seed = 5, found 6"):
+        run_study(study)
+    assert contents(study) == before
+
+
+def test_a_study_of_people_and_a_damaged_one_are_not_run(tmp_path: Path) -> None:
+    people = make(tmp_path / "people", study={"name": "real", "simulated": False})
+    with pytest.raises(InvalidInput, match="found one of people"):
+        run_study(people)
+    damaged = make(tmp_path / "damaged")
+    (damaged / "visits" / "sub-02_tracking").mkdir(parents=True)
+    with pytest.raises(FileError, match=r"sub-02_tracking: expected a visit"):
+        run_study(damaged)
+    with pytest.raises(FileError, match="nowhere: expected the file of a study"):
+        run_study(tmp_path / "nowhere")
+
+
+def test_workers_that_are_none_or_die_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(InvalidInput, match="at least one process, found 0"):
+        workers.compute(abs, [1], n_jobs=0)
+    assert list(workers.compute(abs, iter([-1, 2]), n_jobs=1)) == [1, 2]
+    with pytest.raises(StreamError, match="a worker process died"):
+        list(workers.compute(_die, [1], n_jobs=2))
+    monkeypatch.setattr(workers, "_PATIENCE", 0.2)
+    study = make(tmp_path / "nobody")
+    with pytest.raises(StreamError, match="tcp://127.0.0.1:9: no Dask scheduler"):
+        run_study(study, scheduler="tcp://127.0.0.1:9")
+    with pytest.raises(StreamError, match="no Dask scheduler answers"):
+        run_study(study, scheduler="nonsense://1")
+    assert list_visits(study) == []
+
+
+def _die(_: int) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
