@@ -50,7 +50,7 @@ METRICS = (
 )
 _WHO = ("subject", "variation", "condition", "kind", "repeat", "number", "practised")
 #: Columns of the tables of trials.
-TRACKING = (*_WHO, "trajectory", "trial", "seconds", *METRICS)
+TRACKING = (*_WHO, "trajectory", "trial", "align", "seconds", *METRICS)
 PICKING = (*_WHO, "object", "trial", "success", "outcome", "time", "limit", "comment")
 #: Which of them hold text, and which whole numbers.
 TEXTS = (*_WHO[:4], "trajectory", "object", "outcome", "comment")
@@ -128,7 +128,7 @@ def _tracking(visit: VisitRecord) -> Digest:
         _append(
             digest.table,
             _who(digest, row)
-            | {"trajectory": row["trajectory"], "seconds": row["seconds"]}
+            | {name: row[name] for name in ("trajectory", "align", "seconds")}
             | {"trial": trial}
             | {name: getattr(found, name) for name in METRICS},
         )

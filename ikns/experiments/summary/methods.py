@@ -71,16 +71,15 @@ def _participants(group: Group) -> str:
         else ""
     )
     return (
-        f"No person took part: {' and '.join(counts)} were simulated, each a virtual "
-        "body and a model of a human operator whose parameters are from the "
-        f"literature.{again}"
+        f"No person took part: {' and '.join(counts)}, each a virtual body and a model "
+        f"of a human operator whose parameters are from the literature.{again}"
     )
 
 
 def _tracking(found: TrackingSummary) -> str:
     said = _design(found.said)
     seconds = said.get("seconds", _only(found.table["seconds"]))
-    align = said.get("align")
+    align = said.get("align", _only(found.table["align"]))
     parts = [
         "Tracking: a pointer crossed the screen at constant speed and was to follow a "
         "pseudo-random curve; its height was 100 c, c being the control signal cut "
@@ -211,8 +210,8 @@ def _inputs(said: list[dict[str, Any]]) -> str:
                 found[str(condition)].append(str(text))
     if not found:
         return ""
-    each = "; ".join(f"{name}: {' or '.join(t)}" for name, t in found.items())
-    return f" Input: {each}."
+    sources = "; ".join(f"{name}: {' or '.join(t)}" for name, t in found.items())
+    return f" Input: {sources}."
 
 
 def _only(values: Any) -> float | None:

@@ -234,8 +234,8 @@ def _compared(
     kept = np.isin(trials["condition"], names)
     rows = {name: values[kept] for name, values in trials.items()}
     if np.any(rows["repeat"] != rows["repeat"][0]):  # a pair is an object, once
-        both = zip(rows["object"], rows["repeat"], strict=True)
-        again = [f"{name} {repeat + 1}" for name, repeat in both]
+        once = zip(rows["object"], rows["repeat"], strict=True)
+        again = [f"{name} {repeat + 1}" for name, repeat in once]
         rows = {**rows, "object": np.asarray(again)}
     analysis = success = same = None
     try:

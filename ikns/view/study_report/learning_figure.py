@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ikns.experiments.statistics import LearningCurve, LearningCurves
 from ikns.experiments.summary import TrackingSummary
 from ikns.experiments.summary.cells import Columns
-from ikns.view.study_report.drawing import looks, study_figure
+from ikns.view.study_report.drawing import looks, outside_legend, study_figure
 from ikns.view.style import GREEN, GREY, INK, PALE, PURPLE, house_style
 
 __all__ = ["learning_figure"]
@@ -49,7 +49,7 @@ def learning_figure(found: TrackingSummary) -> Figure:
                 mfc="white",
                 mec=look.color,
                 ms=4,
-                label="training, other curves",
+                label="training",
             )
             number, mean, spread = _by_trial(trials, condition, level=True)
             axes.errorbar(
@@ -61,22 +61,23 @@ def learning_figure(found: TrackingSummary) -> Figure:
                 ms=4,
                 capsize=2,
                 lw=0.8,
-                label="trials, mean and SD",
+                label="trials",
             )
             curves = fitted.get(condition)
             if curves is not None and len(number):
                 k = np.linspace(1, number.max(), 200)
                 for curve in curves.curves:
                     color, line = _LINES[curve.model]
-                    share = f"{curve.model} ({100 * curves.weights[curve.model]:.0f} %)"
-                    axes.plot(k, _value(curve, k), line, color=color, label=share)
+                    y = _value(curve, k)
+                    axes.plot(k, y, line, color=color, label=curve.model)
             axes.axvline(0.5, color=INK, lw=0.6)
-            axes.set_title(condition)
+            who = np.unique(trials["subject"][trials["condition"] == condition])
+            axes.set_title(f"{condition} (n = {len(who)})")
             axes.set_xlabel("trial in this condition")
             axes.yaxis.grid(visible=True, color=PALE)
-            axes.legend(loc="upper right", fontsize=7)
         panels[0].set_ylim(bottom=0)
         panels[0].set_ylabel("RMSE (of 100)")
+        outside_legend(figure, panels[0])
     return figure
 
 

@@ -108,8 +108,8 @@ def _varied(quantity: str, unit: str, found: list[Varied]) -> Table:
         against = each.against
         row: list[Cell] = [
             each.condition,
-            each.name or "as planned",
-            setting_text(each.settings),
+            each.name or "as\u00a0planned",
+            setting_text(each.settings).replace(" = ", "\u00a0=\u00a0"),
             each.over.mean,
             each.over.low,
             each.over.high,

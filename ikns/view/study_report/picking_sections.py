@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
-import numpy as np
-
 from ikns.experiments.picking import load_objects
-from ikns.experiments.summary import PickComparison, PickingSummary
+from ikns.experiments.summary import ObjectCell, PickComparison, PickingSummary
 from ikns.experiments.summary.answers import worded
 from ikns.view.parts import Cell, Picture, Section, Table
 from ikns.view.study_report.effect_figure import effect_figure
@@ -66,7 +65,7 @@ def picking_sections(found: PickingSummary, drawn: list[Drawn]) -> Iterator[Sect
         "Pick and place",
         text,
         [pictures["picking_objects"]] if drawn else [],
-        [_object_table(found)] if drawn else [],
+        [_success_table(found), _time_table(found)] if drawn else [],
     )
     for k, compared in enumerate(found.comparisons):
         name = "picking_difference" + (f"_{k + 1}" if k else "")
@@ -105,57 +104,91 @@ def _comparison(compared: PickComparison, pictures: list[Picture]) -> Section:
         text,
         pictures,
         [
-            tests_table([("paper", found.paper)], beside),
+            tests_table([found.paper], beside),
             *([effects_table(found.effects)] if found.effects else []),
         ],
     )
 
 
-def _object_table(found: PickingSummary) -> Table:
-    known = load_objects()
-    rows: list[list[Cell]] = []
-    for cell in found.cells:
-        name = cell.object or "all"
-        if cell.object in known:
-            each = known[cell.object]
-            name = f"{cell.object} {each.name}, {1000 * each.mass_kg:.0f} g"
-        share = 100 * cell.succeeded / cell.trials if cell.trials else np.nan
-        rows.append(
-            [
-                cell.condition,
-                name,
-                cell.trials,
-                cell.succeeded,
-                cell.dropped,
-                cell.late,
-                float(share),
-                f"{100 * cell.low:.0f} to {100 * cell.high:.0f}"
-                if cell.trials
-                else None,
-                cell.median,
-                cell.mean,
-                cell.deviation,
-                cell.restricted,
-                cell.subjects,
-            ]
-        )
-    return Table(
-        [
-            "condition",
-            "object",
-            "n trials",
-            "succeeded",
+def _success_table(found: PickingSummary) -> Table:
+    columns = ["object"]
+    for condition in found.conditions:
+        columns += [
+            f"{condition}: succeeded",
             "dropped",
             "out of time",
-            "success (%)",
-            "95 %",
-            "median time (s)",
-            "mean (s)",
-            "SD (s)",
-            "with failures (s)",
-            "n participants",
-        ],
+            "success (%), 95 %",
+        ]
+    rows: list[list[Cell]] = []
+    for name, cells in _by_object(found):
+        row: list[Cell] = [name]
+        for cell in cells:
+            if not cell.trials:
+                row += ["–", None, None, "–"]
+                continue
+            share = 100 * cell.succeeded / cell.trials
+            row += [
+                _whole(f"{cell.succeeded} of {cell.trials}"),
+                cell.dropped,
+                cell.late,
+                _whole(f"{share:.0f} ({100 * cell.low:.0f} to {100 * cell.high:.0f})"),
+            ]
+        rows.append(row)
+    return Table(
+        columns,
         rows,
-        "Success and time by object. Median, mean and SD are of successful trials "
-        "alone, as the paper's; the column with failures counts them at the limit.",
+        "Success by object: trials, how the others ended, and the share with its 95 % "
+        "interval, which counts trials as independent.",
     )
+
+
+def _time_table(found: PickingSummary) -> Table:
+    columns = ["object"]
+    for condition in found.conditions:
+        columns += [
+            f"{condition}: n succeeded",
+            "median (s)",
+            "mean ± SD (s)",
+            "with failures (s)",
+        ]
+    rows: list[list[Cell]] = []
+    for name, cells in _by_object(found):
+        row: list[Cell] = [name]
+        for cell in cells:
+            spread = "" if math.isnan(cell.deviation) else f" ± {cell.deviation:.2f}"
+            row += [
+                cell.succeeded,
+                cell.median,
+                "–" if math.isnan(cell.mean) else _whole(f"{cell.mean:.2f}{spread}"),
+                cell.restricted,
+            ]
+        rows.append(row)
+    return Table(
+        columns,
+        rows,
+        "Time by object. Median, mean and SD are of successful trials alone, as in "
+        "the paper; the last column of a condition counts failures at the limit.",
+    )
+
+
+def _by_object(found: PickingSummary) -> Iterator[tuple[str, list[ObjectCell]]]:
+    """Name of each object as in the paper's table, and its cells by condition."""
+    known = load_objects()
+    for code in (*found.objects, ""):
+        name = code or "all"
+        if code in known:
+            name = f"{code} {known[code].name}, {1000 * known[code].mass_kg:.0f} g"
+        yield (
+            _whole(name),
+            [
+                cell
+                for condition in found.conditions
+                for cell in found.cells
+                if (cell.condition, cell.object) == (condition, code)
+            ],
+        )
+
+
+def _whole(text: str) -> str:
+    """Text that stays on one line."""
+    return text.replace(" ", "\u00a0")

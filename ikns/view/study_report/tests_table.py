@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any
 
 from ikns.experiments.statistics import Effect
 from ikns.view.parts import Cell, Table
 
-__all__ = ["Says", "effects_table", "tests_table"]
+__all__ = ["effects_table", "tests_table"]
 
 
-class Says(Protocol):
-    """A result of a test."""
+def tests_table(paper: Sequence[Any], beside: Sequence[tuple[str, Any]]) -> Table:
+    """Sentences of all tests, the paper's first and labelled so.
 
-    def sentence(self) -> str:
-        """Say it."""
-
-
-def tests_table(
-    paper: Sequence[tuple[str, Says | None]],
-    beside: Sequence[tuple[str, Says | None]],
-) -> Table:
-    """Sentences of all tests, the paper's first and labelled so."""
+    Parameters
+    ----------
+    paper : sequence of result or None
+        Of :mod:`ikns.experiments.statistics`, with a ``sentence()``.
+    beside : sequence of (name, result or None)
+    """
     rows: list[list[Cell]] = [
-        ["the paper's own", each.sentence()] for _, each in paper if each is not None
+        ["the paper's own", each.sentence()] for each in paper if each is not None
     ]
     rows += [[name, each.sentence()] for name, each in beside if each is not None]
     return Table(["test", "what it says"], rows, "Tests, each with its n.")

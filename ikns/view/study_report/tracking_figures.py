@@ -42,14 +42,12 @@ def trace_figure(found: TrackingSummary) -> Figure:
                 if median is None:
                     axes.set_title(f"{trajectory}, {condition}: no trial")
                     continue
-                record, who, rmse = median
+                record, _, rmse = median
                 inside = record.time >= 0
                 time = record.time[inside]
                 axes.plot(time, record.target[inside], color=GREY, lw=2.6, alpha=0.55)
                 axes.plot(time, record.y[inside], color=style[condition].color, lw=1.1)
-                axes.set_title(
-                    f"{trajectory}, {condition}: RMSE {rmse:.2f} (participant {who})"
-                )
+                axes.set_title(f"{trajectory}, {condition}: RMSE {rmse:.2f}")
                 axes.set_ylim(0, 100)
                 axes.set_xlim(0, record.profile.seconds)
         figure.supxlabel("time (s)", fontsize=8.5)

@@ -33,6 +33,8 @@ _NAMES = {
     "unseen": "samples without c",
 }
 
+_DECIMALS = {"mae": 2, "lag": 3, "overshoot": 2, "smoothness": 2, "unseen": 1}
+
 
 class Drawn(NamedTuple):
     """A figure with the name of its file, what it says, and what it shows."""
@@ -79,8 +81,8 @@ def tracking_figures(found: TrackingSummary) -> list[Drawn]:
             "tracking_learning",
             learning_figure(found),
             "RMSE over trials, mean and standard deviation over participants, with "
-            "the trajectories' own difficulty taken out; lines: the fitted models with "
-            "their share of the evidence (Akaike weights).",
+            "the trajectories' own difficulty taken out; training, left of the line, "
+            "is on other curves and as it was measured. Lines: the fitted models.",
             "RMSE against the number of the trial, one panel per condition",
         ),
     ]
@@ -120,7 +122,7 @@ def tracking_sections(found: TrackingSummary, drawn: list[Drawn]) -> Iterator[Se
             f"{len(found.unmeasured)} finished trials hold less than a second of "
             f"control signal and were not measured: {_some(found.unmeasured)}."
         )
-    shown = [k for k in ("tracking_traces", "tracking_error", "tracking_rmse")]
+    shown = ("tracking_traces", "tracking_error", "tracking_rmse")
     yield Section(
         "Tracking",
         text,
@@ -174,7 +176,7 @@ def _comparison(
         text,
         pictures,
         [
-            tests_table([("paper", each) for each in found.paper], beside),
+            tests_table(found.paper, beside),
             effects_table(found.effects),
         ],
     )
@@ -200,7 +202,7 @@ def _rmse_table(found: TrackingSummary) -> Table:
                 cell.over.high,
                 cell.over.subjects,
                 cell.trials,
-                "" if of is None else f"{of[0].text} +- {of[1].text}",
+                "" if of is None else f"{of[0].text}\u00a0±\u00a0{of[1].text}",
             ]
         )
     return Table(
@@ -229,7 +231,7 @@ def _metric_table(found: TrackingSummary) -> Table:
         row: list[Cell] = [cell.condition, cell.level or "all", cell.over.subjects]
         for name in names:
             over = found.metrics[name][k].over
-            row.append(_with_spread(over.mean, over.deviation))
+            row.append(_with_spread(over.mean, over.deviation, _DECIMALS[name]))
         rows.append(row)
     return Table(
         [
@@ -239,17 +241,17 @@ def _metric_table(found: TrackingSummary) -> Table:
             *(f"{_NAMES[name]} ({UNITS[name]})" for name in names),
         ],
         rows,
-        "Mean +- standard deviation over n participants. The lag is how far the "
+        "Mean ± standard deviation over n participants. The lag is how far the "
         "pointer is behind; smoothness is negative, nearer to 0 is smoother.",
     )
 
 
-def _with_spread(mean: float, deviation: float) -> str:
+def _with_spread(mean: float, deviation: float, decimals: int) -> str:
     if math.isnan(mean):
         return "–"
     if math.isnan(deviation):
-        return f"{mean:.3f}"
-    return f"{mean:.3f} +- {deviation:.3f}"
+        return f"{mean:.{decimals}f}"
+    return f"{mean:.{decimals}f}\u00a0±\u00a0{deviation:.{decimals}f}"
 
 
 def _learning(found: TrackingSummary) -> list[str]:
