@@ -6,9 +6,10 @@ signal comes from; `carry` ties them to the clock. There is no screen here.
 """
 
 from ikns.experiments.conduct.book import VisitBook
+from ikns.experiments.conduct.carry import carry_out
 from ikns.experiments.conduct.conductor import Conductor
 from ikns.experiments.conduct.desk import COMMANDS, Command, Desk
-from ikns.experiments.conduct.inputs import HeldInput, Input, Sample, VirtualInput
+from ikns.experiments.conduct.inputs import Driver, HeldInput, Sample, VirtualInput
 from ikns.experiments.conduct.tracking import TrackingDesk
 
 __all__ = [
@@ -16,10 +17,11 @@ __all__ = [
     "Command",
     "Conductor",
     "Desk",
+    "Driver",
     "HeldInput",
-    "Input",
     "Sample",
     "TrackingDesk",
     "VirtualInput",
     "VisitBook",
+    "carry_out",
 ]

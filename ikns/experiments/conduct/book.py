@@ -23,6 +23,7 @@ _FIXED = (
     "simulated",
     "seed",
     "design",
+    "align",
 )
 _LOG = "log.jsonl"
 
@@ -43,6 +44,7 @@ class VisitBook:
     ----------
     attempts : list of dict
         All rows, those of before included.
+    simulated : bool
     fault : str
         Why the last attempt could not be written; empty when all are on disk.
 
@@ -58,6 +60,7 @@ class VisitBook:
         self.folder = Path(folder)
         # Whoever lacks the library hears of it now, not after the first trial.
         table_bytes(about["experiment"], [])
+        self.simulated = bool(about["simulated"])
         self.attempts: list[dict[str, Any]] = []
         self.fault = ""
         self._waiting: list[Mapping[str, Any]] = []

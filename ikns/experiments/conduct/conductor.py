@@ -43,14 +43,15 @@ class Conductor:
     rest : float
         Of a break that the experimenter gives, s.
     auto : float, optional
-        Begin by itself after waiting so long, s. Default: never.
-    on_event : callable, optional
-        Called with the name and the text of what happened, and when.
+        Begin by itself after waiting so long, s, and end when all is done. Default:
+        never.
 
     Attributes
     ----------
     shown : dict
         What screens show, plain data; another one after each check.
+    results : list of dict
+        What is told of each attempt.
     plan, curve : dict
         Steps, and the curve of the trial that goes on, with a ``version`` each; they
         change rarely.
@@ -58,6 +59,8 @@ class Conductor:
         Set at once by an emergency stop, in whatever thread; it stays set.
     at_emergency : list of callable
         Called then, in that thread.
+    on_event : callable or None
+        Called with the name and the text of what happened, and when, s.
     over : bool
         Whether the experimenter has ended it.
 
@@ -87,17 +90,16 @@ class Conductor:
         borne: Collection[str] = (),
         rest: float = 120.0,
         auto: float | None = None,
-        on_event: Callable[[str, str, float], None] | None = None,
     ) -> None:
         self.desk, self.book = desk, book
         self.over = False
         self.emergency = Event()
         self.at_emergency: list[Callable[[], None]] = []
+        self.on_event: Callable[[str, str, float], None] | None = None
         self._borne, self._rest, self._auto = frozenset(borne), rest, auto
-        self._on_event = on_event
         self._asked: SimpleQueue[Command] = SimpleQueue()
         self._written = len(book.attempts)
-        self._results: list[dict[str, Any]] = [listed(row) for row in book.attempts]
+        self.results: list[dict[str, Any]] = [listed(row) for row in book.attempts]
         self._c = self._heard = math.nan
         self._paused, self._break_end = False, -math.inf
         self._page = False
@@ -321,6 +323,7 @@ class Conductor:
             self._break_end = -math.inf
         if self.state != "waiting":
             self._waiting_since = math.nan
+            self.over |= self._auto is not None and self.state == "finished"
         elif math.isnan(self._waiting_since):
             self._waiting_since = now
         elif self._auto is not None and now - self._waiting_since >= self._auto:
@@ -342,7 +345,7 @@ class Conductor:
                 self._written, attempt, practised=self._practised(attempt.key)
             )
             self.book.put(row)
-            self._results.append(listed(row) | self.desk.result(attempt))
+            self.results.append(listed(row) | self.desk.result(attempt))
             self._event(
                 "trial ends", f"{self._written} {attempt.key} {attempt.outcome}", now
             )
@@ -363,8 +366,8 @@ class Conductor:
     def _event(self, name: str, text: str, now: float) -> None:
         zero = 0.0 if math.isnan(self._zero) else self._zero
         self.book.note(name, text, time=now - zero)
-        if self._on_event:
-            self._on_event(name, text, now)
+        if self.on_event:
+            self.on_event(name, text, now)
 
     # --- what screens show ----------------------------------------------------------
 
@@ -382,7 +385,7 @@ class Conductor:
             "state": state,
             "prompt": prompt(self.desk, state),
             "step": None if step is None else step_facts(self.desk, step),
-            "place": len(visit.steps) - len(visit.remaining),
+            "at": next((i for i, s in enumerate(visit.steps) if s is step), None),
             "trials": len(trials),
             "left": left,
             "c": self._c,
@@ -393,7 +396,7 @@ class Conductor:
             "fault": self.book.fault or self._drive_fault,
             "can_connect": bool(self._drive_fault),
             "drive": dict(self._drive),
-            "attempts": self._results[-_LISTED:],
+            "attempts": self.results[-_LISTED:],
             "plan": self.plan["version"],
             "curve": self.curve["version"],
             "trial": view,

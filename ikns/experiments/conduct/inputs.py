@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from ikns.experiments.tracking.profiles import Profile
 from ikns.simulation.operator import Delay, Operator
 from ikns.stream.delays import Delays
 
-__all__ = ["HeldInput", "Input", "Sample", "VirtualInput"]
+__all__ = ["Driver", "HeldInput", "Sample", "VirtualInput"]
 
 #: A page that says nothing for longer than this has no control signal, s: at 60 per
 #: second twelve messages in a row are missing.
@@ -33,11 +33,30 @@ class Sample(NamedTuple):
     c: float
 
 
-class Input(Protocol):
-    """Something that gives a control signal."""
+class Driver(Protocol):
+    """Something that makes a control signal.
+
+    Attributes
+    ----------
+    fault : str
+        Why it does so no more; empty while it does.
+    """
+
+    @property
+    def fault(self) -> str:
+        """Why it does so no more."""
 
     def take(self, now: float) -> Sequence[Sample]:
         """Return what came since the last call, in order."""
+
+    def facts(self) -> dict[str, Any]:
+        """Return what the panel shows of it."""
+
+    def halt(self) -> None:
+        """Let nothing move any more, at once; called from any thread."""
+
+    def mark(self, name: str, text: str, now: float) -> None:
+        """Write down what happened, where it keeps a record of its own."""
 
 
 class HeldInput:
@@ -57,6 +76,8 @@ class HeldInput:
     >>> stick.take(10.1), stick.take(10.3)
     ([Sample(time=10.1, c=0.25)], [Sample(time=10.3, c=nan)])
     """
+
+    fault = ""
 
     def __init__(self, *, stale: float = STALE) -> None:
         self._stale = stale
@@ -94,16 +115,20 @@ class HeldInput:
         told, c = self._newest
         return [Sample(now, c if now - told <= self._stale else math.nan)]
 
-    @property
-    def told(self) -> int:
-        """How often it was told."""
-        return self._count
-
-    @property
-    def round_trip(self) -> float:
-        """99th percentile from screen to answer, s; NaN before the first."""
+    def facts(self) -> dict[str, Any]:
+        """Return how often it was told, and how late answers are, s."""
         with self._lock:
-            return self._delays.percentile(99)
+            late = self._delays.percentile(99)
+        return {"kind": "page", "told": self._count, "round_trip": late}
+
+    def halt(self) -> None:
+        """Nothing moves here."""
+
+    def mark(self, name: str, text: str, now: float) -> None:
+        """Count delays anew with each trial; nothing else is kept."""
+        if name == "trial begins":
+            with self._lock:
+                self._delays = Delays()
 
 
 class VirtualInput:
@@ -119,6 +144,8 @@ class VirtualInput:
         Profile of the trial that goes on and when it began or begins (s, of the clock
         that :meth:`take` is asked by), or None: the operator then rests in the middle.
     """
+
+    fault = ""
 
     def __init__(
         self,
@@ -147,3 +174,13 @@ class VirtualInput:
             samples.append(Sample(self._next, self._c))
             self._next += 1 / self._operator.rate
         return samples
+
+    def facts(self) -> dict[str, Any]:
+        """Say that nobody is there."""
+        return {"kind": "virtual"}
+
+    def halt(self) -> None:
+        """Nothing moves here."""
+
+    def mark(self, name: str, text: str, now: float) -> None:
+        """Nothing is kept here."""

@@ -1,0 +1,207 @@
+"""The live loop as what drives a condition: in a thread of its own, with its finger."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from typing import Any
+
+from ikns.control.controller import Decision, Settings
+from ikns.errors import IknsError
+from ikns.experiments.conduct.inputs import STALE, Sample
+from ikns.finger import Finger
+from ikns.runtime import Report, Status, run
+from ikns.session import RunWriter
+from ikns.stream import Source
+from ikns.subject import Subject
+
+__all__ = ["LiveDriver", "live_driver"]
+
+#: How often the loop says how it goes, s.
+_STATUS_EVERY = 1 / 30
+#: How long a rate is counted, s.
+_COUNTED = 1.0
+
+
+class LiveDriver:
+    """A live loop that runs.
+
+    Parameters
+    ----------
+    finger : Finger or None
+    writer : RunWriter or None
+        Session, to which events go, too.
+    smooth : bool
+        Whether the signal is the flexion that the finger is asked, smoothed; else the
+        map's c as it is.
+    on_status : callable, optional
+        Called from the loop.
+
+    Attributes
+    ----------
+    fault : str
+        Why it ended; empty while it runs.
+    report : Report or None
+        Once it has ended.
+    """
+
+    def __init__(
+        self,
+        finger: Finger | None,
+        writer: RunWriter | None,
+        *,
+        smooth: bool = False,
+        on_status: Callable[[Status], None] | None = None,
+    ) -> None:
+        self.fault = ""
+        self.report: Report | None = None
+        self._finger, self._writer, self._smooth = finger, writer, smooth
+        self._on_status = on_status
+        self._samples: deque[Sample] = deque(maxlen=10_000)
+        self._last = -math.inf
+        self._status: Status | None = None
+        self._finger_is = ""
+        self._start = math.nan
+        self._events: list[tuple[str, str, float]] = []
+        self._rate, self._counted_at, self._frames = math.nan, math.nan, 0
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def begin(self, source: Source, subject: Subject, settings: Settings) -> None:
+        """Let the loop run."""
+
+        def loop() -> None:
+            try:
+                self.report = run(
+                    source,
+                    subject,
+                    self._finger,
+                    settings=settings,
+                    session=self._writer,
+                    stop=self._stop,
+                    on_status=self._told,
+                    status_every=_STATUS_EVERY,
+                    on_decision=self._decided,
+                )
+            except (IknsError, OSError) as error:
+                self.fault = str(error)
+            else:
+                self.fault = f"{source.name} has ended."
+            finally:  # whatever it was, nobody must wait for frames
+                self.fault = self.fault or "the live loop failed."
+
+        self._thread = threading.Thread(target=loop, name="ikns loop", daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """Stop the loop, which relaxes the finger, and wait until it has."""
+        self.halt()
+        if self._thread is not None:
+            self._thread.join()
+
+    def halt(self) -> None:
+        """Stop the loop within its next beat, 20 ms."""
+        self._stop.set()
+
+    def take(self, now: float) -> list[Sample]:
+        """Return the frames since the last call, each at its receipt."""
+        samples = []
+        while self._samples:
+            samples.append(self._samples.popleft())
+        if samples:
+            self._last = samples[-1].time
+        elif now - self._last > STALE:
+            samples.append(Sample(now, math.nan))
+        return samples
+
+    def facts(self) -> dict[str, Any]:
+        """How the loop and its finger are doing."""
+        status = self._status
+        if status is None:
+            return {"kind": "ikns"}
+        return {
+            "kind": "ikns",
+            "state": status.state,
+            "finger": self._finger_is,
+            "flexion": status.flexion,
+            "measured": status.measured,
+            "rate": self._rate,
+            "latency": status.latency,
+            "misses": status.misses,
+            "residual": status.residual,
+            "inside": status.inside,
+        }
+
+    def mark(self, name: str, text: str, now: float) -> None:
+        """Put an event into the session."""
+        self._events.append((name, text, now))
+        # Where the session's time began is known once the loop has said so.
+        while self._writer is not None and self._events and self._start < math.inf:
+            told, words, at = self._events.pop(0)
+            onset = max(0.0, at - self._start)
+            self._writer.row("events", [onset, 0.0, told, words])
+
+    def _decided(self, received: float, flexion: float, decision: Decision) -> None:
+        c = flexion if self._smooth else float(decision.solved.c[0])
+        self._samples.append(Sample(received, c if decision.valid else math.nan))
+
+    def _told(self, status: Status) -> None:
+        now = time.monotonic()
+        if math.isnan(self._start):
+            self._start = now - status.time
+        if not now - self._counted_at < _COUNTED:
+            passed = now - self._counted_at
+            self._rate = (status.frames - self._frames) / passed
+            self._counted_at, self._frames = now, status.frames
+        if self._finger is not None:
+            state = self._finger.state()
+            self._finger_is = (
+                f"{state.mode}: {state.alert}" if state.alert else state.mode
+            )
+        self._status = status
+        if self._on_status:
+            self._on_status(status)
+
+
+@contextmanager
+def live_driver(
+    open_source: Callable[[], AbstractContextManager[Source]],
+    subject: Subject,
+    *,
+    finger: Callable[[], Finger] | None = None,
+    open_session: Callable[[Source], AbstractContextManager[RunWriter]] | None = None,
+    settings: Settings | None = None,
+    smooth: bool = False,
+    on_status: Callable[[Status], None] | None = None,
+) -> Iterator[LiveDriver]:
+    """Run the live loop for a while.
+
+    Parameters
+    ----------
+    open_source : callable
+        Opens the frames.
+    subject : Subject
+    finger : callable, optional
+        Makes the finger; without one nothing moves.
+    open_session : callable, optional
+        Opens the next run of a session for a source.
+    settings : Settings, optional
+        Of the controller.
+    smooth : bool
+        See :class:`LiveDriver`.
+    on_status : callable, optional
+        Called from the loop some 30 times a second, so it must not wait.
+    """
+    with ExitStack() as stack:
+        source = stack.enter_context(open_source())
+        writer = stack.enter_context(open_session(source)) if open_session else None
+        driver = LiveDriver(
+            finger() if finger else None, writer, smooth=smooth, on_status=on_status
+        )
+        stack.callback(driver.end)
+        driver.begin(source, subject, Settings() if settings is None else settings)
+        yield driver

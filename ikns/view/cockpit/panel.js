@@ -1,0 +1,196 @@
+import { connect, find, known, write } from "/link.js";
+import { Plot } from "/plot.js";
+
+let hello = { experiment: "tracking" }, shown = null, steps = "";
+const plot = new Plot(find("plot"));
+const send = connect("panel", {
+  hello(message) {
+    hello = message;
+    const what = message.experiment === "picking" ? "Pick and place" : "Tracking";
+    write("title", message.participant ? `${what}, participant ${message.participant}` : what);
+    document.title = message.simulated ? `${what} (simulated)` : what;
+    find("simulated").hidden = !message.simulated;
+    const picking = message.experiment === "picking";
+    for (const id of ["toggle", "success", "dropped", "comment"]) find(id).hidden = !picking;
+    find("plot").hidden = picking;
+    if (message.view && find("view").src !== message.view) find("view").src = message.view;
+    find("view").hidden = !message.view;
+  },
+  plan(message) { showSteps(message.steps); },
+  curve(message) { plot.begin(message); },
+  now(message) {
+    shown = message;
+    send({ n: message.n });
+  },
+});
+
+const MARKS = { done: "\u2713", success: "\u2713", dropped: "\u2715", timeout: "\u23f1", skipped: "\u2013" };
+const STATES = {
+  waiting: "Waiting", align: "Align", track: "Tracking", ready: "Ready", running: "Running", judge: "How did it go?",
+  rest: "Rest", paused: "Paused", finished: "Finished", stopped: "STOPPED",
+};
+
+function item(name, ...parts) {
+  const element = document.createElement("li");
+  element.className = name;
+  for (const part of parts) {
+    const span = document.createElement("span");
+    span.textContent = part;
+    element.append(span);
+  }
+  return element;
+}
+
+function showSteps(list) {
+  const items = [];
+  let head = "";
+  list.forEach((step, k) => {
+    const title = step.kind === "rest" ? "" : `${step.condition}, ${step.kind === "training" ? "training" : "trials"}`;
+    if (title && title !== head) items.push(item("head", title));
+    head = title || head;
+    const words = step.kind === "rest" ? "Rest" : step.name ? `${step.what} ${step.name}` : `${step.what} \u00b7 ${step.repeat}`;
+    const element = item("step", MARKS[step.outcome] ?? "", words, step.tries > 1 ? `${step.tries} tries` : "");
+    element.dataset.place = k;
+    element.classList.toggle("over", step.outcome !== "");
+    items.push(element);
+  });
+  find("steps").replaceChildren(...items);
+  steps = "";
+}
+
+function showPlace() {
+  const place = shown.at === null ? "" : String(shown.at);
+  if (steps === place) return;
+  steps = place;
+  for (const element of find("steps").children) {
+    const here = place !== "" && element.dataset.place === place;
+    element.classList.toggle("here", here);
+    if (here) element.scrollIntoView({ block: "nearest" });
+  }
+}
+
+const number = (value, digits, unit = "") => (known(value) ? `${value.toFixed(digits)}${unit}` : "\u2013");
+
+function facts() {
+  const drive = shown.drive, rows = [["c", number(shown.c, 3), known(shown.c) ? "" : "bad"]];
+  if (drive.kind === "page") {
+    rows.push(["Participant's page", shown.page ? "there" : "none", shown.page ? "good" : "bad"]);
+    rows.push(["Screen to answer, p99", number(known(drive.round_trip) ? 1000 * drive.round_trip : null, 0, " ms")]);
+  }
+  if (known(drive.state)) rows.push(["Safety", drive.state, drive.state === "active" ? "good" : drive.state === "safe" ? "bad" : ""]);
+  if (known(drive.finger)) rows.push(["Finger", drive.finger, drive.finger.startsWith("safe") ? "bad" : ""]);
+  if ("flexion" in drive) rows.push(["Flexion asked", number(drive.flexion, 2)], ["Flexion measured", number(drive.measured, 2)]);
+  if ("rate" in drive) rows.push(["Frames", number(drive.rate, 0, " /s")]);
+  if ("latency" in drive) rows.push(["Receipt to command, p99", number(known(drive.latency) ? 1000 * drive.latency : null, 2, " ms")]);
+  if ("misses" in drive) rows.push(["Late frames", String(drive.misses), drive.misses ? "" : "good"]);
+  if ("residual" in drive) rows.push(["Residual", number(known(drive.residual) ? 1000 * drive.residual : null, 1, " mm")]);
+  if ("inside" in drive) rows.push(["Hand", drive.inside ? "inside the points" : "outside the points", drive.inside ? "" : "bad"]);
+  return rows;
+}
+
+function showFacts() {
+  const rows = facts(), list = find("facts"), text = JSON.stringify(rows);
+  if (list.dataset.text === text) return;
+  list.dataset.text = text;
+  list.replaceChildren(...rows.flatMap(([name, value, kind]) => {
+    const term = document.createElement("dt"), told = document.createElement("dd");
+    term.textContent = name;
+    told.textContent = value;
+    told.className = kind ?? "";
+    return [term, told];
+  }));
+}
+
+function cells(kind, ...values) {
+  const row = document.createElement("tr");
+  values.forEach((value, k) => {
+    const cell = document.createElement(kind);
+    cell.textContent = value;
+    if (k >= 3) cell.className = "number";
+    row.append(cell);
+  });
+  return row;
+}
+
+function showAttempts() {
+  const table = find("attempts"), text = JSON.stringify(shown.attempts);
+  if (table.dataset.text === text) return;
+  table.dataset.text = text;
+  const picking = shown.experiment === "picking";
+  find("heads").replaceChildren(cells("th", "", "Step", "Outcome", picking ? "Time" : "RMSE", ...(picking ? [] : ["Lag"])));
+  table.replaceChildren(...[...shown.attempts].reverse().map((a) => {
+    const figures = picking ? [number(a.time, 2, " s")] : [number(a.rmse, 2), number(a.lag, 2, " s")];
+    const row = cells("td", a.number, a.key.replaceAll("/", " "), a.outcome, ...figures);
+    row.title = a.reason;
+    return row;
+  }));
+}
+
+function allow(id, yes) {
+  find(id).disabled = !yes;
+}
+
+function showControls() {
+  const { state } = shown, going = ["align", "track", "ready", "running", "judge"].includes(state);
+  const ready = state === "waiting", idle = !going && state !== "stopped";
+  allow("begin", ready);
+  allow("abort", going);
+  allow("skip", going || ready || state === "rest");
+  allow("repeat", idle && shown.attempts.length > 0);
+  allow("rest", ready);
+  allow("pause", idle && state !== "finished");
+  allow("toggle", state === "ready" || state === "running");
+  allow("success", state === "running" || state === "judge");
+  allow("dropped", state === "running" || state === "judge");
+  write("toggle", state === "ready" ? "Start the clock" : "Stop the clock");
+  write("pause", state === "paused" ? "Go on" : "Pause");
+  find("connect").hidden = !shown.can_connect;
+  write("end", state === "stopped" ? "Acknowledge and end the run" : "End the run");
+}
+
+function frame() {
+  if (shown !== null) {
+    const { state, step, trial } = shown;
+    write("state", STATES[state] ?? state);
+    const words = step === null || step.kind === "rest" ? "" : `${step.condition} \u00b7 ${step.kind} \u00b7 ${step.what}${step.name ? ` ${step.name}` : ` \u00b7 ${step.repeat}`}`;
+    write("what", words);
+    const left = state === "align" || state === "rest" ? shown.countdown : trial.left;
+    write("clock", known(left) ? `${left.toFixed(1)} s` : "");
+    write("place", `${shown.trials - shown.left} of ${shown.trials} done`);
+    const pages = shown.page ? "Participant's page is open" : shown.borne ? `Open ${location.origin}/ for the participant` : "";
+    write("page", pages);
+    write("message", shown.fault || shown.message);
+    find("message").classList.toggle("fault", Boolean(shown.fault) || state === "stopped");
+    const gauge = find("gauge");
+    gauge.classList.toggle("none", !known(shown.c));
+    gauge.firstElementChild.style.width = `${100 * Math.min(1, Math.max(0, shown.c ?? 0))}%`;
+    showPlace();
+    showFacts();
+    showAttempts();
+    showControls();
+    if (shown.experiment === "tracking") plot.draw({ state, trial, c: shown.c });
+  }
+  requestAnimationFrame(frame);
+}
+
+function ask(name) {
+  const text = find("text");
+  send({ ask: name, text: text.value });
+  if (["abort", "skip", "repeat", "success", "dropped", "comment"].includes(name)) text.value = "";
+}
+
+find("emergency").addEventListener("click", () => send({ ask: "emergency" }));
+for (const button of document.querySelectorAll("[data-ask]"))
+  button.addEventListener("click", () => {
+    ask(button.dataset.ask);
+    button.blur();
+  });
+window.addEventListener("keydown", (event) => {
+  if (event.code === "Escape") send({ ask: "emergency" });
+  if (event.target === find("text") || event.repeat) return;
+  if (event.code === "Space" && hello.experiment === "picking") {
+    event.preventDefault();
+    send({ ask: "toggle" });
+  }
+});
+requestAnimationFrame(frame);

@@ -1,0 +1,93 @@
+import { connect, find, known, write } from "/link.js";
+import { Hands } from "/hands.js";
+import { Plot } from "/plot.js";
+
+const HINTS = {
+  keyboard: "Up and down with the arrow keys, or W and S",
+  mouse: "The pointer follows the mouse",
+  gamepad: "Push the stick up",
+  ikns: "Lift and lower the elbow, the hand stays",
+  ring: "Press the button to close, again to open",
+  virtual: "A virtual operator is at work",
+};
+
+let hello = { role: "viewer", stick: "left", experiment: "tracking" }, shown = null;
+const plot = new Plot(find("plot"), { big: true });
+// Hands are looked at as often as a screen draws, also where it draws more slowly.
+const EVERY = 1000 / 60;
+const send = connect("participant", {
+  hello(message) {
+    hello = message;
+    hands.stick = message.stick;
+    find("simulated").hidden = !message.simulated;
+    find("viewer").hidden = message.role === "participant";
+    document.title = message.simulated ? "Participant (simulated)" : "Participant";
+  },
+  curve(message) { plot.begin(message); },
+  now(message) { shown = message; },
+});
+const mine = () => hello.role === "participant" && shown !== null;
+const hands = new Hands(plot, {
+  onBegin: () => mine() && send({ ask: hello.experiment === "picking" ? "toggle" : "begin" }),
+  onPress: () => {
+    if (!mine()) return;
+    if (shown.condition === "ring") send({ ask: "press" });
+    else if (hello.experiment === "tracking") send({ ask: "begin" });
+  },
+  onStop: () => send({ ask: "emergency" }),
+});
+
+const seconds = (value) => (value >= 60 ? `${Math.floor(value / 60)}:${String(Math.ceil(value) % 60).padStart(2, "0")}` : String(Math.ceil(value)));
+
+function hint() {
+  if (hello.role !== "participant") return "Another page is in control; this one only looks on";
+  const trigger = shown.condition === "gamepad" && hello.stick === "trigger";
+  const words = trigger ? "Press the right trigger" : HINTS[shown.condition] ?? "";
+  const key = { keyboard: "the space bar", mouse: "the space bar", gamepad: "the first button or the space bar" }[shown.condition];
+  return shown.state === "waiting" && shown.borne && key ? `${words}. Begin with ${key}.` : words;
+}
+
+function showTrial() {
+  const { state, trial, step } = shown, picking = shown.experiment === "picking";
+  find("plot").hidden = picking;
+  find("thing").hidden = !picking;
+  const counts = state === "align" || state === "rest";
+  write("count", counts && !picking && shown.countdown > 0 ? seconds(shown.countdown) : "");
+  if (!picking) return plot.draw({ state, trial, c: shown.c });
+  const rest = state === "rest", there = step !== null && step.kind !== "rest";
+  write("code", there ? `Object ${step.what}` : "");
+  write("name", there ? step.name : "");
+  const running = known(trial.left);
+  write("left", rest ? seconds(shown.countdown) : running ? seconds(trial.left) : "");
+  find("bar").hidden = !running;
+  if (running) find("bar").firstElementChild.style.width = `${(100 * trial.left) / trial.limit}%`;
+}
+
+function steer() {
+  if (shown === null) return;
+  const c = hands.c(shown.condition);
+  if (hello.role === "participant" && shown.borne) send({ by: shown.condition, c, n: shown.n });
+  else send({ n: shown.n });
+}
+
+function frame() {
+  if (shown !== null) {
+    document.body.classList.toggle("stopped", shown.state === "stopped");
+    write("prompt", shown.prompt);
+    const left = shown.trials - shown.left, training = shown.step?.kind === "training";
+    write("place", shown.left ? `${training ? "Training, " : ""}${left + 1} of ${shown.trials}` : "");
+    write("hint", hint());
+    write("input", shown.borne && !known(shown.c) && hello.role === "participant" ? noInput() : "");
+    showTrial();
+  }
+  requestAnimationFrame(frame);
+}
+
+function noInput() {
+  if (shown.condition === "gamepad") return "No gamepad yet: press one of its buttons";
+  if (shown.condition === "mouse") return "Move the mouse over this page";
+  return "";
+}
+
+setInterval(steer, EVERY);
+requestAnimationFrame(frame);
