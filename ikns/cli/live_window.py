@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -26,7 +27,8 @@ def live_window(
 
     Postures are drawn by a thread of their own, the newest only.
     """
-    from ikns.view.scene import LiveView, map_scene
+    from ikns.motion import chain_sides
+    from ikns.view.scene import LiveView, map_scene, with_finger
 
     scene = map_scene(
         subject.skeleton,
@@ -35,6 +37,7 @@ def live_window(
         simulated=is_simulated(subject, folder),
         title="Live",
     )
+    scene = with_finger(scene, subject.skeleton, chain_sides(subject.chain)[-1])
     newest: list[Status] = []
     came, closing = threading.Event(), threading.Event()
 
@@ -44,7 +47,13 @@ def live_window(
                 came.clear()
                 status = newest[-1]
                 del newest[:-1]
-                view.show(status.q, time=status.time, c=status.c)
+                moved = status.measured
+                view.show(
+                    status.q,
+                    time=status.time,
+                    c=status.c,
+                    flexion=status.flexion if math.isnan(moved) else moved,
+                )
 
     def take(status: Status) -> None:
         newest.append(status)

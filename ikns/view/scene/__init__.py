@@ -1,10 +1,12 @@
 """The 3-D view: a scene as plain data, and what shows it.
 
-:func:`map_scene` and :func:`recording_scene` make a :class:`Scene`;
+:func:`map_scene` and :func:`recording_scene` make a :class:`Scene`,
+:func:`with_finger` puts a finger on a forearm of it;
 :func:`scene_html` turns it into a page that stands alone, :func:`scene_picture` into a
 PNG, and :class:`LiveView` shows it in the browser while it moves.
 """
 
+from ikns.view.scene.finger import with_finger
 from ikns.view.scene.live import LiveView
 from ikns.view.scene.map_scene import map_scene
 from ikns.view.scene.page import scene_html
@@ -21,4 +23,5 @@ __all__ = [
     "recording_scene",
     "scene_html",
     "scene_picture",
+    "with_finger",
 ]

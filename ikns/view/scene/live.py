@@ -20,6 +20,7 @@ from ikns.errors import FileError, InvalidInput
 from ikns.skeleton import Skeleton
 from ikns.view.scene.body import drawn_links, pose_commands
 from ikns.view.scene.commands import ROOT
+from ikns.view.scene.finger import flexion_commands
 from ikns.view.scene.page import packed_json, scene_html
 from ikns.view.scene.scene import Scene
 
@@ -68,6 +69,11 @@ class LiveView:
 
     def __init__(self, scene: Scene, skeleton: Skeleton, *, port: int = 0) -> None:
         self._skeleton, self._links = skeleton, drawn_links(skeleton)
+        self._fingers = [
+            command["path"]
+            for command in scene.commands
+            if command.get("path", "").endswith("_forearm/finger")
+        ]
         self._page = scene_html(_still(scene), live=_FRAMES).encode()
         self._changed = threading.Condition()
         self._frame: bytes | None = None
@@ -97,7 +103,12 @@ class LiveView:
         webbrowser.open(self.url)
 
     def show(
-        self, q: ArrayLike, *, time: float | None = None, c: float | None = None
+        self,
+        q: ArrayLike,
+        *,
+        time: float | None = None,
+        c: float | None = None,
+        flexion: float | None = None,
     ) -> None:
         """Move the body; call it at any rate, from one thread.
 
@@ -109,6 +120,9 @@ class LiveView:
             s, as text on the page.
         c : float, optional
             Control signal, as text and as a bar; NaN says that it is unknown.
+        flexion : float, optional
+            Of the finger that :func:`ikns.view.scene.with_finger` drew; it stays as it
+            is where this is not finite.
 
         Raises
         ------
@@ -121,9 +135,13 @@ class LiveView:
         if self._closed:
             raise InvalidInput("the live view is closed.")
         moves = pose_commands(f"{ROOT}/body", self._skeleton, posture, self._links)
-        known = bool(np.isfinite(posture).all())
+        if not np.isfinite(posture).all():
+            moves = []
+        if flexion is not None and np.isfinite(flexion):
+            for path in self._fingers:
+                moves += flexion_commands(path, flexion)
         frame = {
-            "commands": [_lean(move) for move in moves] if known else [],
+            "commands": [_lean(move) for move in moves],
             "time": time,
             "c": c if c is not None and np.isfinite(c) else None,
         }

@@ -1,0 +1,133 @@
+"""The simulated finger of ``urdf/finger.urdf`` on the forearm, as commands.
+
+Its base is at the wrist, on the side of the palm, and as high above it as the closed
+finger reaches down; the straight finger runs along the hand. Nobody has measured how a
+finger is worn, so the place is an assumption.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.body import segment_lengths, urdf_folder
+from ikns.finger.chain import WIDEST, joint_angles
+from ikns.skeleton import Skeleton
+from ikns.view.scene.commands import (
+    ROOT,
+    Command,
+    object_command,
+    pose_matrix,
+    transform_command,
+)
+from ikns.view.scene.scene import Layer, Scene
+from ikns.view.scene.shapes import visual_shapes
+
+__all__ = ["finger_path", "flexion_commands", "with_finger"]
+
+Array = NDArray[np.float64]
+
+_COLOR, _TIP = "#40454C", "#D97340"
+#: Half the thickness of the hand of ``urdf/upper_body.urdf``, m.
+_HALF_HAND = 0.014
+
+
+def finger_path(side: str) -> str:
+    """Node of the finger's base on a forearm."""
+    return f"{ROOT}/body/{side}_forearm/finger"
+
+
+def with_finger(scene: Scene, skeleton: Skeleton, side: str) -> Scene:
+    """Add an open finger on a forearm to a scene with a body.
+
+    Parameters
+    ----------
+    scene : Scene
+    skeleton : Skeleton
+        Of the scene.
+    side : "right" or "left"
+
+    Returns
+    -------
+    Scene
+    """
+    base = finger_path(side)
+    paths = _paths(base)
+    last = max(paths.values(), key=len)
+    commands = [transform_command(base, _worn(skeleton, side))]
+    for i, shape in enumerate(visual_shapes(_urdf())):
+        node = f"{paths[shape.link]}/shape{i}"
+        color = _TIP if paths[shape.link] == last else _COLOR
+        commands += [
+            object_command(node, shape.geometry, color),
+            transform_command(node, shape.in_link),
+        ]
+    commands += flexion_commands(base, 0.0)
+    layer = Layer("finger (simulated shape)", (base,), _TIP)
+    return replace(
+        scene, commands=scene.commands + commands, layers=[*scene.layers, layer]
+    )
+
+
+def flexion_commands(base: str, flexion: float) -> list[Command]:
+    """Bend the finger at node `base`, 0 (straight) to 1."""
+    paths = _paths(base)
+    return [
+        transform_command(paths[name], pose_matrix(_turn(axis, angle), origin))
+        for (name, origin, axis), angle in zip(
+            _joints(), joint_angles(flexion), strict=True
+        )
+    ]
+
+
+def _worn(skeleton: Skeleton, side: str) -> Array:
+    """Pose of the finger's base in the forearm's frame (ISB: X to the palm, Y up)."""
+    length = segment_lengths(skeleton.urdf)[f"{side}_forearm"]
+    # Along the hand, away from the palm, and the third across.
+    along, away = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    rotation = np.column_stack([along, away, np.cross(along, away)])
+    return pose_matrix(rotation, np.array([_HALF_HAND + WIDEST, -length, 0.0]))
+
+
+def _urdf() -> str:
+    return (urdf_folder() / "finger.urdf").read_text("utf-8")
+
+
+@cache
+def _joints() -> tuple[tuple[str, Array, Array], ...]:
+    """Child link, origin (3,) m and axis (3,) of every joint that bends."""
+    return tuple(
+        (
+            _read(joint, "child", "link"),
+            np.array(_read(joint, "origin", "xyz").split(), dtype=np.float64),
+            np.array(_read(joint, "axis", "xyz").split(), dtype=np.float64),
+        )
+        for joint in ET.fromstring(_urdf()).iter("joint")
+        if joint.get("type") == "revolute"
+    )
+
+
+def _read(joint: ET.Element, tag: str, key: str) -> str:
+    found = joint.find(tag)
+    assert found is not None
+    return found.attrib[key]
+
+
+def _paths(base: str) -> dict[str, str]:
+    """Node of every link: each module hangs from the one that carries it."""
+    names = [name for name, _, _ in _joints()]
+    modules = {name: "/".join([base, *names[: k + 1]]) for k, name in enumerate(names)}
+    return {"finger_base": base} | modules
+
+
+def _turn(axis: Array, angle: float) -> Array:
+    """Rotation (3, 3) about a unit axis: Rodrigues' formula."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(
+        np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    )
