@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from ikns.errors import InvalidInput
 
@@ -100,12 +99,15 @@ class Grasp:
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
         self._step, self._force = mujoco.mj_step, mujoco.mj_contactForce
+        self._quaternion = mujoco.mju_axisAngle2Quat
+        self._product, self._rotate = mujoco.mju_mulQuat, mujoco.mju_rotVecQuat
         self._motor = self._spin = 0.0
+        self._dt = constant("timestep")
         self.guard = Guard(Safety() if safety is None else safety)
         self.guard.start(0.0, 0.0)
         self._home = self.data.mocap_pos[0].copy()
         self._middle = np.array([0.0, 0.0, self._home[2]])
-        self._facing = Rotation.from_quat(self.data.mocap_quat[0], scalar_first=True)
+        self._facing = self.data.mocap_quat[0].copy()
         self._hand = self.model.body("hand").id
         self._object = self.model.body("object").id
         thing = self.model.geom("object").id
@@ -144,15 +146,12 @@ class Grasp:
         self.guard.command(now, flexion)
         goal = self.guard.goal
         start = data.mocap_pos[0].copy()
-        way = Rotation.from_rotvec(np.asarray(turn, dtype=np.float64))
-        arm = self._home - self._middle
-        end = self._middle + np.asarray(shift, dtype=np.float64) + way.apply(arm)
-        turned = way * self._facing
+        end, facing = self._asked(np.asarray(shift), np.asarray(turn))
         if self.frames == 0:  # the hand begins there, it does not fly there
             start = end
             data.qpos[7:10] = end
-            data.qpos[10:14] = turned.as_quat(scalar_first=True)
-        data.mocap_quat[0] = turned.as_quat(scalar_first=True)
+            data.qpos[10:14] = facing
+        data.mocap_quat[0] = facing
         for k in range(self.steps):
             data.mocap_pos[0] = start + (end - start) * ((k + 1) / self.steps)
             data.ctrl[0] = self._turn_motor(goal)
@@ -183,6 +182,16 @@ class Grasp:
             table=table,
         )
 
+    def _asked(self, shift: Array, turn: Array) -> tuple[Array, Array]:
+        """Place and orientation of the hand turned about the object's middle."""
+        angle = float(np.linalg.norm(turn))
+        axis = turn / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
+        way, facing, arm = np.empty(4), np.empty(4), np.empty(3)
+        self._quaternion(way, axis, angle)
+        self._product(facing, way, self._facing)
+        self._rotate(arm, self._home - self._middle, way)
+        return self._middle + shift + arm, facing
+
     def _pressing(self) -> list[float]:
         total, wrench = [0.0, 0.0, 0.0], np.zeros(6)
         pairs = self.data.contact.geom.tolist()
@@ -194,7 +203,7 @@ class Grasp:
         return [float(force) for force in total]
 
     def _turn_motor(self, goal: float) -> float:
-        dt = constant("timestep")
+        dt = self._dt
         if math.isnan(goal):  # the gear brakes it
             self._spin = 0.0
         else:

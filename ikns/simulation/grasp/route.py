@@ -34,7 +34,7 @@ DOWN, LIFT = 0.12, 0.12
 BEYOND = 0.2
 #: Places at which the self-motion is followed: on the way down and on the arch; and
 #: swivels at which it is kept.
-_ON_COLUMN, _ON_ARCH, _SWIVELS = 4, 9, 25
+_ON_COLUMN, _ON_ARCH, _EVEN = 4, 9, np.linspace(0.0, 1.0, 25)
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,9 @@ class Route:
         wanted = self.swivel[0] + limb * (self.swivel[1] - self.swivel[0])
         share = min(max((wanted - low) / (high - low), 0.0), 1.0)
         rows = self.rows[piece]
-        second, across = _four(np.linspace(0.0, 1.0, rows.shape[1]), share)
+        second, across = _four(_EVEN, share)
         block = rows[here, second : second + 4]
-        return np.asarray(across @ np.tensordot(along, block, axes=1))
+        return np.asarray(np.outer(along, across).ravel() @ block.reshape(16, -1))
 
     def posture(self, s: float, limb: float) -> Array:
         """Joint angles of the body, (18,), the hand where it is meant to be."""
@@ -218,7 +218,7 @@ def _rows(
     if skin is not None:
         shift = skin.in_world(q, skin.with_posture(q))[:, columns]
     rows = np.hstack([motion.postures, inverse, shift.reshape(len(q), -1)])
-    even = np.linspace(motion.swivel[0], motion.swivel[-1], _SWIVELS)
+    even = motion.swivel[0] + np.ptp(motion.swivel) * _EVEN
     return np.asarray(CubicSpline(motion.swivel, rows)(even))
 
 

@@ -93,13 +93,13 @@ def world_model(
     default = spec.default.geom
     default.solref = [constant("contact_time"), 1.0]
     default.solimp = _SOLIMP
-    default.condim = 6
     world = spec.worldbody
     world.add_geom(
         name="table",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[0, 0, 0.1],
         friction=_friction(constant("friction_table")),
+        condim=6 if solid.shape == "sphere" else 3,  # only a ball rolls
     )
     thing = world.add_body(name="object", pos=[0, 0, solid.extent[2] / 2])
     thing.add_freejoint(name="object")
@@ -155,6 +155,7 @@ def _finger(spec: Any, hand: Any, *, friction: float, effort: float) -> None:
             pos=part.box_at,
             friction=_friction(friction),
             priority=1,
+            condim=4,
             contype=2,
             conaffinity=1,
         )
@@ -213,6 +214,7 @@ def _plates(hand: Any, friction: list[float]) -> None:
             size=half,
             friction=friction,
             priority=1,
+            condim=4,
             contype=2,
             conaffinity=1,
         )
