@@ -13,6 +13,7 @@ import tomli_w
 from distributed import LocalCluster
 
 from ikns.errors import FileError, InvalidInput, StreamError
+from ikns.experiments.picking.virtual import virtual_pick_step
 from ikns.experiments.study import read_study, run_study, workers
 from ikns.experiments.study.people import study_participant
 from ikns.experiments.tracking import draw_profile, measure, virtual_step
@@ -23,6 +24,7 @@ STUDY = {
     "study": {"name": "quick", "seed": 5},
     "cohort": {"participants": 3},
     "tracking": {"profiles": ["T1"], "repeats": 1, "training": 2, "seconds": 15},
+    "picking": {"objects": ["A"], "training": 1},
     "parameters": {"rate": 50, "point_seconds": 2},
 }
 #: No hand is as still as that.
@@ -76,7 +78,6 @@ def test_a_killed_run_goes_on_and_two_processes_make_the_bits_of_one(
     done: Path, tmp_path: Path
 ) -> None:
     study = make(tmp_path / "killed")
-    first = study / "visits" / "sub-01_tracking"
     with subprocess.Popen([sys.executable, "-c", RUN, str(study)]) as running:
         while not list_visits(study) and running.poll() is None:
             time.sleep(0.01)
@@ -84,7 +85,7 @@ def test_a_killed_run_goes_on_and_two_processes_make_the_bits_of_one(
             run_study(study)
         running.send_signal(signal.SIGKILL)
     found = list_visits(study)
-    assert 1 <= len(found) < 3
+    assert 1 <= len(found) < 6
     assert not any("part" in path.name for path in found)
     # What a kill may leave beside it: a visit that has no name yet, a torn declaration.
     torn = study / "visits" / ".sub-03_tracking.part"
@@ -95,14 +96,13 @@ def test_a_killed_run_goes_on_and_two_processes_make_the_bits_of_one(
     before = {path: path.stat().st_mtime_ns for path in found}
     told: list[tuple] = []
     run = run_study(study, n_jobs=2, on_progress=lambda *row: told.append(row))
-    assert (run.cells, run.found, run.failed) == (3, len(found), {})
-    assert run.simulated == 3 - len(found)
-    assert told == [("simulating", k, 3) for k in range(len(found), 4)]
+    assert (run.cells, run.found, run.failed) == (6, len(found), {})
+    assert run.simulated == 6 - len(found)
+    assert told == [("simulating", k, 6) for k in range(len(found), 7)]
     assert {path: path.stat().st_mtime_ns for path in found} == before
     assert foreign.read_text() == "mine"
     foreign.unlink()
     assert contents(study) == contents(done)
-    assert first.is_dir()
 
 
 def test_a_cohort_grows_without_doing_anything_twice(
@@ -110,9 +110,9 @@ def test_a_cohort_grows_without_doing_anything_twice(
 ) -> None:
     study = make(tmp_path / "part")
     one = run_study(study, n_jobs=1, participants=1)
-    assert (one.cells, one.simulated) == (1, 1)
+    assert (one.cells, one.simulated) == (2, 2)
     more = run_study(study, n_jobs=1, participants=2)
-    assert (more.cells, more.found, more.simulated) == (2, 1, 1)
+    assert (more.cells, more.found, more.simulated) == (4, 2, 2)
     for path in list_visits(study):
         name = path.relative_to(study).as_posix()
         for file in path.iterdir():
@@ -148,6 +148,19 @@ def test_a_cell_is_what_the_participant_does(done: Path) -> None:
     assert about["subject"]["stature_m"] == person.protocol.subject.adult.stature_m
 
 
+def test_a_picking_cell_is_what_the_participant_does(done: Path) -> None:
+    study = read_study(done)
+    assert study.picking is not None
+    visit = read_visit(done / "visits" / "sub-02_picking", experiment="picking")
+    person = study_participant(1, seed=5, parameters=study.parameters)
+    trials = [s for s in study.picking.steps(1, seed=5) if s.kind == "trial"]
+    assert [row["condition"] for row in visit.attempts] == ["ring", "ikns"]
+    for row, step in zip(visit.attempts, trials, strict=True):
+        again = virtual_pick_step(person, step, practised=1, rate=50.0)
+        assert repr({"number": row["number"]} | again) == repr(row)
+    assert "mujoco" in visit.about["versions"]
+
+
 def test_who_cannot_be_calibrated_is_told_and_stops_nobody(tmp_path: Path) -> None:
     study = make(
         tmp_path / "strict",
@@ -156,10 +169,10 @@ def test_who_cannot_be_calibrated_is_told_and_stops_nobody(tmp_path: Path) -> No
         variations={"usual": {"max_hand_speed": 0.05}},
     )
     run = run_study(study, n_jobs=1)
-    assert (run.cells, run.simulated) == (2, 2)
-    assert list(run.failed) == ["sub-01_tracking"]
-    strict, usual = (read_visit(path) for path in list_visits(study))
-    assert strict.attempts == []
+    assert (run.cells, run.simulated) == (4, 4)
+    assert list(run.failed) == ["sub-01_tracking", "sub-01_picking"]
+    other, strict, _, usual = (read_visit(path) for path in list_visits(study))
+    assert strict.attempts == other.attempts == []
     assert strict.about["reason"] == run.failed["sub-01_tracking"]
     assert "hand slower than 1e-06 m/s" in strict.about["reason"]
     assert len(usual.attempts) == 2

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
-from typing import Any
+from importlib.util import find_spec
+from typing import Any, TypeVar
 
-from ikns.errors import IknsError
+from ikns.errors import IknsError, InvalidInput
+from ikns.experiments.picking.schedule import PickStep
 from ikns.experiments.study.declaration import Study
-from ikns.experiments.study.design import Parameters, TrackingDesign
+from ikns.experiments.study.design import Parameters, PickingDesign, TrackingDesign
 from ikns.experiments.study.people import study_participant
 from ikns.experiments.tracking.profiles import draw_profile
+from ikns.experiments.tracking.schedule import Step
 from ikns.experiments.tracking.virtual import virtual_step
 from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import table_bytes, tracking_row
 from ikns.simulation.operator import Participant
 
 __all__ = ["Cell", "Task", "simulate", "visit_name"]
+
+S = TypeVar("S", Step, PickStep)
 
 #: What keeps one virtual person from taking part, without being a fault of the program.
 _FAULTS = (IknsError, ArithmeticError)
@@ -80,6 +86,24 @@ def visit_name(experiment: str, number: int, variation: str = "") -> str:
     return f"{variation}/{name}" if variation else name
 
 
+def check_libraries(study: Study) -> None:
+    """Refuse to begin without a library that a study's simulation needs.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    needed = {"pyarrow": "visits are written"}
+    if study.picking is not None:
+        needed["mujoco"] = "picking is simulated"
+    for name, what in needed.items():
+        if find_spec(name) is None:
+            raise InvalidInput(
+                f"{what} with {name}, found none; install it with pip install "
+                "'ikns[study]'."
+            )
+
+
 def simulate(task: Task) -> list[Cell]:
     """Simulate cells; the result depends on the task and on nothing else.
 
@@ -87,6 +111,7 @@ def simulate(task: Task) -> list[Cell]:
     without attempts, and ``visit.json`` says why.
     """
     study, parameters = task.study, task.study.parameters_of(task.variation)
+    check_libraries(study)  # a worker elsewhere may lack one: no fault of the person
     person, fault = None, ""
     try:
         person = study_participant(task.number, seed=study.seed, parameters=parameters)
@@ -111,8 +136,10 @@ def _attempts(
     experiment: str, person: Participant, study: Study, parameters: Parameters
 ) -> Iterator[dict[str, Any]]:
     design = study.designs[experiment]
-    assert isinstance(design, TrackingDesign)
-    yield from _tracking(person, design, study.seed, parameters)
+    if isinstance(design, TrackingDesign):
+        yield from _tracking(person, design, study.seed, parameters)
+    else:
+        yield from _picking(person, design, study.seed, parameters)
 
 
 def _tracking(
@@ -121,27 +148,51 @@ def _tracking(
     from ikns.control.controller import Settings
 
     settings = Settings() if parameters.smoothing else None
-    practised = dict.fromkeys(design.conditions, 0)
-    number = 0
-    for step in design.steps(person.number, seed=seed):
-        if step.kind == "rest":
-            continue
-        before = practised[step.condition]
-        practised[step.condition] += 1
-        if step.kind == "training":  # what it leaves behind is its count
-            continue
-        number += 1
+    trials = _trials(design.steps(person.number, seed=seed))
+    for number, (step, practised) in enumerate(trials, start=1):
         record = virtual_step(
             person,
             step,
             draw_profile(step.profile, step.seed, seconds=step.seconds),
-            practised=before,
+            practised=practised,
             rate=parameters.rate,
             latency=parameters.latency,
             settings=settings,
         )
         attempt = Attempt(step.key, "done", "", record)
-        yield tracking_row(number, step, attempt, align=design.align, practised=before)
+        yield tracking_row(
+            number, step, attempt, align=design.align, practised=practised
+        )
+
+
+def _picking(
+    person: Participant, design: PickingDesign, seed: int, parameters: Parameters
+) -> Iterator[dict[str, Any]]:
+    from ikns.experiments.picking.virtual import virtual_pick_step
+
+    trials = _trials(design.steps(person.number, seed=seed))
+    for number, (step, practised) in enumerate(trials, start=1):
+        yield {"number": number} | virtual_pick_step(
+            person,
+            step,
+            practised=practised,
+            rate=parameters.rate,
+            latency=parameters.latency,
+        )
+
+
+def _trials(steps: Iterable[S]) -> Iterator[tuple[S, int]]:
+    """Go through the trials, each with how many were done in its condition before.
+
+    Training is counted and not simulated: what it leaves behind is its count.
+    """
+    done: Counter[str] = Counter()
+    for step in steps:
+        if step.kind == "rest":
+            continue
+        if step.kind == "trial":
+            yield step, done[step.condition]
+        done[step.condition] += 1
 
 
 def _about(
@@ -167,7 +218,7 @@ def _about(
         "training": "counted in practised, not simulated",
         "session": None,
         "subject": {},
-        "versions": _versions(),
+        "versions": _versions(experiment),
         "redrawn": 0,
         "reason": reason,
     }
@@ -185,6 +236,7 @@ def _about(
     return about
 
 
-def _versions() -> dict[str, str]:
-    names = ("ikns", "numpy", "scipy", "numba", "pin")
+def _versions(experiment: str) -> dict[str, str]:
+    names = ["ikns", "numpy", "scipy", "numba", "pin"]
+    names += ["mujoco"] if experiment == "picking" else []
     return {"python": platform.python_version()} | {n: version(n) for n in names}

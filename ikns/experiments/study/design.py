@@ -162,7 +162,8 @@ class Parameters:
     latency : float
         From a posture to its c, s.
     smoothing : bool
-        Whether c is smoothed as the live loop does it.
+        Whether the operator who tracks sees c smoothed as the live loop does it. The
+        finger that picks is always driven by the live controller.
     """
 
     rate: float = 100.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ikns.errors import InvalidInput
-from ikns.experiments.study.cells import simulate
+from ikns.experiments.study.cells import check_libraries, simulate
 from ikns.experiments.study.declaration import FILE, read_study
 from ikns.experiments.study.results import alone, keep_declared, tasks
 from ikns.experiments.study.workers import compute
@@ -75,7 +75,7 @@ def run_study(
         When the study file is missing or a visit is damaged.
     InvalidInput
         When the study is of people, was changed since the first result, or is being
-        run already.
+        run already, or a library is missing.
     StreamError
         When the scheduler does not answer or a worker dies.
     """
@@ -86,11 +86,7 @@ def run_study(
             f"{top / FILE}: expected a simulated study to run, found one of people; "
             "record them with ikns track and ikns pick."
         )
-    if study.picking is not None:
-        raise InvalidInput(
-            f"{top / FILE}: expected [tracking] only, found [picking], which is not "
-            "simulated; leave the table out."
-        )
+    check_libraries(study)
     most = study.participants
     if participants is not None and not 1 <= participants <= most:
         raise InvalidInput(f"expected 1 to {most} participants, found {participants}.")
