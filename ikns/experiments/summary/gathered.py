@@ -40,6 +40,10 @@ class Gathered:
     abouts : list of dict
         What visits say of design, versions and input, once each; the first ten.
     unmeasured : list of str
+    sessions : dict of (variation, participant) to str
+        Of visits that recorded one, relative to the visit.
+    faults : list of str
+        Why virtual persons could not take part.
     """
 
     def __init__(self, experiment: str, *, simulated: bool) -> None:
@@ -51,6 +55,8 @@ class Gathered:
         self.attempts: Counter[tuple[str, str, str]] = Counter()
         self.abouts: list[dict[str, Any]] = []
         self.unmeasured: list[str] = []
+        self.sessions: dict[tuple[str, str], str] = {}
+        self.faults: list[str] = []
         self.redrawn = 0
         self.planned: dict[str, dict[str, Any]] = {}
         self._errors: dict[tuple[str, str, float], RunningError] = {}
@@ -69,6 +75,10 @@ class Gathered:
             values.extend(digest.table[name])
         self.attempts += digest.attempts
         self.unmeasured += [f"{who}: {name}" for name in digest.unmeasured]
+        if isinstance(digest.about.get("session"), str):
+            self.sessions[key] = digest.about["session"]
+        if digest.about.get("reason"):
+            self.faults.append(f"{who}: {digest.about['reason']}")
         self.redrawn += int(digest.about.get("redrawn") or 0)
         self.planned.setdefault(
             digest.variation, dict(digest.about.get("variation_settings") or {})

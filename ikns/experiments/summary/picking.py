@@ -124,6 +124,8 @@ class PickingSummary:
     margin: float | None
     said: list[dict[str, Any]]
     redrawn: int
+    faults: list[str]
+    sessions: dict[tuple[str, str], str] = field(repr=False)
     folders: dict[tuple[str, str], Path] = field(repr=False)
 
     def trials(self, kind: str = "trial") -> dict[str, NDArray[Any]]:
@@ -184,6 +186,8 @@ def summarize_picking(gathered: Gathered, plan: Mapping[str, Any]) -> PickingSum
         margin=None if margin is None else float(margin),
         said=gathered.abouts,
         redrawn=gathered.redrawn,
+        faults=gathered.faults,
+        sessions=gathered.sessions,
         folders=gathered.folders,
     )
 

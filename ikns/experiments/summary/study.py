@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ikns.errors import FileError
+from ikns.experiments.study import check_declared, read_study
+from ikns.experiments.study.declaration import FILE
 from ikns.experiments.summary.digest import Digest, LeftOut, digest_visit
 from ikns.experiments.summary.gathered import Gathered
 from ikns.experiments.summary.picking import PickingSummary, summarize_picking
@@ -46,7 +47,8 @@ class StudySummary:
     folder : Path
     name : str
     plan : dict
-        The study file; empty where there is none.
+        As :meth:`ikns.experiments.study.Study.declared` tells it; empty where there is
+        no study file.
     groups : tuple of Group
         People first.
     left_out : tuple of LeftOut
@@ -85,11 +87,13 @@ def summarize(
     ------
     FileError
         When there is no visit, or none that can be read.
+    InvalidInput
+        When the study file is faulty, or was changed after the first result.
     """
     top = Path(folder)
     single = (top / "visit.json").is_file()
     paths = [top] if single else list_visits(top)
-    plan = {} if single else _plan(top / "study.toml")
+    plan = {} if single else _plan(top)
     if not paths:
         raise FileError(
             f"{top}: expected a study with visits, or a visit, found none; "
@@ -117,7 +121,7 @@ def summarize(
     progress("testing", 0, 1)
     summary = StudySummary(
         top,
-        str(plan.get("study", {}).get("name") or top.resolve().name),
+        str(plan.get("name") or top.resolve().name),
         plan,
         tuple(
             Group(simulated, *_summaries(groups, simulated, plan))
@@ -138,10 +142,10 @@ def _summaries(
     return (
         None
         if tracking is None
-        else summarize_tracking(tracking, plan.get("tracking", {})),
+        else summarize_tracking(tracking, plan.get("tracking") or {}),
         None
         if picking is None
-        else summarize_picking(picking, plan.get("picking", {})),
+        else summarize_picking(picking, plan.get("picking") or {}),
     )
 
 
@@ -157,16 +161,10 @@ def _digests(paths: list[Path], workers: int | None) -> Iterable[Digest | LeftOu
     return done
 
 
-def _plan(path: Path) -> dict[str, Any]:
-    try:
-        plan = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+def _plan(folder: Path) -> dict[str, Any]:
+    """Read what was declared, the same as when the first result was there."""
+    if not (folder / FILE).exists():
         return {}
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FileError(f"{path}: cannot be read as TOML ({error}).") from None
-    for table in ("study", "tracking", "picking"):
-        if not isinstance(plan.get(table, {}), dict):
-            raise FileError(f"{path}: expected a table [{table}].")
-    return plan
+    study = read_study(folder)
+    check_declared(folder, study)
+    return study.declared()

@@ -87,8 +87,12 @@ class TrackingSummary:
         Trials without a second of control signal.
     redrawn : int
         Simulated persons replaced because they could not do the protocol.
+    faults : list of str
+        Why simulated persons could not take part.
+    sessions : dict
+        Recorded with the visits, relative to them, by (variation, participant).
     folders : dict
-        Of the visits, by (variation, participant).
+        Of the visits, likewise.
     """
 
     simulated: bool
@@ -107,6 +111,8 @@ class TrackingSummary:
     said: list[dict[str, Any]]
     unmeasured: list[str]
     redrawn: int
+    faults: list[str]
+    sessions: dict[tuple[str, str], str] = field(repr=False)
     folders: dict[tuple[str, str], Path] = field(repr=False)
 
     def trials(self, kind: str = "trial") -> dict[str, NDArray[Any]]:
@@ -188,6 +194,8 @@ def summarize_tracking(gathered: Gathered, plan: Mapping[str, Any]) -> TrackingS
         said=gathered.abouts,
         unmeasured=gathered.unmeasured,
         redrawn=gathered.redrawn,
+        faults=gathered.faults,
+        sessions=gathered.sessions,
         folders=gathered.folders,
     )
 

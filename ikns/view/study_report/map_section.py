@@ -1,14 +1,16 @@
-"""Clusters and interpolation volume, where a subject folder is at hand."""
+"""Clusters and interpolation volume, where a visit's subject is at hand."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ikns.errors import IknsError
 from ikns.experiments.summary import Group
+from ikns.session import read_run
 from ikns.subject import Subject
 from ikns.view.body import arm_points
 from ikns.view.parts import Section
@@ -18,18 +20,18 @@ from ikns.view.workspace import workspace_figure
 
 __all__ = ["map_drawn", "map_section"]
 
+Array = NDArray[np.float64]
+
+_NOWHERE = np.full((1, 3), np.nan)
+#: Places of the hand that are drawn at most.
+_MOST = 4000
+
 
 def map_drawn(group: Group) -> Drawn | None:
-    """Volume of the first participant with a subject folder that can be read."""
-    for visit in _visits(group):
-        for place in (visit / "subject", visit.parent / f"{visit.name}_subject"):
-            if not (place / "map.json").is_file():
-                continue
-            try:
-                subject = Subject.load(place)
-            except IknsError:
-                continue
-            return _drawn(subject, visit.name.split("_")[0], group.simulated)
+    """Volume of the first visit whose subject can be read; None without any."""
+    for visit, session in _visits(group):
+        for subject, hand in _subjects(visit, session):
+            return _drawn(subject, hand, visit.name.split("_")[0], group.simulated)
     return None
 
 
@@ -41,27 +43,46 @@ def map_section(drawn: Drawn | None) -> Section:
     return Section(title, [], [drawn.picture])
 
 
-def _visits(group: Group) -> Iterable[Path]:
+def _visits(group: Group) -> Iterator[tuple[Path, str]]:
     for each in (group.tracking, group.picking):
         if each is not None:
-            yield from each.folders.values()
+            for key, folder in each.folders.items():
+                yield folder, each.sessions.get(key, "")
 
 
-def _drawn(subject: Subject, who: str, simulated: bool) -> Drawn:
+def _subjects(visit: Path, session: str) -> Iterator[tuple[Subject, Array]]:
+    """Subjects that can be read, and where the hand was: of the session, or beside."""
+    if session:
+        try:
+            run = read_run(visit / session)
+            path = np.column_stack([run.model[f"hand_{axis}"] for axis in "xyz"])
+            yield Subject.load(run.subject_folder), path[:: len(path) // _MOST + 1]
+        except (IknsError, KeyError, OSError):
+            pass
+    for place in (visit / "subject", visit.parent / "subject"):
+        if (place / "map.json").is_file():
+            try:
+                yield Subject.load(place), _NOWHERE
+            except IknsError:
+                continue
+
+
+def _drawn(subject: Subject, hand: Array, who: str, simulated: bool) -> Drawn:
     learned = subject.null_space_map
-    nowhere = np.empty((0, 3))
+    path = "Path of the hand while tracking, " if len(hand) > 1 else ""
     return Drawn(
         "workspace",
         workspace_figure(
-            np.full((1, 3), np.nan),  # no path of the hand is kept with a subject
-            nowhere,
+            hand,
+            np.empty((0, 3)),
             np.empty(0, dtype=np.int64),
             learned.centers_,
             facets=getattr(learned.interpolator_, "hull_facets", None),
             arms=arm_points(subject.skeleton, subject.skeleton.neutral()),
             simulated=simulated,
         ),
-        f"PCA points of {who} and the volume in which their directions are "
-        "interpolated, in the thorax frame.",
+        f"{path}PCA points of {who} and the volume in which their directions are "
+        "interpolated, in the thorax frame. The samples of the calibration are not "
+        "kept with a subject.",
         "Two 3-D views of the PCA points in front of the body",
     )

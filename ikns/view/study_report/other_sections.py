@@ -38,22 +38,40 @@ _OUTCOMES = {
 
 def done_section(group: Group) -> Section:
     """How many attempts were made, and how they ended."""
+    text = [
+        "Every attempt that was made, training included. An aborted attempt comes "
+        "again; a skipped one was left out for good; `again` marks that what was done "
+        "before does not count."
+    ]
     tables = []
     for name, each in (
         ("tracking", group.tracking),
         ("pick and place", group.picking),
     ):
-        if each is not None:
-            tables.append(_attempts(name, each))
-    return Section(
-        "What was done",
-        [
-            "Every attempt that was made, training included. An aborted attempt comes "
-            "again; a skipped one was left out for good; `again` marks that what was "
-            "done before does not count."
-        ],
-        tables=tables,
-    )
+        if each is None:
+            continue
+        tables.append(_attempts(name, each))
+        if each.faults:
+            more = f" and {len(each.faults) - 3} more" if len(each.faults) > 3 else ""
+            text.append(
+                f"In {name}, {len(each.faults)} simulated visits have no attempts "
+                f"because their person could not take part: "
+                f"{'; '.join(each.faults[:3])}{more}."
+            )
+        empty = _without(each)
+        if empty:
+            text.append(
+                f"In {name}, {len(empty)} of {len(each.participants)} participants "
+                f"have no finished trial: {', '.join(empty[:10])}"
+                f"{' and others' if len(empty) > 10 else ''}."
+            )
+    return Section("What was done", text, tables=tables)
+
+
+def _without(found: TrackingSummary | PickingSummary) -> list[str]:
+    """Participants without a trial in the study as planned."""
+    there = set(found.trials()["subject"].tolist())
+    return [who for who in found.participants if who not in there]
 
 
 def _attempts(name: str, found: TrackingSummary | PickingSummary) -> Table:

@@ -105,9 +105,20 @@ def _lead(summary: StudySummary, parts: Sequence[Part]) -> str:
         if len(parts) > 1
         else ""
     )
+    planned = summary.plan.get("participants")
+    came = sum(
+        _count(part.group)
+        for part in parts
+        if part.group.simulated == summary.plan.get("simulated")
+    )
+    so_far = (
+        f" The study file declares {planned}, so this is a part of them."
+        if planned and came < planned
+        else ""
+    )
     return (
         f"Results of {' and '.join(who)}, computed again from the recorded attempts "
-        f"of {summary.visits} visits.{apart}"
+        f"of {summary.visits} visits.{so_far}{apart}"
     )
 
 

@@ -21,6 +21,6 @@ CANNOT = (
 )
 
 NO_MAP = (
-    "Clusters and interpolation volume are left out: no subject folder (as `ikns "
-    "calibrate` writes it) named `subject` is inside or beside a visit."
+    "Left out: no visit has a recorded session, or a folder `subject` (as `ikns "
+    "calibrate` writes it) inside of it or beside it, to take a map from."
 )
