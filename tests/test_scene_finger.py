@@ -66,7 +66,8 @@ def test_it_is_worn_at_the_wrist_and_its_tip_is_the_opening_above_the_palm(
     assert in_forearm[1, 3] == -wrist
     assert np.linalg.det(in_forearm[:3, :3]) == pytest.approx(1)
     drawn = [path for path, *_ in drawn_nodes(scene)]
-    assert sum(path.startswith(finger_path(side)) for path in drawn) == 7
+    # Base, six modules, and the post that carries them.
+    assert sum(path.startswith(finger_path(side)) for path in drawn) == 8
 
 
 def test_the_live_view_bends_it() -> None:

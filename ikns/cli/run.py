@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -95,6 +96,7 @@ def run(
             configuration = {
                 "ikns": ikns.__version__,
                 "python": sys.version.split()[0],
+                **{name: version(name) for name in ("numpy", "numba", "pin")},
                 "source": source,
                 "source_labels": list(stream.labels),
                 "finger": None if dry_run else finger,

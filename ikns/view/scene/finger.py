@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 _COLOR, _TIP = "#40454C", "#D97340"
 #: Half the thickness of the hand of ``urdf/upper_body.urdf``, m.
 _HALF_HAND = 0.014
+#: Thickness of the post that is drawn between wrist and base, m.
+_POST = 0.02
 
 
 def finger_path(side: str) -> str:
@@ -66,7 +68,14 @@ def with_finger(scene: Scene, skeleton: Skeleton, side: str) -> Scene:
             object_command(node, shape.geometry, color),
             transform_command(node, shape.in_link),
         ]
-    commands += flexion_commands(base, 0.0)
+    # What holds it is not part of the URDF: a post, so that it does not float.
+    post = {"type": "BoxGeometry", "width": _POST, "height": WIDEST, "depth": _POST}
+    foot = pose_matrix(np.eye(3), np.array([-_POST, -WIDEST / 2, 0.0]))
+    commands += [
+        object_command(f"{base}/post", post, _COLOR, opacity=0.5),
+        transform_command(f"{base}/post", foot),
+        *flexion_commands(base, 0.0),
+    ]
     layer = Layer("finger (simulated shape)", (base,), _TIP)
     return replace(
         scene, commands=scene.commands + commands, layers=[*scene.layers, layer]
