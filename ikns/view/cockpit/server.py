@@ -65,8 +65,6 @@ class Cockpit:
         port: int = 0,
         about: Mapping[str, Any] | None = None,
     ) -> None:
-        from tornado.netutil import bind_sockets
-
         self.conductor, self._held, self._on_press = conductor, dict(held), on_press
         self.about = {
             "experiment": conductor.desk.experiment,
@@ -78,13 +76,15 @@ class Cockpit:
         self._links: list[Link] = []
         host = _LOOPBACK if host == "localhost" else host
         try:
-            self._sockets = bind_sockets(port, host)
+            found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+            self._socket = socket.create_server(found[4][:2], family=found[0])
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise FileError(
                 f"port {port} of {host} cannot be opened: {reason.lower()}."
             ) from None
-        self.gate = Gate.at(host, self._sockets[0].getsockname()[1])
+        self._socket.setblocking(False)
+        self.gate = Gate.at(host, self._socket.getsockname()[1])
         self._loop = asyncio.new_event_loop()
         self._closing = asyncio.Event()
         self._thread = threading.Thread(
@@ -192,7 +192,7 @@ class Cockpit:
         server = HTTPServer(
             application, max_body_size=_MESSAGE, idle_connection_timeout=60
         )
-        server.add_sockets(self._sockets)
+        server.add_sockets([self._socket])
         due = time.monotonic()
         while not self._closing.is_set():
             for link in list(self._links):

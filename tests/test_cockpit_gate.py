@@ -1,0 +1,269 @@
+"""Who may come into the cockpit: no foreign page, and from afar with the token."""
+
+import asyncio
+import http.client
+import json
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.websocket import WebSocketClientConnection, websocket_connect
+
+from ikns.errors import FileError, InvalidInput
+from ikns.experiments.conduct import Conductor, HeldInput, TrackingDesk, VisitBook
+from ikns.experiments.tracking import schedule
+from ikns.view.cockpit import Cockpit, Gate
+from ikns.view.cockpit.handlers import FILES
+
+ABOUT = {"experiment": "tracking", "participant": "01", "simulated": False}
+PAGES = sorted(FILES)
+
+
+def conductor(folder: Path) -> Conductor:
+    steps = schedule(0, conditions=["keyboard"], training=0)
+    made = Conductor(
+        TrackingDesk(steps), VisitBook(folder / "visit", ABOUT), borne=["keyboard"]
+    )
+    made.check(0.0)
+    return made
+
+
+@contextmanager
+def serving(folder: Path, **more: object) -> Iterator[Cockpit]:
+    with Cockpit(conductor(folder), {"keyboard": HeldInput()}, **more) as cockpit:
+        yield cockpit
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cockpit]:
+    with serving(tmp_path_factory.mktemp("here")) as cockpit:
+        yield cockpit
+
+
+@pytest.fixture(scope="module")
+def afar(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cockpit]:
+    """Listens on every address, as asked."""
+    with serving(tmp_path_factory.mktemp("afar"), host="0.0.0.0") as cockpit:
+        yield cockpit
+
+
+def ask(
+    cockpit: Cockpit, path: str, *, method: str = "GET", **headers: str
+) -> tuple[int, dict[str, str], bytes]:
+    line = http.client.HTTPConnection("127.0.0.1", cockpit.gate.port, timeout=10)
+    try:
+        line.request(method, path, headers=headers)
+        answer = line.getresponse()
+        return answer.status, dict(answer.getheaders()), answer.read()
+    finally:
+        line.close()
+
+
+def knock(
+    cockpit: Cockpit, *, role: str = "panel", says: tuple[str, ...] = (), **headers: str
+) -> dict[str, object] | int:
+    """Open a web socket; return the first message, or the status of the refusal."""
+
+    async def come() -> dict[str, object] | int:
+        url = f"ws://127.0.0.1:{cockpit.gate.port}/link?role={role}"
+        try:
+            link: WebSocketClientConnection = await websocket_connect(
+                HTTPRequest(url, headers=headers)
+            )
+        except HTTPClientError as refusal:
+            return refusal.code
+        message = json.loads(await link.read_message() or "{}")
+        for words in says:
+            await link.write_message(words)
+            # A few frames were on their way; no more than 12 come unanswered.
+            frames = 0
+            while frames < 10 and (answer := await link.read_message()) is not None:
+                frames += json.loads(answer)["kind"] == "now"
+        if link.close_code is not None:
+            message = {"closed": link.close_code}
+        link.close()
+        return message
+
+    return asyncio.run(asyncio.wait_for(come(), 10))
+
+
+def own(cockpit: Cockpit) -> str:
+    return f"http://127.0.0.1:{cockpit.gate.port}"
+
+
+def test_by_default_only_this_machine_is_listened_to(here: Cockpit) -> None:
+    assert {urlsplit(a).hostname for a in (here.url, here.panel_url)} == {"127.0.0.1"}
+    assert here._socket.getsockname()[0] == "127.0.0.1"
+    assert here.gate.token == ""
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_pages_are_served_and_may_load_nothing_else(here: Cockpit, path: str) -> None:
+    status, headers, body = ask(here, path)
+    assert status == 200
+    assert body
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "unsafe" not in policy
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert headers["Cache-Control"] == "no-store"
+
+
+@pytest.mark.parametrize("path", [*PAGES, "/link"])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:{port}", "127.0.0.1", ""]
+)
+def test_a_name_that_was_led_here_is_refused(
+    here: Cockpit, path: str, host: str
+) -> None:
+    # Of a page that has its own name lead to this machine (DNS rebinding).
+    named = host.format(port=here.gate.port)
+    status, _, body = ask(here, path, Host=named, Origin=f"http://{named}")
+    assert status == 403
+    assert b"<html" not in body
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "http://evil.example",
+        "https://127.0.0.1:{port}",
+        "http://127.0.0.1:1",
+        "http://localhost:{port}",
+        "null",
+        "",
+    ],
+)
+def test_a_socket_of_a_foreign_page_is_refused(here: Cockpit, origin: str) -> None:
+    assert knock(here, Origin=origin.format(port=here.gate.port)) == 403
+
+
+def test_a_socket_that_does_not_say_whose_it_is_is_refused(here: Cockpit) -> None:
+    assert knock(here) == 403
+
+
+def test_our_own_page_comes_in(here: Cockpit) -> None:
+    message = knock(here, Origin=own(here))
+    assert isinstance(message, dict)
+    assert message["kind"] == "hello"
+    assert message["role"] == "panel"
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"])
+def test_nothing_can_be_posted(here: Cockpit, method: str) -> None:
+    for origin in (own(here), "http://evil.example"):
+        status, headers, _ = ask(here, "/", method=method, Origin=origin)
+        assert status == 405
+        assert "Access-Control-Allow-Origin" not in headers
+
+
+@pytest.mark.parametrize("path", ["/../pyproject.toml", "/gate.py", "/link/../x", "//"])
+def test_no_other_file_is_served(here: Cockpit, path: str) -> None:
+    assert ask(here, path)[0] == 404
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["no json", "[]", '{"n": "x"}', '{"c": "high"}', "1", "[" * 4000],
+)
+def test_whoever_talks_nonsense_is_shown_out(here: Cockpit, words: str) -> None:
+    told = knock(here, role="participant", says=(words,), Origin=own(here))
+    assert told == {"closed": 1003}
+
+
+def test_a_message_that_is_too_long_ends_the_talk(here: Cockpit) -> None:
+    told = knock(here, says=(json.dumps({"text": "x" * 5000}),), Origin=own(here))
+    assert told == {"closed": 1009}
+
+
+def test_a_participant_cannot_do_what_is_the_experimenters(tmp_path: Path) -> None:
+    with serving(tmp_path) as cockpit:
+        for name in ("pause", "skip", "end", "left"):
+            says = json.dumps({"ask": name})
+            knock(cockpit, role="participant", says=(says,), Origin=own(cockpit))
+            shown = cockpit.conductor.check(1.0)
+            assert shown["state"] == "waiting"
+            assert shown["at"] == 0
+            assert not cockpit.conductor.over
+        says = json.dumps({"ask": "pause"})
+        knock(cockpit, role="panel", says=(says,), Origin=own(cockpit))
+        assert cockpit.conductor.check(1.0)["state"] == "paused"
+
+
+# --- with another address -----------------------------------------------------------
+
+
+def test_from_afar_the_token_is_needed(afar: Cockpit) -> None:
+    token = afar.gate.token
+    assert len(token) >= 32  # 24 bytes
+    assert f"token={token}" in afar.url
+    wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
+    cookie = f"{afar.gate.cookie}={wrong}"
+    for path in [*PAGES, f"/?token={wrong}", "/?token=", "/link"]:
+        assert ask(afar, path)[0] == 403, path
+        assert ask(afar, path, Cookie=cookie)[0] == 403, path
+        assert token.encode() not in ask(afar, path)[2]
+    assert knock(afar, Origin=own(afar)) == 403
+    assert knock(afar, Origin=own(afar), Cookie=cookie) == 403
+
+
+def test_the_token_is_exchanged_for_a_cookie_and_leaves_the_address(
+    afar: Cockpit,
+) -> None:
+    status, headers, _ = ask(afar, f"/panel?token={afar.gate.token}")
+    assert status == 302
+    assert headers["Location"] == "/panel"
+    cookie = headers["Set-Cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=Lax" in cookie
+    mine = cookie.partition(";")[0]
+    assert ask(afar, "/panel", Cookie=mine)[0] == 200
+    message = knock(afar, Origin=own(afar), Cookie=mine)
+    assert isinstance(message, dict)
+    assert message["kind"] == "hello"
+    # The token opens the door to our own pages only.
+    assert knock(afar, Origin="http://evil.example", Cookie=mine) == 403
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "lab.example", ""])
+def test_no_other_address_without_a_token(host: str) -> None:
+    with pytest.raises(InvalidInput, match="token"):
+        Gate(host, 80)
+    assert len(Gate.at(host, 80).token) >= 32
+    assert Gate.at(host, 80).token != Gate.at(host, 80).token
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1"])
+def test_loopback_needs_none(host: str) -> None:
+    assert Gate.at(host, 8000).token == ""
+
+
+@given(st.text(), st.text())
+def test_only_the_token_itself_is_the_token(token: str, told: str) -> None:
+    gate = Gate("10.0.0.1", 80, "t" + token)
+    assert gate.knows_token(told) == (told == "t" + token)
+    assert not gate.knows_token(None)
+
+
+@given(st.text())
+def test_an_origin_is_ours_only_letter_by_letter(origin: str) -> None:
+    gate = Gate("127.0.0.1", 8000)
+    ours = origin == "http://127.0.0.1:8000"
+    assert gate.same_origin(origin, "127.0.0.1:8000") == ours
+
+
+def test_a_port_that_is_taken_is_one_sentence(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(FileError, match=f"port {port} of 127.0.0.1") as told:
+            Cockpit(conductor(tmp_path), {}, port=port)
+    assert str(told.value).endswith(".")
