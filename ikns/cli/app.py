@@ -20,6 +20,9 @@ from ikns.cli.run import run
 from ikns.cli.scale import scale
 from ikns.cli.servo import servo
 from ikns.cli.stream import stream
+from ikns.cli.study import study_app
+from ikns.cli.study_report import report
+from ikns.cli.track import track
 from ikns.cli.ucm import ucm
 from ikns.cli.view import view
 
@@ -45,8 +48,11 @@ for command in (
     replay,
     stream,
     servo,
+    track,
+    report,
 ):
     app.command()(command)
+app.add_typer(study_app, name="study")
 
 
 def _version(wanted: bool) -> None:
