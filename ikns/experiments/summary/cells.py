@@ -110,9 +110,9 @@ def cells(
 def ordered(found: Sequence[str], first: Sequence[str]) -> list[str]:
     """Each word once: those known beforehand in their order, then the others.
 
-    >>> ordered(["gamepad", "ikns", "mouse", "ikns"], ["ikns", "ring"])
+    >>> ordered(["gamepad", "ikns", "mouse", "ikns"], ["ikns", "ring", "ikns"])
     ['ikns', 'gamepad', 'mouse']
     """
     once = list(dict.fromkeys(found))
-    known = [word for word in first if word in once]
+    known = [word for word in dict.fromkeys(first) if word in once]
     return known + [word for word in once if word not in known]
