@@ -22,7 +22,7 @@ from ikns.experiments.study import (
 )
 from ikns.experiments.study.design import LAYOUTS
 from ikns.experiments.study.people import recalibrated, study_participant
-from ikns.experiments.visits import create_visit
+from ikns.experiments.visits import create_visit, list_visits
 from ikns.simulation.operator import Participant
 
 SMALL: dict[str, Any] = {
@@ -270,6 +270,22 @@ def test_interpolation_changes_the_weights_and_not_the_points(
 # --- what may change once there are results ------------------------------------------
 
 
+def declare(folder: Path, **tables: dict | None) -> None:
+    """Declare, and have a result, whichever it is."""
+    keep_declared(folder, study_from_table(changed(**tables)))
+    about = {"experiment": "tracking", "participant": "01", "simulated": True}
+    if not list_visits(folder):
+        create_visit(folder / "visits" / "sub-01_tracking", about)
+
+
+def test_without_a_result_everything_may_change(tmp_path: Path) -> None:
+    keep_declared(tmp_path, study_from_table(SMALL))
+    keep_declared(tmp_path, study_from_table(changed(study={"seed": 1})))
+    declare(tmp_path, study={"seed": 2})
+    with pytest.raises(InvalidInput, match="seed = 2, found 1"):
+        check_declared(tmp_path, study_from_table(changed(study={"seed": 1})))
+
+
 @pytest.mark.parametrize(
     "tables",
     [
@@ -281,8 +297,8 @@ def test_interpolation_changes_the_weights_and_not_the_points(
     ],
 )
 def test_more_of_the_same_may_be_added(tables: dict, tmp_path: Path) -> None:
-    keep_declared(tmp_path, study_from_table(SMALL))
-    keep_declared(tmp_path, study_from_table(changed(**tables)))
+    declare(tmp_path)
+    declare(tmp_path, **tables)
     check_declared(tmp_path, study_from_table(changed(**tables)))
 
 
@@ -307,9 +323,12 @@ def test_what_results_mean_may_not_change(
     tables: dict, sentence: str, tmp_path: Path
 ) -> None:
     # The second experiment and the variation are added later, and hold from then on.
-    keep_declared(tmp_path, study_from_table(SMALL))
-    whole = {"picking": {}, "variations": {"gate": {"max_hand_speed": 0.1}}}
-    keep_declared(tmp_path, study_from_table(changed(**whole)))
+    declare(tmp_path)
+    whole: dict[str, Any] = {
+        "picking": {},
+        "variations": {"gate": {"max_hand_speed": 0.1}},
+    }
+    declare(tmp_path, **whole)
     with pytest.raises(InvalidInput, match=sentence):
         check_declared(tmp_path, study_from_table(changed(**(whole | tables))))
     with pytest.raises(InvalidInput, match=sentence):
@@ -318,11 +337,10 @@ def test_what_results_mean_may_not_change(
 
 
 def test_a_damaged_copy_of_the_declaration_is_named(tmp_path: Path) -> None:
-    study = study_from_table(SMALL)
-    keep_declared(tmp_path, study)
+    declare(tmp_path)
     (tmp_path / "visits" / "declared.json").write_text("{}")
     with pytest.raises(FileError, match=r"declared\.json: cannot be read"):
-        check_declared(tmp_path, study)
+        check_declared(tmp_path, study_from_table(SMALL))
 
 
 def test_a_declaration_is_plain(tmp_path: Path) -> None:

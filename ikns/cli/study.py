@@ -13,11 +13,14 @@ import typer
 
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, progress, show
+from ikns.cli.study_plan import plan
 
 __all__ = ["study_app"]
 
 study_app = typer.Typer(
-    help="Declare a study, simulate it, plan its size.", no_args_is_help=True
+    help="Declare a study, simulate it, plan its size.",
+    no_args_is_help=True,
+    add_completion=False,
 )
 
 #: Between two lines of progress where there is no terminal, s.
@@ -97,6 +100,9 @@ def run(
         f"All participants are simulated. Now: ikns report {folder}",
         as_json=as_json,
     )
+
+
+study_app.command()(plan)
 
 
 @contextmanager

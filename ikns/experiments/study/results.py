@@ -12,7 +12,7 @@ from typing import Any
 from ikns.errors import FileError, InvalidInput
 from ikns.experiments.study.cells import Task, visit_name
 from ikns.experiments.study.declaration import FILE, Study
-from ikns.experiments.visits import EXPERIMENTS
+from ikns.experiments.visits import EXPERIMENTS, list_visits
 
 __all__ = ["alone", "check_declared", "keep_declared", "tasks"]
 
@@ -47,7 +47,7 @@ def check_declared(folder: Path, study: Study) -> None:
 
 
 def keep_declared(folder: Path, study: Study) -> None:
-    """Write down, with the first result, what was declared; later what was added."""
+    """Write down what was declared, before the first result; later what was added."""
     check_declared(folder, study)
     before, now = _before(folder), study.declared()
     kept = now if before is None else {**now, "participants": before["participants"]}
@@ -120,6 +120,8 @@ def _done(visit: Path) -> bool:
 
 
 def _before(folder: Path) -> dict[str, Any] | None:
+    if not list_visits(folder):  # a run that came to nothing declares nothing
+        return None
     place = folder / "visits" / _DECLARED
     try:
         table = json.loads(place.read_text(encoding="utf-8"))

@@ -10,7 +10,7 @@ from pathlib import Path
 from ikns.errors import InvalidInput
 from ikns.experiments.study.cells import check_libraries, simulate
 from ikns.experiments.study.declaration import FILE, read_study
-from ikns.experiments.study.results import alone, keep_declared, tasks
+from ikns.experiments.study.results import alone, check_declared, keep_declared, tasks
 from ikns.experiments.study.workers import compute
 from ikns.experiments.visits import write_visit
 from ikns.warm_up import compiled_before, warm_up
@@ -98,7 +98,7 @@ def run_study(
     if scheduler is None and not compiled_before():
         warm_up(on_progress)  # once, and not in every worker
     with alone(top):
-        keep_declared(top, study)
+        check_declared(top, study)
         left = sum(
             len(task.experiments) for task in tasks(top, study, participants=people)
         )
@@ -110,6 +110,8 @@ def run_study(
             n_jobs=n_jobs,
             scheduler=scheduler,
         ):
+            if not done:
+                keep_declared(top, study)
             for cell in finished:
                 write_visit(top / "visits" / cell.name, cell.about, cell.attempts)
                 done += 1
