@@ -27,6 +27,9 @@ Sees = Literal["finger", "signal"]
 #: How near the goal the object must lie, m: inside a circle of a decimeter (assumption;
 #: the paper shows a red circle).
 NEAR = 0.05
+#: An object that meets the table while the hand is higher than this over where it puts
+#: things down was not put down, m (assumption).
+_PUT_DOWN = 0.03
 #: What lies still: slower than this for so long, m/s and s.
 _STILL, _STILL_FOR = 0.02, 0.2
 #: An object that has risen by so much, and touches nothing below, was lifted, m.
@@ -182,7 +185,7 @@ def pick(
         height = seen.place[2] - grasp.solid.extent[2] / 2  # of its middle, risen
         trace[k] = c, told, seen.flexion, seen.finger, height, person.place
         in_hand[k] = seen.in_hand
-        ended = judge.step(person.doing, seen)
+        ended = judge.step(person.doing, seen, float(shift[2]))
         if ended:
             outcome, why = ended
             break
@@ -212,7 +215,7 @@ class _Judge:
         self._lifted, self._still = False, 0
         self._held: Array | None = None
 
-    def step(self, doing: str, seen: Seen) -> tuple[Outcome, str] | None:
+    def step(self, doing: str, seen: Seen, high: float) -> tuple[Outcome, str] | None:
         """Return outcome and reason once there is one."""
         if doing not in ("carrying", "placing", "releasing"):
             return None
@@ -227,6 +230,8 @@ class _Judge:
                 return "dropped", "slipped out as the hand rose"
         elif down and off > NEAR:
             return "dropped", f"came down {100 * off:.0f} cm from the goal"
+        elif down and high > _PUT_DOWN:
+            return "dropped", f"fell with the hand {100 * high:.0f} cm up"
         alone = down and seen.speed < _STILL and seen.finger == 0.0
         self._still = self._still + 1 if alone else 0
         if doing == "releasing" and self._lifted and self._still >= self._long:

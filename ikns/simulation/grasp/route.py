@@ -20,18 +20,23 @@ from ikns.simulation.arm import Arm, SelfMotion, self_motion
 from ikns.simulation.artifacts import SoftTissue
 from ikns.simulation.operator.cohort import Participant, tracking_place
 
-__all__ = ["BEYOND", "DOWN", "LIFT", "Route", "hand_route"]
+__all__ = ["BEYOND", "DOWN", "LEVELS", "LIFT", "Route", "hand_route"]
 
 Array = NDArray[np.float64]
+Piece = tuple[Array, Array, Array]
 
 #: Where object and goal are among the points of the calibration, as shares of their
-#: box, forward, up and outwards (assumptions: the paper shows two places on a table).
-START, GOAL = (0.5, 0.15, 0.8), (0.5, 0.15, 0.2)
+#: box, forward and outwards (assumptions: the paper shows two places on a table), and
+#: how high: the lowest of these where the elbow has room all the way.
+START, GOAL = (0.5, 0.8), (0.5, 0.2)
+LEVELS = (0.15, 0.3, 0.45, 0.6)
 #: How high the hand comes from and how high it carries, m (assumptions).
 DOWN, LIFT = 0.12, 0.12
 #: The elbow goes farther than it does while tracking, by this share of that range at
 #: either end, where joints let it (assumption): nobody stops with the finger half open.
 BEYOND = 0.2
+#: A place is no good where it can go less far than this share of that range.
+_LEAST = 0.8
 #: Places at which the self-motion is followed: on the way down and on the arch; and
 #: swivels at which it is kept.
 _ON_COLUMN, _ON_ARCH, _EVEN = 4, 9, np.linspace(0.0, 1.0, 25)
@@ -56,13 +61,11 @@ class Route:
         Its joint center, m.
     swivel : (float, float)
         Elbow swivels that are limb 0 and 1, rad.
-    knots : tuple of array
-        Places where the self-motion is known, on the way down and on the arch.
-    ranges : tuple of (K, 2) arrays
-        Swivels that can be reached there, rad.
-    rows : tuple of (K, U, C) arrays
-        At even steps between those: posture (9), pseudo-inverse of the Jacobian (42),
-        what skin adds to the markers (3 each).
+    pieces : tuple of (knots, ranges, rows)
+        On the way down and on the arch: (K,) places where the self-motion is known;
+        (K, 2) swivels that can be reached there, rad; and (K, U, C) at even steps
+        between those: posture (9), pseudo-inverse of the Jacobian (42), what skin adds
+        to the markers (3 each).
     """
 
     arm: Arm
@@ -72,9 +75,7 @@ class Route:
     rotation: Array
     shoulder: Array
     swivel: tuple[float, float]
-    knots: tuple[Array, Array]
-    ranges: tuple[Array, Array]
-    rows: tuple[Array, Array]
+    pieces: tuple[Piece, Piece]
 
     def hand(self, s: float) -> Array:
         """Where the hand is meant to be, thorax frame, (3,) m."""
@@ -86,14 +87,12 @@ class Route:
 
     def row(self, s: float, limb: float) -> Array:
         """Posture, pseudo-inverse and skin with the limb (0 to 1) at a place."""
-        piece = 0 if s < 0 else 1
-        knots = self.knots[piece]
+        knots, ranges, rows = self.pieces[0 if s < 0 else 1]
         first, along = _four(knots, s)
         here = slice(first, first + 4)
-        low, high = along @ self.ranges[piece][here]
+        low, high = along @ ranges[here]
         wanted = self.swivel[0] + limb * (self.swivel[1] - self.swivel[0])
         share = min(max((wanted - low) / (high - low), 0.0), 1.0)
-        rows = self.rows[piece]
         second, across = _four(_EVEN, share)
         block = rows[here, second : second + 4]
         return np.asarray(np.outer(along, across).ravel() @ block.reshape(16, -1))
@@ -103,9 +102,7 @@ class Route:
         return self.arm.put(self.angles, self.row(s, limb)[:9])
 
 
-def hand_route(
-    participant: Participant, *, height: float = 0.0, columns: list[int] | None = None
-) -> Route:
+def hand_route(participant: Participant, *, height: float = 0.0) -> Route:
     """Find the way of a participant's hand.
 
     Parameters
@@ -113,28 +110,35 @@ def hand_route(
     participant : Participant
     height : float
         Of object and goal over the usual, m.
-    columns : list of int, optional
-        Markers whose skin counts, of those of the true body. Default: those of the
-        calibrated one.
 
     Raises
     ------
     InvalidInput
-        When the hand cannot get there, or the elbow has no room.
+        When the hand cannot get there, or the elbow has no room, at any level.
     """
+    reason: InvalidInput | None = None
+    for level in LEVELS:
+        try:
+            return _at_level(participant, level, height)
+        except InvalidInput as error:
+            reason = error
+    raise InvalidInput(f"no way for the hand over a table: {reason}")
+
+
+def _at_level(participant: Participant, level: float, height: float) -> Route:
     run = participant.protocol
     arm = Arm(run.subject.skeleton, run.side)
     labels = arm.skeleton.marker_set.labels
-    if columns is None:
-        columns = participant.subject.skeleton.marker_set.columns(labels).tolist()
-    box = np.array([run.places.min(axis=0), run.places.max(axis=0)])
+    columns = participant.subject.skeleton.marker_set.columns(labels)
+    low_corner, high_corner = run.places.min(axis=0), run.places.max(axis=0)
     if arm.outward < 0:
-        box[:, 2] = box[::-1, 2]
-    up = np.array([0.0, height, 0.0])
+        low_corner[2], high_corner[2] = high_corner[2], low_corner[2]
     start, goal = (
-        box[0] + np.array(at) * np.ptp(box, axis=0) * [1, 1, arm.outward] + up
-        for at in (START, GOAL)
+        low_corner + np.array([x, level, z]) * (high_corner - low_corner)
+        for x, z in (START, GOAL)
     )
+    start[1] += height
+    goal[1] += height
     # The hand is held as this person would hold it halfway.
     angles, rest = tracking_place(run, (start + goal) / 2)
     assert rest.motion is not None
@@ -147,31 +151,34 @@ def hand_route(
         yaw = _yaw(shoulder, rest.position, _way(start, goal, max(s, 0.0)))
         return np.asarray(Rotation.from_rotvec([0, yaw, 0]).as_matrix() @ rest.rotation)
 
-    knots, ranges, rows = [], [], []
-    for places in (np.linspace(-1, 0, _ON_COLUMN), np.linspace(0, 1, _ON_ARCH)):
-        found = []
-        for s in places:
-            position = _way(start, goal, float(s))
-            body = arm.to_pose(body, position, turned(float(s)))
-            swivel = arm.swivel(body)
-            motion = self_motion(
-                arm,
-                body,
-                lowest=min(low - more, swivel - more),
-                highest=max(high + more, swivel + more),
+    def motion(s: float, near: Array) -> SelfMotion:
+        position = _way(start, goal, s)
+        here = arm.to_pose(near, position, turned(s))
+        swivel = arm.swivel(here)
+        found = self_motion(
+            arm,
+            here,
+            lowest=min(low - more, swivel - more),
+            highest=max(high + more, swivel + more),
+        )
+        if np.ptp(found.swivel) < _LEAST * (high - low) or len(found.swivel) < 4:
+            raise InvalidInput(
+                f"the elbow has no room to swivel with the {arm.side} hand at "
+                f"{np.round(position, 3)} m in the thorax frame."
             )
-            if len(motion.swivel) < 4:
-                raise InvalidInput(
-                    f"the elbow has no room to swivel with the {arm.side} hand at "
-                    f"{np.round(position, 3)} m in the thorax frame."
-                )
-            found.append(motion)
+        return found
+
+    pieces = []
+    for knots in (np.linspace(-1, 0, _ON_COLUMN), np.linspace(0, 1, _ON_ARCH)):
+        found: list[SelfMotion] = []
+        for s in knots:
+            found.append(motion(float(s), body))
             # The next place is sought from the middle of what this one allows.
-            middle = np.clip((low + high) / 2, *motion.swivel[[0, -1]])
-            body = arm.put(angles, motion.at(middle))
-        knots.append(places)
-        ranges.append(np.array([m.swivel[[0, -1]] for m in found]))
-        rows.append(np.array([_rows(arm, angles, m, run.skin, columns) for m in found]))
+            first, last = found[-1].swivel[[0, -1]]
+            body = arm.put(angles, found[-1].at(np.clip((low + high) / 2, first, last)))
+        ranges = np.array([m.swivel[[0, -1]] for m in found])
+        rows = [_rows(arm, angles, m, run.skin, columns) for m in found]
+        pieces.append((knots, ranges, np.array(rows)))
     return Route(
         arm,
         angles,
@@ -180,9 +187,7 @@ def hand_route(
         turned(0.0),
         shoulder,
         (low, high),
-        (knots[0], knots[1]),
-        (ranges[0], ranges[1]),
-        (rows[0], rows[1]),
+        (pieces[0], pieces[1]),
     )
 
 
@@ -206,7 +211,7 @@ def _rows(
     angles: Array,
     motion: SelfMotion,
     skin: SoftTissue | None,
-    columns: list[int],
+    columns: NDArray[np.intp],
 ) -> Array:
     bodies = np.array([arm.put(angles, posture) for posture in motion.postures])
     inverse = [
