@@ -104,6 +104,16 @@ def test_a_finger_that_opens_on_the_way_drops():
     assert 0.4 < done.trace[-1, 5] < 1.0
 
 
+@pytest.mark.parametrize(("fall", "outcome"), [(0.05, "success"), (0.3, "dropped")])
+def test_crosstalk_drops_what_it_takes_below_the_contact(fall, outcome):
+    def strays(want, place, seen):
+        return want - fall * max(place, 0.0) if want else 0.0
+
+    # The can stops the finger at 0.89: planted crosstalk of 0.05 leaves it pressed, of
+    # 0.3 opens it on the way.
+    assert go(strays, solid("D")).outcome == outcome
+
+
 def test_a_finger_that_never_looks_open_waits():
     done = go(lambda want, place, seen: 1.0, solid("D"), limit=4.0)
     assert (done.outcome, done.why) == ("timeout", "still opening")

@@ -81,7 +81,8 @@ def virtual_pick_step(
         hand while carried; `c_drift`, by how much the way to the goal alone changes c,
         the elbow held (signed, the largest; 0 for a ring); `hold_share`, share of the
         carrying in which the finger touched the object; `contact_c`, flexion at which
-        it stopped the finger. NaN where there was none.
+        it stopped the finger; `c_margin`, the least that the finger was told beyond that
+        on the way. NaN where there was none.
     """
     picked, drift = virtual_pick(
         participant, step, practised=practised, rate=rate, latency=latency, **more
@@ -89,7 +90,8 @@ def virtual_pick_step(
     carried = picked.carried
     force = picked.trace[:, 3]
     held = picked.in_hand[carried]
-    began = int(np.argmax(carried)) if carried.any() else -1
+    told = picked.trace[carried, 1]
+    contact = float(picked.trace[np.argmax(carried), 2]) if len(held) else math.nan
     return {
         "key": step.key,
         "kind": step.kind,
@@ -107,7 +109,8 @@ def virtual_pick_step(
         "slip_m": _farthest(held),
         "c_drift": drift,
         "hold_share": float(np.mean(force[carried] > 0)) if len(held) else math.nan,
-        "contact_c": float(picked.trace[began, 2]) if began >= 0 else math.nan,
+        "contact_c": contact,
+        "c_margin": float(np.min(told) - contact) if len(held) else math.nan,
     }
 
 
@@ -122,6 +125,7 @@ def virtual_pick(
     unsteadiness: Unsteadiness | None = None,
     sees: Literal["finger", "signal"] = "finger",
     squeeze: float | None = None,
+    planted: float = 0.0,
     objects: dict[str, PickObject] | None = None,
     **model: Any,
 ) -> tuple[Picked, float]:
@@ -146,6 +150,8 @@ def virtual_pick(
         What the person goes by, see :class:`ikns.simulation.grasp.Elbow`.
     squeeze : float, optional
         Instead of what this person does, see :class:`ikns.simulation.grasp.Habits`.
+    planted : float
+        Crosstalk to add to the map's own: by how much c falls on the way to the goal.
     objects : dict of str to PickObject, optional
         Default: :func:`ikns.experiments.picking.load_objects`.
     **model
@@ -201,7 +207,7 @@ def virtual_pick(
             latency=latency,
             settings=settings,
         )
-        drive = Elbow(operator, arm, sees=sees)
+        drive = Elbow(operator, arm, sees=sees, planted=planted)
     else:
         drive = Ring(reaction=habits.reaction, latency=latency, rate=rate)
     side = participant.protocol.side

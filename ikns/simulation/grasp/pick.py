@@ -50,15 +50,22 @@ class Elbow:
         What the operator goes by. The finger: once it is felt to press, nothing tells
         how much further c is, so the elbow stays where it is, as well as it can. Or the
         signal on a screen, whatever the finger does.
+    planted : float
+        Crosstalk to add: by how much c falls on the way from object to goal.
     """
 
     def __init__(
-        self, operator: Operator, arm: CarriedArm, *, sees: Sees = "finger"
+        self,
+        operator: Operator,
+        arm: CarriedArm,
+        *,
+        sees: Sees = "finger",
+        planted: float = 0.0,
     ) -> None:
         if sees not in ("finger", "signal"):
             raise InvalidInput(f"expected to see finger or signal, found '{sees}'.")
         self.operator, self.arm, self.sees = operator, arm, sees
-        self._told = math.nan
+        self._planted, self._told = planted, math.nan
 
     @property
     def c(self) -> float:
@@ -74,7 +81,7 @@ class Elbow:
         else:
             shown = seen.flexion
         limb = self.operator.step(want, shown)
-        self._told = self.arm.step(limb, place)
+        self._told = self.arm.step(limb, place) - self._planted * max(place, 0.0)
         return self._told
 
 
