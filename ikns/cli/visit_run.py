@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Literal
 
 import ikns
@@ -19,6 +20,7 @@ from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Conductor, Desk, Driver
+    from ikns.finger import Finger
     from ikns.runtime import Status
     from ikns.session import RunWriter
     from ikns.stream import Source
@@ -31,6 +33,7 @@ _PAGE = {
     "keyboard": "keyboard at the participant's page, 0.5 per second",
     "mouse": "mouse at the participant's page",
 }
+_RING = "button that types a space at the participant's page"
 #: A virtual operator begins after this long, s.
 _VIRTUAL_WAIT = 2.0
 
@@ -193,6 +196,7 @@ def conduct(
     as_json : bool
     """
     from ikns.experiments.conduct import Conductor, HeldInput, VisitBook, carry_out
+    from ikns.experiments.conduct.ring import ring_driver
     from ikns.view.cockpit import Cockpit
 
     virtual = "virtual" in conditions
@@ -202,6 +206,7 @@ def conduct(
             f"{', '.join(conditions)}."
         )
     subject = _subject(arm) if "ikns" in conditions else None
+    _finger(arm)
     simulated = virtual or (subject is not None and _simulated(subject, arm))
     if who.study is not None and who.study.simulated != simulated:
         words = {True: "simulated", False: "with people"}
@@ -245,7 +250,7 @@ def conduct(
         conductor = Conductor(
             desk,
             book,
-            borne=set(_PAGE),
+            borne={*_PAGE, "ring"},
             rest=rest,
             auto=_VIRTUAL_WAIT if virtual else None,
         )
@@ -266,10 +271,14 @@ def conduct(
                 )
                 shown.append(take)
             drivers["ikns"] = lambda: _live(arm, subject, session, who, shown)
+        presses: SimpleQueue[None] = SimpleQueue()
+        if "ring" in conditions:
+            drivers["ring"] = lambda: ring_driver(presses, _finger(arm))
         cockpit = stack.enter_context(
             Cockpit(
                 conductor,
                 held,
+                on_press=lambda: presses.put(None),
                 host=screens.host,
                 port=screens.port,
                 about={
@@ -296,8 +305,8 @@ def _subject(arm: Arm) -> ikns.Subject:
     for name, value in (("--subject", arm.subject), ("--source", arm.source)):
         if value is None:
             raise InvalidInput(
-                f"the condition ikns needs {name}, found none; --conditions keyboard "
-                "needs nothing but a browser."
+                f"the condition ikns needs {name}, found none; other --conditions need "
+                "nothing but a browser."
             )
     assert arm.subject is not None
     return ikns.Subject.load(arm.subject)
@@ -327,13 +336,8 @@ def _live(
 ) -> AbstractContextManager[Driver]:
     from ikns.control.controller import Settings
     from ikns.experiments.conduct.live import live_driver
-    from ikns.finger import Finger, Safety, open_finger
 
     settings = Settings(hold_speed=arm.hold_speed)
-
-    def finger() -> Finger:
-        assert arm.finger is not None
-        return open_finger(arm.finger, safety=Safety(safe_state=arm.safe_state))
 
     def open_session(source: Source) -> AbstractContextManager[RunWriter]:
         assert arm.subject is not None
@@ -362,12 +366,22 @@ def _live(
     return live_driver(
         lambda: _open_source(arm, subject),
         subject,
-        finger=finger if arm.finger else None,
+        finger=_finger(arm),
         open_session=open_session,
         settings=settings,
         smooth=arm.smooth,
         on_status=tell if shown else None,
     )
+
+
+def _finger(arm: Arm) -> Callable[[], Finger] | None:
+    from ikns.finger import Safety, open_finger
+
+    if arm.finger is None:
+        return None
+    address, safety = arm.finger, Safety(safe_state=arm.safe_state)
+    open_finger(address, safety=safety)  # an address that is none is told now
+    return lambda: open_finger(address, safety=safety)
 
 
 def _operator(desk: Any, screens: Screens, who: Whose, seed: int) -> Driver:
@@ -390,6 +404,8 @@ def _said(condition: str, arm: Arm, screens: Screens) -> str:
     if condition == "gamepad":
         stick = "right trigger" if screens.stick == "trigger" else "left stick, up"
         return f"{_PAGE[condition]}, {stick}"
+    if condition == "ring":
+        return _RING
     return _PAGE.get(condition, f"{condition} operator")
 
 

@@ -2,7 +2,8 @@
 
 `conductor` is one visit as it goes on; `tracking` and `picking` are what it has to know
 of an experiment; `book` keeps every attempt on disk; `inputs` are where a control
-signal comes from; `carry` ties them to the clock. There is no screen here.
+signal comes from, `live` and `ring` those with a finger; `carry` ties them to the
+clock. There is no screen here.
 """
 
 from ikns.experiments.conduct.book import VisitBook
@@ -10,6 +11,7 @@ from ikns.experiments.conduct.carry import carry_out
 from ikns.experiments.conduct.conductor import Conductor
 from ikns.experiments.conduct.desk import COMMANDS, Command, Desk
 from ikns.experiments.conduct.inputs import Driver, HeldInput, Sample, VirtualInput
+from ikns.experiments.conduct.picking import PickingDesk
 from ikns.experiments.conduct.tracking import TrackingDesk
 
 __all__ = [
@@ -19,6 +21,7 @@ __all__ = [
     "Desk",
     "Driver",
     "HeldInput",
+    "PickingDesk",
     "Sample",
     "TrackingDesk",
     "VirtualInput",

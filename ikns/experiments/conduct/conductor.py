@@ -164,7 +164,7 @@ class Conductor:
     def break_off(self, now: float, reason: str) -> None:
         """Abort the trial that goes on, if any: it comes again."""
         if self.desk.state():
-            self.desk.visit.abort(now, reason)
+            self.desk.abort(now, reason)
             self._message = f"The trial was aborted: {reason}."
 
     def connect_again(self) -> bool:
@@ -262,8 +262,8 @@ class Conductor:
             raise InvalidInput("expected no break, found one: skip it to begin.")
         step = self.desk.visit.current
         if step is not None and step.kind != "rest" and self.desk.needs_signal:
-            silence = now - self._heard
-            if not silence <= _HEARD:
+            borne = step.condition in self._borne
+            if not now - self._heard <= _HEARD or (borne and not self._page):
                 raise InvalidInput(
                     f"expected a control signal of {step.condition}, found none"
                     f"{_where(step.condition, self._borne, page=self._page)}."
@@ -278,7 +278,7 @@ class Conductor:
         elif self.desk.visit.current is None:
             raise InvalidInput("expected a step to skip, found none left.")
         else:
-            self.desk.visit.skip(now, reason or "by the experimenter")
+            self.desk.skip(now, reason or "by the experimenter")
 
     def _give_break(self, now: float) -> None:
         if self.desk.state():

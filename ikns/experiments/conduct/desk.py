@@ -55,6 +55,12 @@ class Desk(Protocol):
     def check(self, now: float) -> None:
         """Let time pass; put down a trial that has ended."""
 
+    def abort(self, now: float, reason: str) -> None:
+        """Break the trial off that goes on; it comes again."""
+
+    def skip(self, now: float, reason: str) -> None:
+        """Leave the current step out."""
+
     def ask(self, name: str, text: str, now: float) -> None:
         """Do one of its own commands."""
 

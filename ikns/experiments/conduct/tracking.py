@@ -75,6 +75,14 @@ class TrackingDesk:
             self._view = self.visit.trial.check(now - _BEHIND)
             self.visit.finish()
 
+    def abort(self, now: float, reason: str) -> None:
+        """Break the trial off."""
+        self.visit.abort(now, reason)
+
+    def skip(self, now: float, reason: str) -> None:
+        """Leave the current step out."""
+        self.visit.skip(now, reason)
+
     def ask(self, name: str, text: str, now: float) -> None:
         """Nothing more may be asked."""
 

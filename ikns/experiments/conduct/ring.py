@@ -1,0 +1,135 @@
+"""A finger by a push button: the condition "ring", in a thread of its own."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from ikns.errors import IknsError
+from ikns.experiments.conduct.inputs import STALE, Sample
+from ikns.finger import Finger
+from ikns.finger.inputs import RingButton
+
+__all__ = ["RingDriver", "ring_driver"]
+
+#: How often the finger is told, 1/s.
+_RATE = 100.0
+
+
+class RingDriver:
+    """A button and its finger.
+
+    Parameters
+    ----------
+    presses : queue
+        Gets something whenever the button is pressed, from any thread.
+    finger : Finger or None
+
+    Attributes
+    ----------
+    fault : str
+        Why it ended; empty while it goes on.
+    """
+
+    def __init__(self, presses: SimpleQueue[None], finger: Finger | None) -> None:
+        self.fault = ""
+        self._presses, self._finger = presses, finger
+        self._samples: deque[Sample] = deque(maxlen=10_000)
+        self._last = -math.inf
+        self._facts: dict[str, Any] = {"kind": "ring"}
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="ring", daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """Stop, which relaxes the finger, and wait until it has."""
+        self.halt()
+        self._thread.join()
+
+    def halt(self) -> None:
+        """Stop within a period."""
+        self._stop.set()
+
+    def take(self, now: float) -> list[Sample]:
+        """Return what was told the finger since the last call."""
+        samples = []
+        while self._samples:
+            samples.append(self._samples.popleft())
+        if samples:
+            self._last = samples[-1].time
+        elif now - self._last > STALE:
+            samples.append(Sample(now, math.nan))
+        return samples
+
+    def facts(self) -> dict[str, Any]:
+        """Return how the finger is doing."""
+        return self._facts
+
+    def mark(self, name: str, text: str, now: float) -> None:
+        """Nothing is kept here."""
+
+    def _run(self) -> None:
+        try:
+            with ExitStack() as stack:
+                if self._finger is not None:
+                    stack.enter_context(self._finger)
+                self._go_on()
+        except (IknsError, OSError) as error:
+            self.fault = str(error)
+        finally:
+            self.fault = self.fault or "the ring button is not listened to any more."
+
+    def _go_on(self) -> None:
+        while not self._presses.empty():  # of before
+            self._presses.get()
+        ring = RingButton()
+        due = time.monotonic()
+        while not self._stop.is_set():
+            try:
+                while True:
+                    self._presses.get_nowait()
+                    ring.press()
+            except Empty:
+                pass
+            now, c = ring()
+            if self._finger is not None:
+                self._finger.command(c)
+                state = self._finger.state()
+                if state.mode == "safe":
+                    self.fault = f"finger: {state.alert}."
+                    return
+                self._facts = {
+                    "kind": "ring",
+                    "finger": state.mode,
+                    "flexion": c,
+                    "measured": state.flexion,
+                }
+            self._samples.append(Sample(now, c))
+            due = max(due + 1 / _RATE, time.monotonic())
+            self._stop.wait(due - time.monotonic())
+
+
+@contextmanager
+def ring_driver(
+    presses: SimpleQueue[None], finger: Callable[[], Finger] | None = None
+) -> Iterator[RingDriver]:
+    """Let a button drive a finger for a while.
+
+    Parameters
+    ----------
+    presses : queue
+        See :class:`RingDriver`.
+    finger : callable, optional
+        Makes the finger; without one nothing moves.
+    """
+    driver = RingDriver(presses, finger() if finger else None)
+    try:
+        yield driver
+    finally:
+        driver.end()
