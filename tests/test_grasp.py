@@ -248,3 +248,11 @@ def test_shapes_sides_and_rates_that_are_none_are_refused():
         Grasp(CAN, side="both")
     with pytest.raises(InvalidInput, match="expected a rate that divides 500"):
         Grasp(CAN, rate=60.0)
+
+
+def test_a_simulation_that_comes_apart_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log where one is
+    grasp = Grasp(CAN, rate=RATE)
+    grasp.data.qvel[:3] = 1e12
+    with pytest.raises(InvalidInput, match="came apart after 0.01 s"):
+        grasp.frame(0.0)

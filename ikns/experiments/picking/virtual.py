@@ -81,8 +81,8 @@ def virtual_pick_step(
         hand while carried; `c_drift`, by how much the way to the goal alone changes c,
         the elbow held (signed, the largest; 0 for a ring); `hold_share`, share of the
         carrying in which the finger touched the object; `contact_c`, flexion at which
-        it stopped the finger; `c_margin`, the least that the finger was told beyond that
-        on the way. NaN where there was none.
+        it stopped the finger; `c_margin`, the least that the finger was told beyond
+        that on the way. NaN where there was none.
     """
     picked, drift = virtual_pick(
         participant, step, practised=practised, rate=rate, latency=latency, **more

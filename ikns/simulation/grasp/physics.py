@@ -140,6 +140,11 @@ class Grasp:
         turn : (3,) array
             How it is to be turned about the object's middle, a rotation vector, rad in
             the world.
+
+        Raises
+        ------
+        InvalidInput
+            When the physics comes apart.
         """
         data = self.data
         now = self.time
@@ -157,6 +162,11 @@ class Grasp:
             data.ctrl[0] = self._turn_motor(goal)
             self._step(self.model, data)
         self.frames += 1
+        if data.warning.number.any():
+            raise InvalidInput(
+                f"the simulated contact came apart after {self.time:g} s, expected an "
+                f"object and a hand that 2 ms resolve, found {self.solid}."
+            )
         self.guard.measured(self.time, self.flexion)
         return self.seen()
 
