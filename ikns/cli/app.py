@@ -14,6 +14,7 @@ from ikns.cli.compare import compare
 from ikns.cli.control import control
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
+from ikns.cli.pick import pick
 from ikns.cli.replay import replay
 from ikns.cli.robot import robot
 from ikns.cli.run import run
@@ -49,6 +50,7 @@ for command in (
     stream,
     servo,
     track,
+    pick,
     report,
 ):
     app.command()(command)
