@@ -12,8 +12,8 @@ is held, slips or falls; its constants: `ikns/simulation/grasp/contact.toml`.
 - ring: a button, pressed a reaction after the person wants it, 2 per second, 50 ms.
 
 The second table is about crosstalk, the change of c that carrying makes. `drift`: with
-the elbow held, by the map alone. `margin`: the least that the finger was told, on the
-way, beyond where the object stops it.
+the elbow held where it just closed the finger, by the map alone. `margin`: the least
+that the finger was told, on the way, beyond where the object stops it.
 
 - finger: the person goes by the finger; once it presses, nothing tells where c is.
 - signal: c on a screen, held 0.3 (+- 0.1 between people) beyond the contact.
@@ -98,8 +98,8 @@ def gather(people: list[dict], way: str, code: str | None = None) -> dict:
         "slip_mm": 1e3 * middle("slip_m"),
         "held": middle("hold_share"),
         "contact_c": middle("contact_c"),
-        "drift": float(np.mean([abs(row["c_drift"]) for row in rows])),
-        "drift_most": float(np.max([abs(row["c_drift"]) for row in rows])),
+        "drift": float(np.nanmean([abs(row["c_drift"]) for row in rows])),
+        "drift_most": float(np.nanmax([abs(row["c_drift"]) for row in rows])),
         "margin": float(np.mean(margins)) if margins else None,
         "margin_least": float(np.min(margins)) if margins else None,
     }

@@ -79,10 +79,10 @@ def virtual_pick_step(
         The columns of a picking attempt and, in SI units: `why`; `peak_grip_N`, the
         finger's largest force on the object; `slip_m`, how far the object moved in the
         hand while carried; `c_drift`, by how much the way to the goal alone changes c,
-        the elbow held (signed, the largest; 0 for a ring); `hold_share`, share of the
-        carrying in which the finger touched the object; `contact_c`, flexion at which
-        it stopped the finger; `c_margin`, the least that the finger was told beyond
-        that on the way. NaN where there was none.
+        the elbow held where it just closed (signed, the largest; 0 for a ring);
+        `hold_share`, share of the carrying in which the finger touched the object;
+        `contact_c`, flexion at which it stopped the finger; `c_margin`, the least that
+        the finger was told beyond that on the way. NaN where there was none.
     """
     picked, drift = virtual_pick(
         participant, step, practised=practised, rate=rate, latency=latency, **more
@@ -161,7 +161,7 @@ def virtual_pick(
     -------
     picked : Picked
     drift : float
-        Change of c by the way alone.
+        Change of c by the way alone; NaN when nothing was carried.
     """
     if step.condition not in VIRTUAL_CONDITIONS or step.kind == "rest":
         raise InvalidInput(
@@ -219,8 +219,12 @@ def virtual_pick(
         drift=np.hstack([_in_world(drift[:, :3]), _in_world(drift[:, 3:])]),
         limit=step.limit,
     )
-    crosstalk = _crosstalk(participant, route) if step.condition == "ikns" else 0.0
-    return picked, crosstalk
+    if step.condition == "ring":
+        return picked, 0.0
+    if not picked.carried.any():
+        return picked, math.nan
+    contact = float(picked.trace[np.argmax(picked.carried), 2])
+    return picked, _crosstalk(participant, route, contact)
 
 
 class _Same:
@@ -246,18 +250,25 @@ def _in_world(v: Array) -> Array:
     return np.stack([v[..., 0], -v[..., 2], v[..., 1]], axis=-1)
 
 
-def _crosstalk(participant: Participant, route: Route) -> float:
+def _crosstalk(participant: Participant, route: Route, contact: float) -> float:
     """Largest change of c on the way to the goal with the elbow held, signed.
 
-    By the calibrated map at the true postures: no noise, no limb.
+    The elbow is where c at the object is what stops the finger there. By the calibrated
+    map at the true postures: no noise, no limb.
     """
     subject = participant.subject
     columns = subject.skeleton.columns(chain_joints(subject.chain)) - 6
-    places = np.linspace(0.0, 1.0, 21)
-    q = np.array([route.posture(float(s), 0.5)[columns] for s in places])
-    x = np.array([route.hand(float(s)) for s in places])
-    c = np.ravel(subject.null_space_map.control_signal(q, x))
-    change = c - c[0]
+
+    def c(places: Array, limbs: Array) -> Array:
+        ways = list(zip(places.tolist(), limbs.tolist(), strict=True))
+        q = np.array([route.posture(s, limb)[columns] for s, limb in ways])
+        x = np.array([route.hand(s) for s, _ in ways])
+        return np.ravel(subject.null_space_map.control_signal(q, x))
+
+    limbs = np.linspace(0.0, 1.0, 11)
+    limb = float(np.interp(contact, c(np.zeros(11), limbs), limbs))
+    along = c(np.linspace(0.0, 1.0, 21), np.full(21, limb))
+    change = along - along[0]
     return float(change[np.argmax(np.abs(change))])
 
 
