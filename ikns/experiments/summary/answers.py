@@ -50,8 +50,9 @@ def tracking_answer(
         question = "Does tracking with the null space differ from another device?"
         return [(question, ["Not tested: there is no visit of tracking."])]
     if not summary.comparisons:
-        only = f"Not tested: one condition only, {summary.conditions[0]}."
-        return [("Does tracking with the null space differ?", [only])]
+        return [
+            ("Does tracking with the null space differ?", [_only(summary.conditions)])
+        ]
     return [
         (
             f"Does tracking with {worded(c.names[0])} differ from "
@@ -70,8 +71,12 @@ def picking_answer(
         question = "Does pick and place with the null space differ?"
         return [(question, ["Not tested: there is no visit of pick and place."])]
     if not summary.comparisons:
-        only = f"Not tested: one condition only, {summary.conditions[0]}."
-        return [("Does pick and place with the null space differ?", [only])]
+        return [
+            (
+                "Does pick and place with the null space differ?",
+                [_only(summary.conditions)],
+            )
+        ]
     return [
         (
             f"Does pick and place with {worded(c.names[0])} differ from "
@@ -80,6 +85,12 @@ def picking_answer(
         )
         for c in summary.comparisons
     ]
+
+
+def _only(conditions: list[str]) -> str:
+    if not conditions:
+        return "Not tested: nothing was attempted."
+    return f"Not tested: one condition only, {conditions[0]}."
 
 
 def _tracking_sentences(

@@ -12,6 +12,7 @@ from ikns.experiments.summary import (
     TrackingSummary,
     Varied,
 )
+from ikns.experiments.summary.answers import people
 from ikns.experiments.summary.methods import methods, setting_text
 from ikns.view.parts import Cell, Section, Table
 
@@ -61,8 +62,9 @@ def done_section(group: Group) -> Section:
         empty = _without(each)
         if empty:
             text.append(
-                f"In {name}, {len(empty)} of {len(each.participants)} participants "
-                f"have no finished trial: {', '.join(empty[:10])}"
+                f"In {name}, {len(empty)} of "
+                f"{people(len(each.participants), simulated=each.simulated)} finished "
+                f"no trial: {', '.join(empty[:10])}"
                 f"{' and others' if len(empty) > 10 else ''}."
             )
     return Section("What was done", text, tables=tables)
@@ -96,7 +98,8 @@ def _attempts(name: str, found: TrackingSummary | PickingSummary) -> Table:
     return Table(
         ["condition", "kind", *outcomes, *other, "attempts"],
         rows,
-        f"Attempts at {name}, {who} participants, all variations.",
+        f"Attempts at {name}, {people(who, simulated=found.simulated)}, all of the "
+        "variations.",
     )
 
 

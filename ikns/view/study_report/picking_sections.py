@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from ikns.experiments.picking import load_objects
 from ikns.experiments.summary import ObjectCell, PickComparison, PickingSummary
-from ikns.experiments.summary.answers import worded
+from ikns.experiments.summary.answers import people, worded
 from ikns.view.parts import Cell, Picture, Section, Table
 from ikns.view.study_report.effect_figure import effect_figure
 from ikns.view.study_report.picking_figures import picking_figure
@@ -55,9 +55,8 @@ def picking_sections(found: PickingSummary, drawn: list[Drawn]) -> Iterator[Sect
     """Pictures, tables and tests; what is not tested says why."""
     pictures = {each.name: each.picture for each in drawn}
     text = [
-        f"Trials of {len(found.participants)} participants"
-        f"{' (simulated)' if found.simulated else ''}. A trial succeeds, or the "
-        "object is dropped, or time runs out."
+        f"Trials of {people(len(found.participants), simulated=found.simulated)}. "
+        "A trial succeeds, or the object is dropped, or time runs out."
     ]
     if not drawn:
         text.append("No trial was finished, so there is nothing to draw or to test.")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ikns.experiments.statistics.printed import PAPER
 from ikns.experiments.statistics.wording import p_text
 from ikns.experiments.summary import Comparison, TrackingSummary
-from ikns.experiments.summary.answers import worded
+from ikns.experiments.summary.answers import people, worded
 from ikns.experiments.summary.tracking import UNITS
 from ikns.view.parts import Cell, Picture, Section, Table
 from ikns.view.study_report.effect_figure import effect_figure
@@ -111,9 +111,9 @@ def tracking_sections(found: TrackingSummary, drawn: list[Drawn]) -> Iterator[Se
     """Pictures, tables and tests; what is not tested says why."""
     pictures = {each.name: each.picture for each in drawn}
     text = [
-        f"Trials of {len(found.participants)} participants"
-        f"{' (simulated)' if found.simulated else ''}, everything computed from the "
-        "recorded control signal. RMSE and error are of 100, the height of the screen."
+        f"Trials of {people(len(found.participants), simulated=found.simulated)}, "
+        "everything computed from the recorded control signal. RMSE and error are of "
+        "100, the height of the screen."
     ]
     if not drawn:
         text.append("No trial was finished, so there is nothing to draw or to test.")
@@ -169,7 +169,7 @@ def _comparison(
     if found.anova is None:
         text.append(
             "The analysis of variance was left out: it needs two trajectories, all of "
-            "them from every participant, and at most 200 participants."
+            "them from every participant, and no more than 200 of those."
         )
     return Section(
         title,

@@ -11,7 +11,7 @@ from typing import Any
 from ikns.experiments.summary import Group, StudySummary
 from ikns.experiments.summary.numbers import numbers, trials_csv
 from ikns.view.parts import Section, Step
-from ikns.view.render import pdf, png, svg
+from ikns.view.render import pdf, svg
 from ikns.view.study_report.map_section import map_drawn, map_section
 from ikns.view.study_report.other_sections import (
     done_section,
@@ -28,7 +28,7 @@ from ikns.view.study_report.tracking_sections import (
     tracking_sections,
 )
 
-__all__ = ["report_files", "write_study_report"]
+__all__ = ["report_files", "study_page", "write_study_report"]
 
 _PAGE, _NUMBERS = "report.html", "numbers.json"
 _TABLES = ("tables/tracking.csv", "tables/picking.csv")
@@ -42,7 +42,7 @@ _FIGURES = (
     "picking_difference",
     "workspace",
 )
-_KINDS: dict[str, Callable[[Any], bytes]] = {"pdf": pdf, "svg": svg, "png": png}
+_KINDS: dict[str, Callable[[Any], bytes]] = {"pdf": pdf, "svg": svg}
 #: Conditions that a study may have beside the first.
 _MOST = 20
 
@@ -59,6 +59,20 @@ def report_files() -> list[str]:
     return [_PAGE, _NUMBERS, *_TABLES, *(f"figures/{name}" for name in names)]
 
 
+def study_page(summary: StudySummary) -> tuple[str, list[tuple[str, Drawn]]]:
+    """Return the page, and its figures with the names of their files."""
+    drawn: list[tuple[str, Drawn]] = []
+    parts = [Part(group, list(_sections(group, drawn))) for group in summary.groups]
+    page = study_html(
+        summary,
+        parts,
+        about_paper=paper_section(),
+        left_out=left_out_section(summary),
+        next_steps=_next_steps(summary),
+    )
+    return page, drawn
+
+
 def write_study_report(
     folder: Path,
     summary: StudySummary,
@@ -67,8 +81,8 @@ def write_study_report(
 ) -> None:
     """Write a report into a folder that exists and is empty.
 
-    ``report.html`` loads nothing from elsewhere; ``figures/`` has each figure as PDF,
-    SVG and PNG; ``numbers.json`` and ``tables/*.csv`` have every number and trial.
+    ``report.html`` loads nothing from elsewhere; ``figures/`` has each figure as PDF
+    and SVG; ``numbers.json`` and ``tables/*.csv`` have every number and trial.
 
     Parameters
     ----------
@@ -77,18 +91,8 @@ def write_study_report(
     progress : callable
         Told (step, done, total).
     """
-    drawn: list[tuple[str, Drawn]] = []
-    parts = []
-    for group in summary.groups:
-        sections = list(_sections(group, drawn))
-        parts.append(Part(group, sections))
-    page = study_html(
-        summary,
-        parts,
-        about_paper=paper_section(),
-        left_out=left_out_section(summary),
-        next_steps=_next_steps(summary),
-    )
+    progress("drawing", 0, 1)
+    page, drawn = study_page(summary)
     (folder / _PAGE).write_text(page, encoding="utf-8", newline="\n")
     if drawn:
         (folder / "figures").mkdir()
