@@ -233,13 +233,13 @@ def test_through_the_chain_c_follows_the_elbow_all_along_the_way(person, route):
 
 @pytest.fixture(scope="module")
 def row(person):
-    step = PickStep("trial", "ikns", "D")
+    step = PickStep("trial", "ikns", "A")
     return virtual_pick_step(person, step, practised=3, rate=RATE)
 
 
 def test_a_row_is_the_same_whatever_was_done_before(person, row):
     virtual_pick_step(person, PickStep("trial", "ring", "E"), practised=0, rate=RATE)
-    step = PickStep("trial", "ikns", "D")
+    step = PickStep("trial", "ikns", "A")
     again = virtual_pick_step(replace(person), step, practised=3, rate=RATE)
     assert json.dumps(again) == json.dumps(row)  # to the bit; NaN is NaN
 
@@ -248,7 +248,7 @@ def test_a_row_has_the_columns_of_a_visit_and_numbers_that_fit(row):
     columns = "key kind condition object repeat outcome reason practised time limit"
     assert {*columns.split(), "comment", "why"} <= row.keys()
     assert all(type(value) in (str, int, float) for value in row.values())
-    assert row["key"] == "ikns/trial/D/0"
+    assert row["key"] == "ikns/trial/A/0"
     assert row["outcome"] in ("success", "dropped", "timeout")
     assert 2.0 < row["time"] <= row["limit"] == 20.0
     assert 0.0 <= row["hold_share"] <= 1.0
@@ -271,7 +271,7 @@ def test_a_button_knows_no_crosstalk(person):
 
 
 def test_a_hand_that_holds_the_signal_while_it_travels_feels_no_crosstalk(person):
-    step = PickStep("trial", "ikns", "C")
+    step = PickStep("trial", "ikns", "F")
     held, _ = virtual_pick(
         person, step, practised=3, rate=RATE, settings=Settings(hold_speed=0.15)
     )
