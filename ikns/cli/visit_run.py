@@ -100,6 +100,13 @@ class Screens:
     rate: float
     stick: str = "left"
 
+    def __post_init__(self) -> None:
+        """Refuse a rate that is none."""
+        if not 0 < self.rate <= 1000:
+            raise InvalidInput(
+                f"expected a --rate above 0 and up to 1000 Hz, found {self.rate:g}."
+            )
+
 
 def names(text: str) -> list[str]:
     """Split a list of names at its commas.
@@ -197,7 +204,7 @@ def conduct(
     """
     from ikns.experiments.conduct import Conductor, HeldInput, VisitBook, carry_out
     from ikns.experiments.conduct.ring import ring_driver
-    from ikns.view.cockpit import Cockpit
+    from ikns.view.cockpit import Cockpit, check_port
 
     virtual = "virtual" in conditions
     if virtual and len(conditions) > 1:
@@ -207,6 +214,7 @@ def conduct(
         )
     subject = _subject(arm) if "ikns" in conditions else None
     _finger(arm)
+    check_port(screens.host, screens.port)
     simulated = virtual or (subject is not None and _simulated(subject, arm))
     if who.study is not None and who.study.simulated != simulated:
         words = {True: "simulated", False: "with people"}

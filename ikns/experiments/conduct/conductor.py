@@ -112,6 +112,7 @@ class Conductor:
         self.plan: dict[str, Any] = {"version": 0}
         self.curve: dict[str, Any] = {"version": 0}
         self.shown: dict[str, Any] = {}
+        self._left: tuple[Any, ...] = desk.visit.remaining
         self._tell_plan()
 
     @property
@@ -119,8 +120,7 @@ class Conductor:
         """Of the trial that goes on or comes next; empty when none does."""
         if self._stopped or self.over:
             return ""
-        left = self.desk.visit.remaining
-        return next((step.condition for step in left if step.kind != "rest"), "")
+        return next((s.condition for s in self._left if s.kind != "rest"), "")
 
     @property
     def state(self) -> str:
@@ -129,12 +129,11 @@ class Conductor:
             return "stopped"
         if going := self.desk.state():
             return going
-        step = self.desk.visit.current
-        if step is None:
+        if not self._left:
             return "finished"
         if self._paused:
             return "paused"
-        if step.kind == "rest" or self._break_end > -math.inf:
+        if self._left[0].kind == "rest" or self._break_end > -math.inf:
             return "rest"
         return "waiting"
 
@@ -194,6 +193,7 @@ class Conductor:
             except InvalidInput as error:
                 self._message = str(error)
             self._settle(now)
+            self._left = self.desk.visit.remaining
         if self.emergency.is_set() and not self._stopped:
             self._stop(now)
         self._pass_time(now)
@@ -318,7 +318,9 @@ class Conductor:
         if self._stopped or self.desk.state():
             self._waiting_since = math.nan
             return
-        self.desk.visit.rest(now)
+        if self._left and self._left[0].kind == "rest":
+            self.desk.visit.rest(now)
+            self._left = self.desk.visit.remaining
         if now >= self._break_end:
             self._break_end = -math.inf
         if self.state != "waiting":
@@ -352,6 +354,7 @@ class Conductor:
             # Kept on disk, not in memory.
             attempts[self._written - 1] = attempt._replace(record=None)
         self._wrote = now
+        self._left = self.desk.visit.remaining
         self._tell_plan()
 
     def _practised(self, key: str) -> int:
@@ -377,17 +380,16 @@ class Conductor:
 
     def _snapshot(self, now: float) -> dict[str, Any]:
         visit, state = self.desk.visit, self.state
-        step, view = visit.current, self.desk.view(now)
-        trials = [s for s in visit.steps if s.kind != "rest"]
-        left = sum(s.kind != "rest" for s in visit.remaining)
+        step = self._left[0] if self._left else None
+        view = self.desk.view(now)
         shown = {
             "experiment": self.desk.experiment,
             "state": state,
             "prompt": prompt(self.desk, state),
             "step": None if step is None else step_facts(self.desk, step),
             "at": next((i for i, s in enumerate(visit.steps) if s is step), None),
-            "trials": len(trials),
-            "left": left,
+            "trials": sum(s.kind != "rest" for s in visit.steps),
+            "left": sum(s.kind != "rest" for s in self._left),
             "c": self._c,
             "condition": self.condition,
             "borne": self.condition in self._borne,

@@ -5,6 +5,6 @@ its own. The pages are the files beside: no build step, nothing from the network
 """
 
 from ikns.view.cockpit.gate import Gate
-from ikns.view.cockpit.server import Cockpit
+from ikns.view.cockpit.server import Cockpit, check_port
 
-__all__ = ["Cockpit", "Gate"]
+__all__ = ["Cockpit", "Gate", "check_port"]

@@ -17,7 +17,7 @@ from ikns.view.cockpit.gate import Gate
 if TYPE_CHECKING:
     from ikns.view.cockpit.link import Link
 
-__all__ = ["Cockpit"]
+__all__ = ["Cockpit", "check_port"]
 
 _LOOPBACK = "127.0.0.1"
 #: How often pages get what is newest, 1/s.
@@ -75,15 +75,7 @@ class Cockpit:
         } | dict(about or {})
         self._links: list[Link] = []
         host = _LOOPBACK if host == "localhost" else host
-        try:
-            found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-            self._socket = socket.create_server(found[4][:2], family=found[0])
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise FileError(
-                f"port {port} of {host} cannot be opened: {reason.lower()}."
-            ) from None
-        self._socket.setblocking(False)
+        self._socket = _listening(host, port)
         self.gate = Gate.at(host, self._socket.getsockname()[1])
         self._loop = asyncio.new_event_loop()
         self._closing = asyncio.Event()
@@ -207,3 +199,27 @@ class Cockpit:
         while self._links and time.monotonic() < end:
             await asyncio.sleep(0.01)
         await server.close_all_connections()
+
+
+def check_port(host: str, port: int) -> None:
+    """Make sure, before any work, that a cockpit may listen there.
+
+    Raises
+    ------
+    FileError
+        When it may not.
+    """
+    _listening(_LOOPBACK if host == "localhost" else host, port).close()
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        made = socket.create_server(found[4][:2], family=found[0])
+    except (OSError, OverflowError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(
+            f"port {port} of {host} cannot be opened: {reason.lower()}."
+        ) from None
+    made.setblocking(False)
+    return made
