@@ -53,6 +53,12 @@ def contents(study: Path) -> dict[str, bytes]:
     }
 
 
+def children(process: int) -> list[int]:
+    """Processes that this one started."""
+    tasks = Path(f"/proc/{process}/task").glob("*/children")
+    return [int(child) for task in tasks for child in task.read_text().split()]
+
+
 @pytest.fixture(scope="session")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The study as one process makes it."""
@@ -83,6 +89,7 @@ def test_a_killed_run_goes_on_and_two_processes_make_the_bits_of_one(
             time.sleep(0.01)
         with pytest.raises(InvalidInput, match="found another run"):
             run_study(study)
+        left_behind = children(running.pid)
         running.send_signal(signal.SIGKILL)
     found = list_visits(study)
     assert 1 <= len(found) < 6
@@ -102,6 +109,7 @@ def test_a_killed_run_goes_on_and_two_processes_make_the_bits_of_one(
     assert {path: path.stat().st_mtime_ns for path in found} == before
     assert foreign.read_text() == "mine"
     foreign.unlink()
+    assert not any(Path(f"/proc/{worker}").exists() for worker in left_behind)
     assert contents(study) == contents(done)
 
 

@@ -7,6 +7,8 @@ need no common disk, and what happens to them leaves no trace.
 from __future__ import annotations
 
 import os
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError
 from itertools import islice
@@ -23,6 +25,8 @@ R = TypeVar("R")
 
 #: How long a scheduler may take to answer, s.
 _PATIENCE = 10.0
+#: How often a worker looks whether the run goes on, s.
+_LOOK = 0.5
 _GOES_ON = "what was finished is kept, and the same command goes on from there"
 
 
@@ -75,8 +79,9 @@ def _on_cores(work: Callable[[T], R], tasks: Iterable[T], n: int) -> Iterator[R]
     from joblib import Parallel, delayed, parallel_config
     from joblib.externals.loky import get_reusable_executor
 
+    begin = {"initializer": _leave_with, "initargs": (os.getpid(),)}
     try:
-        with parallel_config("loky", n_jobs=n, inner_max_num_threads=1):
+        with parallel_config("loky", n_jobs=n, inner_max_num_threads=1, **begin):
             yield from Parallel(return_as="generator_unordered", batch_size=1)(
                 delayed(_alone)(work, task) for task in tasks
             )
@@ -124,6 +129,21 @@ def _on_dask(work: Callable[[T], R], tasks: Iterable[T], scheduler: str) -> Iter
             for task in islice(waiting, 1):
                 running.add(submit(task))
             yield result
+
+
+def _leave_with(parent: int) -> None:
+    """Let this worker end when the process that started it does.
+
+    Otherwise the workers of a killed run wait for work for minutes, or for ever where
+    it was killed while it held their queue.
+    """
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _alone(work: Callable[[T], R], task: T) -> R:
