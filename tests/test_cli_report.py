@@ -10,6 +10,7 @@ from command_line import check_refused, contents
 
 from ikns.cli import main
 from ikns.experiments.study import init_study
+from ikns.view.study_report import report_files
 
 ERRORS = {("ikns", "T1"): 2.0}
 
@@ -38,6 +39,15 @@ def test_a_report_appears_in_the_study_and_is_not_overwritten(
     assert "Not tested: one condition only, ikns." in out
     assert (study / "report" / "report.html").is_file()
     assert contents(study / "visits") == before
+    held = [p for p in (study / "report").rglob("*") if p.is_file()]
+    names = {path.relative_to(study / "report").as_posix() for path in held}
+    assert names <= set(report_files())
+    assert {"numbers.json", "tables/tracking.csv"} < names
+    figures = sorted((study / "report" / "figures").iterdir())
+    assert [path.suffix for path in figures] == [".pdf", ".svg"] * 4
+    for path in figures:
+        assert path.name.startswith("simulated_")
+        assert path.read_bytes().startswith(b"%PDF" if path.suffix == ".pdf" else b"<?")
     sentence = check_refused(["report", str(study)], study, capfd)
     assert "use --force" in sentence
     (study / "visits" / "sub-01_tracking" / "visit.json").unlink()

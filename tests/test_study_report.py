@@ -2,18 +2,16 @@
 
 import csv
 import io
-import json
 import re
 from html.parser import HTMLParser
 
-import numpy as np
 import pytest
 import small_visits as small
 
 from ikns.experiments.study import init_study
 from ikns.experiments.summary import summarize
-from ikns.experiments.summary.numbers import numbers
-from ikns.view.study_report import report_files, study_page, write_study_report
+from ikns.experiments.summary.numbers import numbers, trials_csv
+from ikns.view.study_report import study_page
 
 VOID = {"meta", "img"}
 
@@ -75,10 +73,7 @@ def simulated(tmp_path_factory):
         errors = dict.fromkeys([("ikns", "T1"), ("gamepad", "T1")], who + 1.0)
         small.tracking(study, who, errors, variation="late")
     summary = summarize(study)
-    (top / "report").mkdir()
-    write_study_report(top / "report", summary)
-    page = (top / "report" / "report.html").read_text(encoding="utf-8")
-    return summary, page, top / "report"
+    return summary, *study_page(summary)
 
 
 @pytest.fixture(scope="module")
@@ -171,7 +166,7 @@ def test_the_answers_come_first_and_are_those_of_the_statistics(simulated):
 
 
 def test_simulated_is_said_large_in_every_heading_caption_figure_and_file(simulated):
-    summary, page, folder = simulated
+    summary, page, drawn = simulated
     reader = Reader(page)
     assert "Simulated: no person took part" in reader.text
     about_paper = next(k for k, h in enumerate(reader.headings) if "The paper's" in h)
@@ -184,25 +179,13 @@ def test_simulated_is_said_large_in_every_heading_caption_figure_and_file(simula
     assert "4 simulated participants" in own
     assert not re.findall(r"\d+ (?:participants|people|persons)", own)
     assert "What such a simulation can and cannot show" in page
-    names = {path.name for path in (folder / "figures").iterdir()}
-    assert len(names) == 2 * 7
-    assert all(name.startswith("simulated_") for name in names)
-    stored = json.loads((folder / "numbers.json").read_text())
-    assert stored["simulated"] == [True]
-    for row in csv.DictReader(
-        io.StringIO((folder / "tables/tracking.csv").read_text())
-    ):
+    assert len(drawn) == 7
+    for name, each in drawn:
+        assert name.startswith("simulated_")
+        assert each.figure.get_suptitle().endswith("(simulated participants)")
+    assert numbers(summary)["simulated"] == [True]
+    for row in csv.DictReader(io.StringIO(trials_csv(summary, "tracking"))):
         assert row["simulated"] == "yes"
-
-
-def test_every_figure_is_there_for_print_and_names_itself_simulated(simulated):
-    _, _, folder = simulated
-    figures = folder / "figures"
-    for path in figures.glob("*.pdf"):
-        assert path.read_bytes().startswith(b"%PDF")
-        assert path.with_suffix(".svg").read_bytes().startswith(b"<?xml")
-    held = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
-    assert held <= set(report_files())
 
 
 def test_a_page_about_people_speaks_of_no_simulation(tmp_path):
@@ -281,19 +264,18 @@ def test_the_methods_are_written_from_the_configuration(simulated):
     assert "t = 0.27 gives p = 0.789" in text  # the paper, examined again
 
 
-def test_numbers_of_the_json_file_are_those_of_the_summary(simulated):
-    summary, _, folder = simulated
-    stored = json.loads((folder / "numbers.json").read_text())
-    (group,) = stored["groups"]
+def test_numbers_and_trials_for_other_programs_are_those_of_the_summary(simulated):
+    summary, _, _ = simulated
+    (group,) = numbers(summary)["groups"]
     found = summary.groups[0].tracking
     assert [c["over"]["mean"] for c in group["tracking"]["rmse"]] == [
         c.over.mean for c in found.rmse
     ]
     analysis = group["tracking"]["comparisons"][0]["analysis"]
     assert analysis["subjects"]["p"] == found.comparisons[0].analysis.subjects.p
-    rows = list(
-        csv.DictReader(io.StringIO((folder / "tables/tracking.csv").read_text()))
-    )
-    assert np.array([float(row["rmse"]) for row in rows]).tolist() == (
-        found.table["rmse"].tolist()
-    )
+    for name in ("tracking", "picking"):
+        text = trials_csv(summary, name)
+        rows = list(csv.DictReader(io.StringIO(text)))
+        table = getattr(summary.groups[0], name).table
+        key = "rmse" if name == "tracking" else "time"
+        assert [float(row[key]) for row in rows] == table[key].tolist()
