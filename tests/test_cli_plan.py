@@ -153,6 +153,7 @@ def test_an_option_that_overrides_a_declaration_is_told(study):
 
 def test_the_table_names_the_assumption_and_marks_what_is_needed(study):
     text = " ".join(run(study).split())
+    assert "Plan picking with --experiment picking." in text
     assert "equivalence within 1 RMSE (of 100), 300 simulated studies" in text
     assert "Assumed: differences of RMSE with standard deviations of 1.3" in text
     assert "the paper's printed means" in text

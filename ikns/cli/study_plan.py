@@ -44,6 +44,7 @@ class _Design(NamedTuple):
     repeats: int
     seed: int
     conditions: tuple[str, str] | None
+    others: list[str]
     warnings: list[str]
 
 
@@ -183,6 +184,7 @@ def plan(
         _assumption(assumed.found, design),
         made.size.sentence(),
         *([] if made.declared is None else [made.declared.sentence()]),
+        *design.others,
         *([] if figure is None else [f"Wrote {figure}"]),
         *notes(warned),
         as_json=as_json,
@@ -210,6 +212,7 @@ def _design(
             repeats or _PAPER_REPEATS[name],
             seed or 0,
             None,
+            [],
             [],
         )
     from ikns.experiments.study import read_study
@@ -241,6 +244,9 @@ def _design(
         repeats or said["repeats"],
         found.seed if seed is None else seed,
         (first, others[0]),
+        [f"Plan {x} with --experiment {x}." for x in found.designs if x != name]
+        if experiment is None
+        else [],
         warned,
     )
 
