@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 import tomli_w
-from typer.testing import CliRunner, Result
+from command_line import check_refused
 
+from ikns.cli import main
 from ikns.cli import study as command
-from ikns.cli.study import study_app
-from ikns.errors import FileError, IknsError, InvalidInput
 
 STUDY: dict[str, Any] = {
     "study": {"name": "quick", "seed": 5},
@@ -21,64 +20,83 @@ STUDY: dict[str, Any] = {
 }
 
 
-def call(*argv: str | Path) -> Result:
-    return CliRunner().invoke(study_app, [str(word) for word in argv])
+Captured = pytest.CaptureFixture[str]
 
 
-def refused(kind: type[IknsError], *argv: str | Path) -> str:
-    """What ``ikns`` would print as one sentence before leaving with 2."""
-    found = call(*argv).exception
-    assert isinstance(found, kind)
-    assert "\n" not in str(found)
-    return str(found)
+def call(capfd: Captured, *argv: str | Path) -> str:
+    assert main(["study", *map(str, argv)]) == 0
+    return capfd.readouterr().out
 
 
-def test_a_new_user_gets_an_example_and_is_told_what_is_next(tmp_path: Path) -> None:
+def test_a_new_user_gets_an_example_and_is_told_what_is_next(
+    tmp_path: Path, capfd: Captured
+) -> None:
     folder = tmp_path / "study"
-    done = call("init", folder)
-    assert done.exit_code == 0
-    assert "10 simulated participants, tracking and picking" in done.stdout
-    assert f"ikns study run {folder}" in done.stdout
-    assert "exists already; use --force" in refused(InvalidInput, "init", folder)
-    found = json.loads(call("init", folder, "--force", "--json").stdout)
+    done = call(capfd, "init", folder)
+    assert "10 simulated participants, tracking and picking" in done
+    assert f"ikns study run {folder}" in done
+    again = ["study", "init", str(folder)]
+    assert "exists already; use --force" in check_refused(again, tmp_path, capfd)
+    found = json.loads(call(capfd, "init", folder, "--force", "--json"))
     assert found["study"] == str(folder / "study.toml")
     assert found["participants"] == 10
 
 
-def test_a_run_says_what_it_did_and_then_that_nothing_is_left(tmp_path: Path) -> None:
+def test_a_run_says_what_it_did_and_then_that_nothing_is_left(
+    tmp_path: Path, capfd: Captured
+) -> None:
     (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY))
-    first = json.loads(call("run", tmp_path, "--jobs", "1", "--json").stdout)
+    first = json.loads(call(capfd, "run", tmp_path, "--jobs", "1", "--json"))
     assert (first["cells"], first["simulated_now"], first["found"]) == (1, 1, 0)
     assert first["simulated"] is True
     assert first["failed"] == {}
-    again = call("run", tmp_path, "--jobs", "1").stdout
+    again = call(capfd, "run", tmp_path, "--jobs", "1")
     assert re.search(r"quick: 1 cells, 0 simulated now in \d+ s, 1 there before", again)
     assert "All participants are simulated" in again
+    changed = STUDY | {"study": {"name": "quick", "seed": 6}}
+    (tmp_path / "study.toml").write_text(tomli_w.dumps(changed))
+    assert "results with seed = 5, found 6" in check_refused(
+        ["study", "run", str(tmp_path)], tmp_path, capfd
+    )
 
 
-def test_a_run_names_whom_it_could_not_simulate(tmp_path: Path) -> None:
+def test_a_run_names_whom_it_could_not_simulate(
+    tmp_path: Path, capfd: Captured
+) -> None:
     strict = STUDY["parameters"] | {"max_hand_speed": 1e-6}
     (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY | {"parameters": strict}))
-    done = call("run", tmp_path, "--jobs", "1")
-    assert done.exit_code == 0
-    assert "Note: 1 of 1 cells have no attempts: sub-01_tracking: " in done.stdout
+    told = call(capfd, "run", tmp_path, "--jobs", "1")
+    assert "Note: 1 of 1 cells have no attempts: sub-01_tracking: " in told
 
 
-def test_bad_input_is_one_sentence(tmp_path: Path) -> None:
-    assert "expected the file of a study" in refused(FileError, "run", tmp_path)
-    table = STUDY | {"cohort": {"people": 3}}
-    (tmp_path / "study.toml").write_text(tomli_w.dumps(table))
-    assert "expected one of participants in [cohort], found 'people'" in refused(
-        InvalidInput, "run", tmp_path
+@pytest.mark.parametrize(
+    ("tables", "options", "sentence"),
+    [
+        (None, [], "expected the file of a study"),
+        (
+            {"cohort": {"people": 3}},
+            [],
+            "expected one of participants in [cohort], found 'people'",
+        ),
+        ({}, ["--participants", "2"], "1 to 1 participants, found 2"),
+        ({}, ["--jobs", "0"], "one process, found 0"),
+        ({}, ["--job", "1"], "no such option"),
+        ({"study": {"name": "x", "simulated": False}}, [], "found one of people"),
+    ],
+)
+def test_bad_input_is_one_sentence(
+    tables: dict | None,
+    options: list[str],
+    sentence: str,
+    tmp_path: Path,
+    capfd: Captured,
+) -> None:
+    if tables is not None:
+        (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY | tables))
+    argv = ["study", "run", str(tmp_path), *options]
+    assert sentence in check_refused(argv, tmp_path, capfd).replace(
+        "No such", "no such"
     )
-    (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY))
-    assert "1 to 1 participants, found 2" in refused(
-        InvalidInput, "run", tmp_path, "--participants", "2"
-    )
-    assert "one process, found 0" in refused(
-        InvalidInput, "run", tmp_path, "--jobs", "0"
-    )
-    assert call("run").exit_code == 2
 
 
 def test_time_left_is_told_where_there_is_no_terminal(

@@ -11,7 +11,7 @@ from ikns.errors import InvalidInput
 from ikns.experiments.study.cells import check_libraries, simulate
 from ikns.experiments.study.declaration import FILE, read_study
 from ikns.experiments.study.results import alone, check_declared, keep_declared, tasks
-from ikns.experiments.study.workers import compute
+from ikns.experiments.study.workers import compute, processes
 from ikns.experiments.visits import write_visit
 from ikns.warm_up import compiled_before, warm_up
 
@@ -90,6 +90,7 @@ def run_study(
     most = study.participants
     if participants is not None and not 1 <= participants <= most:
         raise InvalidInput(f"expected 1 to {most} participants, found {participants}.")
+    processes(n_jobs)  # refused before anything is written
     people = participants or most
     cells = people * len(study.designs) * (1 + len(study.variations))
     report = on_progress or (lambda step, done, total: None)

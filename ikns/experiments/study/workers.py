@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from ikns.errors import InvalidInput, StreamError
 
-__all__ = ["compute"]
+__all__ = ["compute", "processes"]
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -61,11 +61,22 @@ def compute(
     """
     if scheduler is not None:
         return _on_dask(work, tasks, scheduler)
-    cores = os.cpu_count() or 1
-    workers = cores + 1 + n_jobs if n_jobs < 0 else n_jobs
-    if workers < 1:
+    n = processes(n_jobs)
+    return _here(work, tasks) if n == 1 else _on_cores(work, tasks, n)
+
+
+def processes(n_jobs: int) -> int:
+    """Return how many processes are meant; as in joblib, -1 is one for each core.
+
+    Raises
+    ------
+    InvalidInput
+        When that is none.
+    """
+    n = (os.cpu_count() or 1) + 1 + n_jobs if n_jobs < 0 else n_jobs
+    if n < 1:
         raise InvalidInput(f"expected at least one process, found {n_jobs}.")
-    return _here(work, tasks) if workers == 1 else _on_cores(work, tasks, workers)
+    return n
 
 
 def _here(work: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
