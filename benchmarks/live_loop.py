@@ -4,9 +4,9 @@ A simulated person's recording goes through the whole loop: source, pose, contro
 signal, safety, finger, session. All times are of the monotonic
 clock, which processes share.
 
-1. At the cameras' pace: from receipt to the finger's command in one process, and from
-   the call that sends a frame over LSL in another process; with and without a session
-   being written. The four streams run side by side. Then 1000 Hz.
+1. At the cameras' pace, a session being written: from receipt to the finger's command
+   in one process, and, side by side with that, from the call that sends a frame over
+   LSL in another process. Then 1000 Hz.
 2. At full speed: frames a second, and memory.
 3. Faults of source, servo, program and disk, each at random instants: state that the
    loop ends in, time until then against the stated one, commands beyond the limits of
@@ -50,22 +50,15 @@ def ready(folder: Path) -> None:
     person.load(folder)
 
 
-def paces(
-    pool: Executor, folder: Path, seconds: float, fast: float, sessions: list[bool]
-) -> dict[str, Any]:
-    """At the cameras' pace."""
+def paces(pool: Executor, folder: Path, seconds: float, fast: float) -> dict[str, Any]:
+    """At the cameras' pace, with a session."""
     wanted = {
-        f"{where}, 100 Hz, {'with' if session else 'no'} session": pool.submit(
-            go, folder, 100.0, seconds, session
-        )
-        for where, go in (("in process", pace.replayed), ("over LSL", pace.over_lsl))
-        for session in sessions
+        "in process, 100 Hz": pool.submit(pace.replayed, folder, 100.0, seconds, True),
+        "over LSL, 100 Hz": pool.submit(pace.over_lsl, folder, 100.0, seconds, True),
     }
     found = {name: future.result() for name, future in wanted.items()}
-    for session in sessions:
-        name = f"in process, 1000 Hz, {'with' if session else 'no'} session"
-        run = pool.submit(pace.replayed, folder, 1000.0, fast, session)
-        found[name] = run.result()
+    run = pool.submit(pace.replayed, folder, 1000.0, fast, True)
+    found["in process, 1000 Hz"] = run.result()
     return {name: asdict(one) for name, one in found.items()}
 
 
@@ -255,8 +248,7 @@ def main() -> None:
             options.jobs, mp_context=context, initializer=ready, initargs=(folder,)
         ) as pool:
             if "pace" in only:
-                sessions = [True] if options.quick else [False, True]
-                found["pace"] = paces(pool, folder, seconds, fast, sessions)
+                found["pace"] = paces(pool, folder, seconds, fast)
             if "speed" in only:
                 found["speed"] = speeds(pool, folder, frames)
             if places := [place for place in PLACES if place in only]:

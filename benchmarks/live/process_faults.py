@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ikns.errors import IknsError
 from ikns.finger import DynamixelFinger, SimulatedFinger
 from ikns.finger.servo import Servo, Wire
 from ikns.runtime import Status, run
@@ -169,6 +170,7 @@ def kill(
     """Send a signal to a program that drives a servo; also return the seconds lost."""
     rng = np.random.default_rng(seed)
     number, context = _SIGNALS[name], get_context("forkserver")
+    expected = "stopped" if number == signal.SIGKILL else "relaxed"
     lost = math.nan
     with tempfile.TemporaryDirectory() as scratch:
         session = Path(scratch) / "session" if session is None else session
@@ -180,7 +182,10 @@ def kill(
             )
             child.start()
             theirs.close()
-            began = ours.recv()
+            began = _told(ours)
+            if isinstance(began, str):  # it never came to drive anything
+                child.join(10)
+                return Outcome(name, expected, began, {}, {}, 0, ""), lost
             canary.begin()
             time.sleep(rng.uniform(0.3, 2.5))
             # A child that the machine kept from running is safe before it is struck.
@@ -205,7 +210,6 @@ def kill(
         except Exception as error:
             wrong = str(error)
     remarks = () if torque is False else ("the servo was left pushing.",)
-    expected = "stopped" if number == signal.SIGKILL else "relaxed"
     promised = {"safe": _LEAVE if number == signal.SIGTERM else WATCHDOG}
     outcome = Outcome(
         name,
@@ -221,6 +225,15 @@ def kill(
     return outcome, lost
 
 
+def _told(child: Connection) -> float | str:
+    """When the child's run began, s, or what kept it from beginning."""
+    try:
+        told = child.recv()
+    except EOFError:
+        return "the program died before it drove the finger."
+    return told if isinstance(told, float) else str(told)
+
+
 def _drive(folder: Path, session: Path, port: str, tell: Connection) -> None:
     """Do what `ikns run` does, until stopped."""
     sys.stdout = sys.stderr = Path(os.devnull).open("w", encoding="utf-8")
@@ -233,13 +246,18 @@ def _drive(folder: Path, session: Path, port: str, tell: Connection) -> None:
             told = True
             tell.send(time.monotonic() - status.time)
 
-    with session_for(session, subject, folder / "person", recording) as writer:
-        with Source(Replay(recording, loop=True)) as source:
-            run(
-                source,
-                subject,
-                DynamixelFinger(port),
-                session=writer,
-                on_status=note,
-                status_every=0.05,
-            )
+    try:
+        with session_for(session, subject, folder / "person", recording) as writer:
+            with Source(Replay(recording, loop=True)) as source:
+                run(
+                    source,
+                    subject,
+                    DynamixelFinger(port),
+                    session=writer,
+                    on_status=note,
+                    status_every=0.05,
+                )
+    except (IknsError, OSError) as error:
+        if told:
+            raise
+        tell.send(f"did not begin: {error}")
