@@ -1,5 +1,7 @@
 """Tables from visits on disk, against what was put there."""
 
+import csv
+import io
 import json
 import pickle
 from collections import Counter
@@ -24,7 +26,7 @@ from ikns.experiments.statistics import (
 from ikns.experiments.study import init_study
 from ikns.experiments.summary import RunningError, cells, digest_visit, summarize
 from ikns.experiments.summary.answers import picking_answer, tracking_answer
-from ikns.experiments.summary.numbers import numbers, trials_csv
+from ikns.experiments.summary.numbers import error_csv, numbers, trials_csv
 from ikns.experiments.tracking import (
     draw_profile,
     measure,
@@ -222,6 +224,11 @@ def test_people_and_simulated_participants_are_never_added_up(tmp_path):
     assert second.tracking.participants == ["03", "04", "05"]
     assert cell(first.tracking.rmse, "ikns").over.mean == pytest.approx(1)
     assert cell(second.tracking.rmse, "ikns").over.mean == pytest.approx(5)
+    rows = csv.DictReader(io.StringIO(error_csv(summarize(tmp_path))))
+    for row in rows:
+        size, n = {"no": (1, 2), "yes": (5, 3)}[row["simulated"]]
+        assert float(row["mean"]) == pytest.approx(size, abs=0.005)
+        assert int(row["n"]) == n
     lines = trials_csv(summarize(tmp_path), "tracking").splitlines()
     assert [line.split(",")[0] for line in lines] == [
         "simulated",
@@ -289,6 +296,32 @@ def test_visits_that_cannot_be_used_are_left_out_with_their_reason(tmp_path):
         (tmp_path / "visits" / name / "visit.json").write_text("{}")
     with pytest.raises(FileError, match=r"expected a visit .*and 3 more"):
         summarize(tmp_path)
+
+
+def test_frames_that_do_not_follow_one_another_are_refused_with_their_visit(tmp_path):
+    good = small.attempt(1, "ikns", "T1", small.off_by(1))
+    short = {**good, "c": good["c"][:-1]}
+    back = {**good, "time": good["time"][::-1]}
+    strange = {**good, "trajectory": "T9"}
+    for who, row in enumerate((good, short, back, strange), start=1):
+        small.visit(tmp_path, who, "tracking", [row])
+    for who, time in ((1, np.nan), (2, -1.0)):
+        rows = small.picking_rows({("ikns", "A"): ("success", time)})
+        small.visit(tmp_path, who, "picking", rows)
+    summary = summarize(tmp_path)
+    assert summary.visits == 1
+    assert len(summary.left_out) == 5
+    for each in summary.left_out:
+        assert each.reason.startswith(f"{each.folder}: ")
+
+
+def test_trajectories_done_in_one_condition_only_are_counted(tmp_path):
+    for who in (1, 2, 3):
+        errors = {key: 1.0 + who for key in BOTH[: 4 - who // 2]}
+        small.tracking(tmp_path, who, errors | {("gamepad", "T1"): 1.5})
+    (compared,) = group(tmp_path).tracking.comparisons
+    assert (compared.subjects, compared.alone) == (3, 2)
+    assert compared.analysis.subjects.pairs == 3
 
 
 def test_a_study_without_visits_is_refused(tmp_path):

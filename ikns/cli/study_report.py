@@ -22,9 +22,13 @@ def report(
         Path | None,
         typer.Option(help="Folder to write; by default `report` in the study."),
     ] = None,
-    workers: Annotated[
+    jobs: Annotated[
         int | None,
-        typer.Option(min=1, help="Processes that read visits; same result with any."),
+        typer.Option(
+            min=-1,
+            help="Processes that read visits; -1: one for each core, which many "
+            "visits have by themselves.",
+        ),
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -42,7 +46,7 @@ def report(
     if study.is_dir():  # else it is the study that is missing, not where to write
         check_output_folder(place, report_files(), force=force)
     with progress() as told:
-        summary = summarize(study, workers=workers, progress=told)
+        summary = summarize(study, workers=jobs, progress=told)
         with output_folder(place) as folder:
             write_study_report(folder, summary, progress=told)
     page = place / "report.html"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.errors import IknsError, NotEnoughData
+from ikns.errors import FileError, IknsError, NotEnoughData, naming
 from ikns.experiments.tracking import error_over_time, measure
 from ikns.experiments.visits import (
     VisitRecord,
@@ -107,10 +107,11 @@ class Digest:
 def digest_visit(folder: Path) -> Digest | LeftOut:
     """Read a visit, measure its trials, and let the rest go."""
     try:
-        visit = read_visit(folder)
-        if visit.about["experiment"] == "tracking":
-            return _tracking(visit)
-        return _picking(visit)
+        with naming(str(folder)):
+            visit = read_visit(folder)
+            if visit.about["experiment"] == "tracking":
+                return _tracking(visit)
+            return _picking(visit)
     except IknsError as error:
         return LeftOut(folder, str(error))
 
@@ -119,6 +120,7 @@ def _tracking(visit: VisitRecord) -> Digest:
     digest = _begun(visit, TRACKING)
     traces: dict[tuple[str, str, float], list[Array]] = {}
     for row, trial in _trials(visit, ("done",)):
+        _check_trace(row)
         record = tracking_record(row)
         try:
             found = measure(record)
@@ -144,6 +146,12 @@ def _tracking(visit: VisitRecord) -> Digest:
 def _picking(visit: VisitRecord) -> Digest:
     digest = _begun(visit, PICKING)
     for row, trial in _trials(visit, ("success", "dropped", "timeout")):
+        time, limit = row["time"], row["limit"]
+        if row["outcome"] == "success" and not 0 <= time < np.inf or not limit > 0:
+            raise FileError(
+                f"expected a time of success from 0 s and a limit above 0 s, found "
+                f"{time:g} and {limit:g} in attempt {row['number']}."
+            )
         _append(
             digest.table,
             _who(digest, row)
@@ -152,6 +160,20 @@ def _picking(visit: VisitRecord) -> Digest:
             | {"success": row["outcome"] == "success"},
         )
     return digest
+
+
+def _check_trace(row: dict[str, Any]) -> None:
+    """Refuse frames that do not follow one another."""
+    time, c = row["time"], row["c"]
+    if (
+        len(time) != len(c)
+        or not np.all(np.diff(time) > 0)
+        or not np.isfinite(time).all()
+    ):
+        raise FileError(
+            "expected increasing times and as many values of c, found "
+            f"{len(time)} and {len(c)} in attempt {row['number']}."
+        )
 
 
 def _begun(visit: VisitRecord, columns: tuple[str, ...]) -> Digest:

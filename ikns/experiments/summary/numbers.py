@@ -15,7 +15,7 @@ from ikns.experiments.summary.picking import PickingSummary
 from ikns.experiments.summary.study import Group, StudySummary
 from ikns.experiments.summary.tracking import TrackingSummary
 
-__all__ = ["numbers", "trials_csv"]
+__all__ = ["error_csv", "numbers", "trials_csv"]
 
 
 def numbers(summary: StudySummary) -> dict[str, Any]:
@@ -54,6 +54,31 @@ def trials_csv(summary: StudySummary, experiment: str) -> str:
         said = "yes" if group.simulated else "no"
         for row in zip(*(v.tolist() for v in found.table.values()), strict=True):
             writer.writerow([said, *("" if cell != cell else cell for cell in row)])
+    return text.getvalue()
+
+
+def error_csv(summary: StudySummary) -> str:
+    """Return the error over time of tracking as CSV, people first; or nothing.
+
+    Per condition, trajectory and time (s): how many participants, mean, standard
+    deviation and percentiles of pointer less target, of 100.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = ("time", "count", "mean", "deviation", "low", "middle", "high")
+    header = ("simulated", "condition", "trajectory", "time_s", "n", *names[2:4])
+    for group in summary.groups:
+        for (condition, trajectory), error in (
+            {} if group.tracking is None else group.tracking.errors
+        ).items():
+            if header:
+                writer.writerow([*header, "p10", "p50", "p90"])
+                header = ()
+            columns = [getattr(error, name).tolist() for name in names]
+            said = "yes" if group.simulated else "no"
+            for row in zip(*columns, strict=True):
+                cells = ["" if cell != cell else cell for cell in row]
+                writer.writerow([said, condition, trajectory, *cells])
     return text.getvalue()
 
 

@@ -78,8 +78,8 @@ def summarize(
     folder : str or Path
         A study, or a single visit.
     workers : int, optional
-        Processes that read visits; by default one for few visits, else one a core. The
-        result does not depend on it.
+        Processes that read visits, -1: one a core; by default one for few visits, else
+        one a core. The result does not depend on it.
     progress : callable
         Told (step, done, total).
 

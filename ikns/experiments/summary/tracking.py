@@ -46,12 +46,16 @@ class Comparison:
         "Not tested: ..." where there is no analysis.
     subjects : int
         With trials in both conditions.
+    alone : int
+        Trajectories of a participant that were done in one condition only, and are in
+        no paired test.
     """
 
     names: tuple[str, str]
     analysis: TrackingAnalysis | None
     why: str
     subjects: int
+    alone: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +227,11 @@ def compared(
             )
         except IknsError as error:
             why = f"Not tested: {error}"
-    return Comparison(names, analysis, why, subjects)
+    places = [
+        set(zip(trials["subject"][own], trials["trajectory"][own], strict=True))
+        for own in (trials["condition"] == name for name in names)
+    ]
+    return Comparison(names, analysis, why, subjects, len(places[0] ^ places[1]))
 
 
 def not_tested(names: tuple[str, str], people: list[int], both: int) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ikns.experiments.summary import Group, StudySummary
-from ikns.experiments.summary.numbers import numbers, trials_csv
+from ikns.experiments.summary.numbers import error_csv, numbers, trials_csv
 from ikns.view.parts import Section, Step
 from ikns.view.render import pdf, svg
 from ikns.view.study_report.map_section import map_drawn, map_section
@@ -31,7 +31,11 @@ from ikns.view.study_report.tracking_sections import (
 __all__ = ["report_files", "study_page", "write_study_report"]
 
 _PAGE, _NUMBERS = "report.html", "numbers.json"
-_TABLES = ("tables/tracking.csv", "tables/picking.csv")
+_TABLES: dict[str, Callable[[StudySummary], str]] = {
+    "tables/tracking.csv": lambda summary: trials_csv(summary, "tracking"),
+    "tables/picking.csv": lambda summary: trials_csv(summary, "picking"),
+    "tables/tracking_error.csv": error_csv,
+}
 _FIGURES = (
     "tracking_traces",
     "tracking_error",
@@ -103,8 +107,8 @@ def write_study_report(
     text = json.dumps(_plain(numbers(summary)), indent=1, allow_nan=False)
     (folder / _NUMBERS).write_text(text + "\n", encoding="utf-8")
     (folder / "tables").mkdir()
-    for name in _TABLES:
-        table = trials_csv(summary, Path(name).stem)
+    for name, made in _TABLES.items():
+        table = made(summary)
         if table:
             (folder / name).write_text(table, encoding="utf-8", newline="")
 
