@@ -271,6 +271,7 @@ def test_a_pilot_s_spread_is_measured_again_from_its_visits(pilots):
     assert low == pytest.approx(deviation * math.sqrt(3 / stats.chi2.ppf(0.975, 3)))
     assert high == pytest.approx(deviation * math.sqrt(3 / stats.chi2.ppf(0.025, 3)))
     assert told["spread"]["pilot_simulated"] is False
+    assert told["spread"]["source"] == "a pilot with 4 subjects"
     assert told["warnings"] == []
 
 
@@ -291,6 +292,7 @@ def test_a_simulated_pilot_is_called_simulated(pilots, tmp_path):
     assert told["spread"]["pilot_simulated"] is True
     text = " ".join(run(*argv, "--figure", picture).split())
     assert f"the pilot {pilots / 'virtual'} is simulated" in text
+    assert "(a simulated pilot with 4 subjects;" in text
     assert picture.read_bytes().startswith(b"<?xml")
     with pytest.raises(InvalidInput, match="--force"):
         run(*argv, "--figure", picture)

@@ -323,7 +323,11 @@ def _of_pilot(pilot: Path, design: _Design, report: Any) -> _Assumed:
         trials = {**trials, "time": late}
     with naming(str(pilot)):
         found = pilot_spread(
-            trials, value, level=level, conditions=design.conditions or _two(part)
+            trials,
+            value,
+            level=level,
+            conditions=design.conditions or _two(part),
+            simulated=part.simulated,
         )
     warned = [left.reason for left in summary.left_out]
     if groups[0].simulated:

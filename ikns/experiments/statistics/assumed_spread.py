@@ -95,6 +95,7 @@ def pilot_spread(
     *,
     level: str,
     conditions: Sequence[str] | None = None,
+    simulated: bool = False,
 ) -> AssumedSpread:
     """Take the spread apart that a pilot study found.
 
@@ -112,6 +113,8 @@ def pilot_spread(
         Column of the trajectory or object.
     conditions : (str, str), optional
         First and second of the difference.
+    simulated : bool
+        Whether the subjects are virtual; the source says so.
 
     Raises
     ------
@@ -155,7 +158,7 @@ def pilot_spread(
     low, high = (deviation * math.sqrt((n - 1) / q) for q in chi2.tolist())
     return AssumedSpread(
         Spread(*(math.sqrt(part) for part in parts)),
-        f"a pilot with {n} subjects",
+        f"a {'simulated ' * simulated}pilot with {n} subjects",
         deviation,
         low,
         high,
