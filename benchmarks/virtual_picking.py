@@ -26,8 +26,10 @@ import argparse
 import json
 import os
 import platform
+import re
 import sys
 import time
+from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
@@ -93,7 +95,7 @@ def gather(people: list[dict], way: str, code: str | None = None) -> dict:
         "successes": len(good),
         "time": float(np.mean(good)) if good else None,
         "time_sd": float(np.std(good, ddof=1)) if len(good) > 1 else None,
-        "why": sorted({row["why"] for row in rows if row["why"]}),
+        "why": [re.sub(r" \d+ cm", "", row["why"]) for row in rows if row["why"]],
         "grip_N": middle("peak_grip_N"),
         "slip_mm": 1e3 * middle("slip_m"),
         "held": middle("hold_share"),
@@ -161,7 +163,8 @@ def conclude(table: dict, people: list[dict]) -> str:
         way: float(np.mean([s for p in people for s in p["cpu_s"][way]]))
         for way in ("finger", "ring")
     }
-    reasons = sorted({why for cell in table["ways"].values() for why in cell["why"]})
+    faults = Counter(why for cell in table["ways"].values() for why in cell["why"])
+    reasons = [f"{why} ({n} times)" for why, n in faults.most_common()]
     return "\n".join(
         [
             f"Carried over the table with the elbow held, c strays by "
@@ -175,7 +178,9 @@ def conclude(table: dict, people: list[dict]) -> str:
                 for cell in [table["ways"][f"planted {fall:g}"]]
             )[:-1]
             + ".",
-            "What went wrong: " + ("; ".join(reasons) if reasons else "nothing") + ".",
+            "What went wrong, all ways together: "
+            + ("; ".join(reasons) if reasons else "nothing")
+            + ".",
             "Friction, the finger's springs and effort, where people put the hand, how "
             "they decide, how long they look, and how far they aim beyond the contact "
             "are free and mostly assumed; none was fitted to the paper's times or "
