@@ -10,6 +10,8 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ikns.errors import IknsError, InvalidInput
 from ikns.experiments.picking.schedule import PickStep
 from ikns.experiments.study.declaration import Study
@@ -27,7 +29,7 @@ __all__ = ["Cell", "Task", "simulate", "visit_name"]
 S = TypeVar("S", Step, PickStep)
 
 #: What keeps one virtual person from taking part, without being a fault of the program.
-_FAULTS = (IknsError, ArithmeticError)
+_FAULTS = (IknsError, ArithmeticError, np.linalg.LinAlgError)
 _INPUTS = {
     "ikns": "virtual operator through body, cameras and map (simulated)",
     "gamepad": "virtual operator with a stick, direct (simulated)",
