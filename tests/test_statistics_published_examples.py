@@ -17,6 +17,7 @@ from ikns.experiments.statistics import (
     cohens_dz,
     exact_sign,
     learning_curves,
+    mixed_model,
     normality,
     pair_arrays,
     pooled_t,
@@ -185,3 +186,31 @@ def test_the_learning_curve_is_that_of_scipy_s_curve_fit() -> None:
     assert (curve.gain, 49 / 4 / curve.rate, curve.final) == pytest.approx(
         (2.5, 1.3, 0.5), rel=1e-4
     )
+
+
+def test_the_mixed_model_has_the_f_of_statsmodels_repeated_measures() -> None:
+    # statsmodels/stats/tests/test_anova_rm.py, two factors, from R's ezANOVA: with
+    # nothing missing the condition's F is the square of the mixed model's t.
+    cells = {
+        ("first", "a"): [7, 3, 6, 6, 5, 8, 6, 7],
+        ("first", "b"): [7, 11, 9, 11, 10, 10, 11, 11],
+        ("first", "c"): [8, 14, 10, 11, 12, 10, 11, 12],
+        ("second", "a"): [16, 7, 11, 9, 10, 11, 8, 8],
+        ("second", "b"): [16, 10, 13, 10, 10, 14, 11, 12],
+        ("second", "c"): [24, 29, 10, 22, 25, 28, 22, 24],
+    }
+    rows = [
+        (who, condition, level, float(value))
+        for (condition, level), values in cells.items()
+        for who, value in enumerate(values)
+    ]
+    names = ("subject", "condition", "trajectory", "value")
+    table = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+    found = mixed_model(table, "value")
+    assert found.structure == "random condition per subject"
+    assert found.condition is not None
+    t = found.condition.estimate / found.condition.error
+    # The optimizer stops at a gradient of 1e-5 or so, which leaves 1e-3 of an error.
+    assert t**2 == pytest.approx(40.14159, rel=2e-3)
+    assert found.condition.p == pytest.approx(3.905263e-04, rel=5e-3)
+    assert found.condition.degrees == 7

@@ -41,6 +41,7 @@ Array = NDArray[np.float64]
 _FULL = "random intercept and condition per subject"
 _UNCORRELATED = "random intercept and condition per subject, uncorrelated"
 _INTERCEPT = "random intercept per subject"
+_CONDITION = "random condition per subject"
 
 
 @dataclass(frozen=True)
@@ -136,8 +137,8 @@ def mixed_model(
     """Fit condition x level with random subjects; simpler when that does not converge.
 
     Tried in order, the first that converges counts: intercept and condition per
-    subject; the same uncorrelated; an intercept per subject. The result says which, and
-    why. Trials need not be balanced.
+    subject; the same uncorrelated; one of the two alone, whichever is likelier. The
+    result says which, and why. Trials need not be balanced.
 
     Parameters
     ----------
@@ -240,7 +241,8 @@ def mixed_model(
         )
         interaction = float(stats.f.sf(wald / extra, extra, extra * degrees))
     last = design.shape[1] - 1
-    random = np.sqrt(np.maximum(np.diag(np.atleast_2d(fit.cov_re)), 0.0)) * scale
+    parts = np.sqrt(np.maximum(np.diag(np.atleast_2d(fit.cov_re)), 0.0)) * scale
+    own = (0.0, parts[0]) if structure == _CONDITION else (*parts, 0.0)
     return MixedModel(
         condition=coefficient(1, degrees),
         interaction_p=interaction,
@@ -248,8 +250,8 @@ def mixed_model(
         trial=None
         if trial is None
         else coefficient(last, max(len(y) - last - 1 - 2 * degrees, 1)),
-        subject_deviation=float(random[0]),
-        slope_deviation=float(random[1]) if len(random) > 1 else 0.0,
+        subject_deviation=float(own[0]),
+        slope_deviation=float(own[1]),
         noise_deviation=math.sqrt(float(fit.scale)) * scale,
         structure=structure,
         **about,
@@ -257,17 +259,13 @@ def mixed_model(
 
 
 def _fit(y: Array, design: Array, x: Array, who: NDArray[np.str_]) -> Any:
-    """First of three random structures that converges, its name, why not the full."""
+    """Fit the first structure that converges; its name, and why it is not the full."""
     library = statsmodels("regression.mixed_linear_model")
     both = np.column_stack([np.ones(len(y)), x])
     fixed = np.ones(design.shape[1])
     free = library.MixedLMParams.from_components(fe_params=fixed, cov_re=np.eye(2))
-    failed: list[str] = []
-    for name, random, keep in (
-        (_FULL, both, None),
-        (_UNCORRELATED, both, free),
-        (_INTERCEPT, None, None),
-    ):
+
+    def fitted(random: Array | None, keep: Any) -> Any:
         with warnings.catch_warnings():
             # What they say is asked of the result below.
             warnings.simplefilter("ignore")
@@ -280,8 +278,21 @@ def _fit(y: Array, design: Array, x: Array, who: NDArray[np.str_]) -> Any:
                 )
             except (np.linalg.LinAlgError, ValueError):
                 good = False
-        if good:
-            why = f"{failed[0]} did not converge" if failed else ""
-            return fit, name, why
-        failed.append(name)
-    return None, "none", "no mixed model converged, so look at the subject means"
+        return fit if good else None
+
+    for name, keep in ((_FULL, None), (_UNCORRELATED, free)):
+        fit = fitted(both, keep)
+        if fit is not None:
+            return fit, name, "" if name == _FULL else f"{_FULL} did not converge"
+    # With the same fixed effects, restricted likelihoods compare. An intercept alone
+    # would count trials as independent evidence even where subjects differ in how the
+    # condition suits them.
+    alone = [
+        (fit.llf, name, fit)
+        for name, random in ((_INTERCEPT, None), (_CONDITION, x[:, None]))
+        if (fit := fitted(random, None)) is not None
+    ]
+    if not alone:
+        return None, "none", "no mixed model converged, so look at the subject means"
+    _, name, fit = max(alone, key=lambda each: each[0])
+    return fit, name, f"{_FULL} did not converge"
