@@ -176,6 +176,7 @@ def kill(
         session = Path(scratch) / "session" if session is None else session
         servo = Servo("xl430")
         with Canary() as canary, Wire(servo) as wire:
+            context.set_forkserver_preload(["ikns.runtime", "ikns.calibration"])
             ours, theirs = context.Pipe()
             child = context.Process(
                 target=_drive, args=(folder, session, wire.port, theirs)
