@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -157,10 +158,15 @@ def track(
         )
     steps = schedule(who.number, **design)
 
+    if not (0 <= wait < math.inf and 0 <= design["rest"] < math.inf):
+        raise InvalidInput(
+            f"expected --align and --rest from 0 s, found {wait:g} and "
+            f"{design['rest']:g}."
+        )
+
     def make_desk(rows: Sequence[Mapping[str, Any]]) -> Desk:
         return TrackingDesk(steps, rows, align=wait)
 
-    make_desk([])  # whatever is impossible is told before anything is written
     conduct(
         who,
         Arm(

@@ -396,7 +396,9 @@ class Conductor:
             "page": self._page,
             "message": self._message,
             "fault": self.book.fault or self._drive_fault,
-            "can_connect": bool(self._drive_fault),
+            "can_connect": bool(
+                self._drive_fault or self._drive.get("state") == "safe"
+            ),
             "drive": dict(self._drive),
             "attempts": self.results[-_LISTED:],
             "plan": self.plan["version"],
