@@ -117,7 +117,7 @@ def track(
     on disk when it ends; Ctrl-C breaks off, and the same command goes on.
     """
     from ikns.experiments.conduct import Desk, TrackingDesk
-    from ikns.experiments.tracking import schedule
+    from ikns.experiments.tracking import draw_profile, schedule
 
     who = whose(
         visit, study, experiment="tracking", participant=participant, number=number
@@ -156,8 +156,14 @@ def track(
         raise InvalidInput(
             f"expected conditions of {', '.join(_INPUTS)}, found '{strangers[0]}'."
         )
+    if not 0 <= design["seed"] < 2**32:
+        raise InvalidInput(
+            f"expected a --seed from 0 to below 2**32, found {design['seed']}."
+        )
     steps = schedule(who.number, **design)
-
+    for step in steps:  # whatever is impossible is told before anything is written
+        if step.kind != "rest":
+            draw_profile(step.profile, step.seed, seconds=step.seconds)
     if not (0 <= wait < math.inf and 0 <= design["rest"] < math.inf):
         raise InvalidInput(
             f"expected --align and --rest from 0 s, found {wait:g} and "

@@ -160,7 +160,7 @@ def whose(
     who = str(chosen(participant, stored, "participant", "01"))
     if not (who.isascii() and who.isalnum()):
         raise InvalidInput(
-            f"expected a participant of letters and digits, not '{who}'."
+            f"expected a participant of letters and digits, found '{who}'."
         )
     place = chosen(number, stored, "participant_number", None)
     if place is None:

@@ -214,6 +214,8 @@ def check_port(host: str, port: int) -> None:
 
 def _listening(host: str, port: int) -> socket.socket:
     try:
+        if not 0 <= port < 2**16:  # some systems would take the rest of it
+            raise OverflowError("expected 0 to 65535")
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         made = socket.create_server(found[4][:2], family=found[0])
     except (OSError, OverflowError, UnicodeError) as error:
