@@ -184,7 +184,7 @@ participants = 4
 [tracking]
 conditions = ["keyboard", "mouse"]
 repeats = 1
-seconds = 12.0
+seconds = 25.0
 align = 1.5
 training = 0
 """

@@ -92,7 +92,8 @@ class LiveDriver:
             else:
                 self.fault = f"{source.name} has ended."
             finally:  # whatever it was, nobody must wait for frames
-                self.fault = self.fault or "the live loop failed."
+                asked = self.report is not None and self._stop.is_set()
+                self.fault = "" if asked else self.fault or "the live loop failed."
 
         self._thread = threading.Thread(target=loop, name="ikns loop", daemon=True)
         self._thread.start()

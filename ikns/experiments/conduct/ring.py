@@ -83,7 +83,8 @@ class RingDriver:
         except (IknsError, OSError) as error:
             self.fault = str(error)
         finally:
-            self.fault = self.fault or "the ring button is not listened to any more."
+            if not self._stop.is_set():
+                self.fault = self.fault or "the ring button is not listened to."
 
     def _go_on(self) -> None:
         while not self._presses.empty():  # of before
