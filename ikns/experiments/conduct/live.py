@@ -90,10 +90,12 @@ class LiveDriver:
             except (IknsError, OSError) as error:
                 self.fault = str(error)
             else:
-                self.fault = f"{source.name} has ended."
+                # Asked to stop it has no fault.
+                ended = f"{source.name} has ended."
+                self.fault = "" if self._stop.is_set() else ended
             finally:  # whatever it was, nobody must wait for frames
-                asked = self.report is not None and self._stop.is_set()
-                self.fault = "" if asked else self.fault or "the live loop failed."
+                if self.report is None and not self.fault:
+                    self.fault = "the live loop failed."
 
         self._thread = threading.Thread(target=loop, name="ikns loop", daemon=True)
         self._thread.start()
