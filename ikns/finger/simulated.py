@@ -14,13 +14,13 @@ from ikns.finger.guard import Guard, Safety
 from ikns.finger.leaving import forget, relax_at_exit
 from ikns.finger.state import FingerState
 
-__all__ = ["SimulatedFinger"]
+__all__ = ["FOLLOW", "SPEED", "SPIN", "YIELD", "SimulatedFinger"]
 
 # A servo that closes the finger with half a turn, ours, after an XL430-W250 (57 rev/min
 # and 1.3 A at 11.1 V): flexion per second, amperes at a standstill, seconds to follow
 # and to change speed, flexion of error at which it pushes as hard as it may.
-_SPEED, _STALL_CURRENT = 1.9, 1.3
-_FOLLOW, _SPIN, _YIELD = 0.03, 0.01, 0.1
+SPEED, _STALL_CURRENT = 1.9, 1.3
+FOLLOW, SPIN, YIELD = 0.03, 0.01, 0.1
 _FRICTION = 0.1  # share of full effort that moving costs
 _STEP = 1e-3
 #: A finger slower than this is said to rest, flexion per second.
@@ -184,8 +184,8 @@ class SimulatedFinger:
             return
         limit = self._effort_limit
         error = goal - self._flexion
-        wanted = min(max(error / _FOLLOW, -_SPEED), _SPEED)
-        self._velocity += (wanted - self._velocity) * min(dt / _SPIN, 1.0)
+        wanted = min(max(error / FOLLOW, -SPEED), SPEED)
+        self._velocity += (wanted - self._velocity) * min(dt / SPIN, 1.0)
         if abs(error) < 1e-9 and abs(self._velocity) < 1e-6:
             self._velocity = 0.0
         flexion = self._flexion + self._velocity * dt
@@ -195,5 +195,5 @@ class SimulatedFinger:
         if flexion > contact:
             flexion, self._velocity = contact, 0.0
         self._flexion = flexion
-        push = error / _YIELD + _FRICTION * self._velocity / _SPEED
+        push = error / YIELD + _FRICTION * self._velocity / SPEED
         self._effort = min(max(push, -limit), limit)

@@ -12,9 +12,7 @@ from ikns.errors import InvalidInput
 
 # The simulated finger's motor is this one's, too.
 from ikns.finger.guard import Guard, Safety
-from ikns.finger.simulated import _FOLLOW as FOLLOW
-from ikns.finger.simulated import _SPEED as SPEED
-from ikns.finger.simulated import _SPIN as SPIN
+from ikns.finger.simulated import FOLLOW, SPEED, SPIN
 from ikns.simulation.grasp.parts import Solid, constant, finger_parts
 from ikns.simulation.grasp.world import world_model
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from ikns.errors import InvalidInput
 from ikns.finger.chain import WIDEST
-from ikns.finger.simulated import _YIELD as YIELD
+from ikns.finger.simulated import YIELD
 from ikns.simulation.grasp.parts import Solid, constant, finger_parts, hand_size
 
 __all__ = ["CLEAR", "grip_height", "object_in_gripper", "world_model"]
