@@ -213,25 +213,38 @@ def compared(
     why = not_tested(names, [len(side) for side in both], subjects)
     analysis = None
     if not why:
-        kept = np.isin(trials["condition"], names)
-        rows = _rows(trials, kept)
-        try:
-            analysis = analyze_tracking(
-                {**rows, "RMSE": rows["rmse"]},  # as sentences call it
-                margin=margin,
-                value="RMSE",
-                unit=UNITS["rmse"],
-                trial="trial" if np.ptp(rows["trial"]) > 0 else None,
-                conditions=names,
-                unequal="keep",
-            )
-        except IknsError as error:
-            why = f"Not tested: {error}"
+        rows = _rows(trials, np.isin(trials["condition"], names))
+        analysis, why = _analyzed(rows, names, margin)
     places = [
         set(zip(trials["subject"][own], trials["trajectory"][own], strict=True))
         for own in (trials["condition"] == name for name in names)
     ]
     return Comparison(names, analysis, why, subjects, len(places[0] ^ places[1]))
+
+
+def _analyzed(
+    rows: Columns, names: tuple[str, str], margin: float | None
+) -> tuple[TrackingAnalysis | None, str]:
+    """All tests; without the trial's number where trajectories cannot be told from it.
+
+    So it is with one repeat in the same order for everybody, and learning then cannot
+    be told either.
+    """
+    why = ""
+    for trial in ("trial", None):
+        try:
+            return analyze_tracking(
+                {**rows, "RMSE": rows["rmse"]},  # as sentences call it
+                margin=margin,
+                value="RMSE",
+                unit=UNITS["rmse"],
+                trial=trial,
+                conditions=names,
+                unequal="keep",
+            ), ""
+        except IknsError as error:
+            why = f"Not tested: {error}"
+    return None, why
 
 
 def not_tested(names: tuple[str, str], people: list[int], both: int) -> str:
