@@ -264,6 +264,22 @@ def test_the_methods_are_written_from_the_configuration(simulated):
     assert "t = 0.27 gives p = 0.789" in text  # the paper, examined again
 
 
+def test_the_methods_hide_neither_settings_nor_what_was_not_simulated(tmp_path):
+    errors = {("ikns", "T1"): 2.0}
+    small.tracking(
+        tmp_path,
+        1,
+        errors,
+        design={"training": 10},
+        training="counted, not simulated",
+        parameters={"marker_noise": 0.001},
+    )
+    (group,) = numbers(summarize(tmp_path))["groups"]
+    text = " ".join(group["methods"])
+    assert "Parameters of the simulation: marker_noise = 0.001." in text
+    assert "do not count (training: counted, not simulated)." in text
+
+
 def test_numbers_and_trials_for_other_programs_are_those_of_the_summary(simulated):
     summary, _, _ = simulated
     (group,) = numbers(summary)["groups"]

@@ -22,7 +22,7 @@ from ikns.experiments.summary.running import ErrorOverTime, RunningError
 __all__ = ["Gathered"]
 
 #: What visits say of themselves that the methods tell, and of how many that differ.
-_SAID, _MOST_SAID = ("design", "versions", "input"), 10
+_SAID, _MOST_SAID = ("design", "versions", "input", "training", "parameters"), 10
 
 
 class Gathered:
@@ -38,7 +38,8 @@ class Gathered:
     attempts : Counter
         By (condition, kind, outcome).
     abouts : list of dict
-        What visits say of design, versions and input, once each; the first ten.
+        What visits say of design, versions, input and simulation, once each; the first
+        ten.
     unmeasured : list of str
     sessions : dict of (variation, participant) to str
         Of visits that recorded one, relative to the visit.

@@ -70,9 +70,12 @@ def _participants(group: Group) -> str:
         if redrawn
         else ""
     )
+    first = next((each.said[0] for each in both if each.said), {})
+    settings = setting_text(first.get("parameters") or {})
+    more = f" Parameters of the simulation: {settings}." if settings else ""
     return (
         f"No person took part: {' and '.join(counts)}, each a virtual body and a model "
-        f"of a human operator whose parameters are from the literature.{again}"
+        f"of a human operator whose parameters are from the literature.{again}{more}"
     )
 
 
@@ -93,7 +96,7 @@ def _tracking(found: TrackingSummary) -> str:
             "" if align is None else f"{number(float(align), 's')} to align and then "
         )
         parts.append(f"A trial gave {before}{number(float(seconds), 's')} to track.")
-    parts += _block(said, "every curve")
+    parts += _block(said, "every curve", _training(found.said))
     parts.append(_order(found.conditions, "curves"))
     return " ".join(part for part in parts if part) + _inputs(found.said)
 
@@ -109,12 +112,18 @@ def _picking(found: PickingSummary) -> str:
             f"A trial ended with success, with the object dropped, or after "
             f"{number(found.limit, 's')}."
         )
-    parts += _block(said, "every object")
+    parts += _block(said, "every object", _training(found.said))
     parts.append(_order(found.conditions, "objects"))
     return " ".join(part for part in parts if part) + _inputs(found.said)
 
 
-def _block(said: Mapping[str, Any], each: str) -> list[str]:
+def _training(said: list[dict[str, Any]]) -> str:
+    """Say how visits trained, where they did not as a person would."""
+    told = {str(each["training"]) for each in said if each.get("training")}
+    return f" (training: {' or '.join(sorted(told))})" if told else ""
+
+
+def _block(said: Mapping[str, Any], each: str, training: str) -> list[str]:
     parts = []
     if "repeats" in said:
         parts.append(f"In each condition {each} came {said['repeats']} times.")
@@ -123,7 +132,7 @@ def _block(said: Mapping[str, Any], each: str) -> list[str]:
     if said.get("training"):
         parts.append(
             f"{said['training']} training trials came before each condition and do "
-            "not count."
+            f"not count{training}."
         )
     if said.get("rest"):
         parts.append(f"Rest between conditions: {number(float(said['rest']), 's')}.")
