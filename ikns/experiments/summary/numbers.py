@@ -66,13 +66,14 @@ def error_csv(summary: StudySummary) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     names = ("time", "count", "mean", "deviation", "low", "middle", "high")
-    header = ("simulated", "condition", "trajectory", "time_s", "n", *names[2:4])
+    header: tuple[str, ...] = ("simulated", "condition", "trajectory", "time_s", "n")
+    header += (*names[2:4], "p10", "p50", "p90")
     for group in summary.groups:
         for (condition, trajectory), error in (
             {} if group.tracking is None else group.tracking.errors
         ).items():
             if header:
-                writer.writerow([*header, "p10", "p50", "p90"])
+                writer.writerow(header)
                 header = ()
             columns = [getattr(error, name).tolist() for name in names]
             said = "yes" if group.simulated else "no"
