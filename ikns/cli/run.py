@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 import ikns
-from ikns.cli.live_window import live_window
+from ikns.cli.live_session import live_session, software, stopped_by_signals
 from ikns.cli.options import AsJson, SubjectFolder
 from ikns.cli.output import show, table
+from ikns.cli.simulated import is_simulated
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
     from ikns.runtime import Report, Status
-    from ikns.session import RunWriter
 
 __all__ = ["run"]
 
@@ -94,9 +91,7 @@ def run(
         writer = None
         if session is not None:
             configuration = {
-                "ikns": ikns.__version__,
-                "python": sys.version.split()[0],
-                **{name: version(name) for name in ("numpy", "numba", "pin")},
+                **software(),
                 "source": source,
                 "source_labels": list(stream.labels),
                 "finger": None if dry_run else finger,
@@ -104,7 +99,7 @@ def run(
                 "settings": dataclasses.asdict(settings),
             }
             writer = stack.enter_context(
-                _session(
+                live_session(
                     session,
                     calibrated,
                     subject,
@@ -114,10 +109,17 @@ def run(
                     resume=resume,
                 )
             )
-        stop = stack.enter_context(_stopped_by_signals())
+        stop = stack.enter_context(stopped_by_signals())
         shown = stack.enter_context(_status_line())
         if view:
-            shown.append(stack.enter_context(live_window(calibrated, subject)))
+            from ikns.view.scene import body_view
+
+            window, take = stack.enter_context(
+                body_view(calibrated, simulated=is_simulated(calibrated, subject))
+            )
+            sys.stderr.write(f"ikns: the view is at {window.url} on this machine.\n")
+            window.open()
+            shown.append(take)
         report = drive(
             stream,
             calibrated,
@@ -147,56 +149,6 @@ def run(
 
 
 @contextmanager
-def _session(
-    folder: Path,
-    calibrated: ikns.Subject,
-    subject: Path,
-    configuration: dict[str, Any],
-    *,
-    rate: float,
-    participant: str,
-    resume: bool,
-) -> Iterator[RunWriter]:
-    from ikns.session import create_session, mend_session, open_run
-    from ikns.subject import FILES
-
-    if resume:
-        for sentence in mend_session(folder):
-            _say(sentence)
-    else:
-        create_session(folder, participant=participant)
-    with open_run(
-        folder,
-        labels=calibrated.skeleton.marker_set.labels,
-        joint_names=calibrated.skeleton.joint_names,
-        rate=rate,
-        n_dof=calibrated.null_space_map.n_dof,
-        configuration=configuration,
-        subject={name: (subject / name).read_text("utf-8") for name in FILES},
-        on_fault=_say,
-    ) as writer:
-        yield writer
-
-
-@contextmanager
-def _stopped_by_signals() -> Iterator[threading.Event]:
-    """Make Ctrl-C and SIGTERM set an event; a second Ctrl-C interrupts."""
-    stop = threading.Event()
-
-    def ask(number: int, _: object) -> None:
-        if stop.is_set() and number == signal.SIGINT:
-            raise KeyboardInterrupt
-        stop.set()
-
-    before = {n: signal.signal(n, ask) for n in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-@contextmanager
 def _status_line() -> Iterator[list[Callable[[Status], None]]]:
     """Write one line over and over, while stderr is a terminal."""
     if not sys.stderr.isatty():
@@ -221,10 +173,6 @@ def _each(shown: list[Callable[[Status], None]]) -> Callable[[Status], None]:
             one(status)
 
     return show
-
-
-def _say(sentence: str) -> None:
-    sys.stderr.write(f"\nikns: {sentence}\n")
 
 
 def _line(s: Status) -> str:

@@ -13,8 +13,8 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Literal
 
 import ikns
+from ikns.cli.live_session import live_session, software, stopped_by_signals
 from ikns.cli.output import show, table
-from ikns.cli.run import _session, _stopped_by_signals
 from ikns.cli.simulated import is_simulated
 from ikns.errors import InvalidInput
 
@@ -224,7 +224,7 @@ def conduct(
         )
     session = arm.session or who.folder / "session"
     with ExitStack() as stack:
-        stop = stack.enter_context(_stopped_by_signals())
+        stop = stack.enter_context(stopped_by_signals())
         shown: list[Callable[[Status], None]] = []
         address = ""
         if subject is not None:
@@ -243,10 +243,7 @@ def conduct(
                 "seed": seed,
                 "input": {name: _said(name, arm, screens) for name in conditions},
                 "session": _relative(session, who.folder) if subject else None,
-                "versions": {
-                    "ikns": ikns.__version__,
-                    "python": sys.version.split()[0],
-                },
+                "versions": software(),
             }
             | dict(about),
         )
@@ -272,11 +269,12 @@ def conduct(
             )
         if subject is not None:
             if arm.view:
-                from ikns.view.cockpit.body import body_view
+                from ikns.view.scene import body_view
 
-                address, take = stack.enter_context(
+                window, take = stack.enter_context(
                     body_view(subject, simulated=simulated)
                 )
+                address = window.url
                 shown.append(take)
             drivers["ikns"] = lambda: _live(arm, subject, session, who, shown)
         presses: SimpleQueue[None] = SimpleQueue()
@@ -349,13 +347,12 @@ def _live(
 
     def open_session(source: Source) -> AbstractContextManager[RunWriter]:
         assert arm.subject is not None
-        return _session(
+        return live_session(
             session,
             subject,
             arm.subject,
             {
-                "ikns": ikns.__version__,
-                "python": sys.version.split()[0],
+                **software(),
                 "source": arm.source,
                 "source_labels": list(source.labels),
                 "finger": arm.finger,

@@ -7,6 +7,7 @@ PNG, and :class:`LiveView` shows it in the browser while it moves.
 """
 
 from ikns.view.scene.finger import with_finger
+from ikns.view.scene.following import body_view
 from ikns.view.scene.live import LiveView
 from ikns.view.scene.map_scene import map_scene
 from ikns.view.scene.page import scene_html
@@ -19,6 +20,7 @@ __all__ = [
     "LiveView",
     "Scene",
     "ScenePicture",
+    "body_view",
     "map_scene",
     "recording_scene",
     "scene_html",

@@ -1,13 +1,18 @@
-"""The body in 3-D beside the panel: postures go to a live view of their own."""
+"""The live view of a person whose live loop never waits for it."""
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from ikns.motion import chain_sides
 from ikns.subject import Subject
+from ikns.view.scene.finger import with_finger
+from ikns.view.scene.live import LiveView
+from ikns.view.scene.map_scene import map_scene
 
 if TYPE_CHECKING:
     from ikns.runtime import Status
@@ -18,10 +23,10 @@ __all__ = ["body_view"]
 @contextmanager
 def body_view(
     subject: Subject, *, simulated: bool
-) -> Iterator[tuple[str, Callable[[Status], None]]]:
-    """Serve the 3-D view of a subject.
+) -> Iterator[tuple[LiveView, Callable[[Status], None]]]:
+    """Serve the 3-D view of a subject with a finger.
 
-    Postures are drawn by a thread of their own, the newest only.
+    Statuses are drawn by a thread of its own, the newest only.
 
     Parameters
     ----------
@@ -31,13 +36,11 @@ def body_view(
 
     Yields
     ------
-    address : str
+    view : LiveView
         On this machine only.
     take : callable
-        Shows the posture of a status; it does not wait.
+        Shows a status; it does not wait.
     """
-    from ikns.view.scene import LiveView, map_scene
-
     scene = map_scene(
         subject.skeleton,
         subject.null_space_map,
@@ -45,6 +48,7 @@ def body_view(
         simulated=simulated,
         title="Live",
     )
+    scene = with_finger(scene, subject.skeleton, chain_sides(subject.chain)[-1])
     newest: list[Status] = []
     came, closing = threading.Event(), threading.Event()
 
@@ -54,17 +58,23 @@ def body_view(
                 came.clear()
                 status = newest[-1]
                 del newest[:-1]
-                view.show(status.q, time=status.time, c=status.c)
+                moved = status.measured
+                view.show(
+                    status.q,
+                    time=status.time,
+                    c=status.c,
+                    flexion=status.flexion if math.isnan(moved) else moved,
+                )
 
     def take(status: Status) -> None:
         newest.append(status)
         came.set()
 
     with LiveView(scene, subject.skeleton) as view:
-        thread = threading.Thread(target=draw, args=(view,), name="body", daemon=True)
+        thread = threading.Thread(target=draw, args=(view,), name="view", daemon=True)
         thread.start()
         try:
-            yield view.url, take
+            yield view, take
         finally:
             closing.set()
             thread.join()

@@ -1,0 +1,85 @@
+"""What every command that drives a finger shares: its session, and how it is ended."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import ikns
+
+if TYPE_CHECKING:
+    from ikns.session import RunWriter
+
+__all__ = ["live_session", "say", "software", "stopped_by_signals"]
+
+
+def software() -> dict[str, str]:
+    """Versions that a result may depend on."""
+    names = ("numpy", "numba", "pin")
+    return {
+        "ikns": ikns.__version__,
+        "python": sys.version.split()[0],
+        **{name: version(name) for name in names},
+    }
+
+
+@contextmanager
+def live_session(
+    folder: Path,
+    calibrated: ikns.Subject,
+    subject: Path,
+    configuration: dict[str, Any],
+    *,
+    rate: float,
+    participant: str,
+    resume: bool,
+) -> Iterator[RunWriter]:
+    """Open the next run of a session; with `resume`, of one that is there already."""
+    from ikns.session import create_session, mend_session, open_run
+    from ikns.subject import FILES
+
+    if resume:
+        for sentence in mend_session(folder):
+            say(sentence)
+    else:
+        create_session(folder, participant=participant)
+    with open_run(
+        folder,
+        labels=calibrated.skeleton.marker_set.labels,
+        joint_names=calibrated.skeleton.joint_names,
+        rate=rate,
+        n_dof=calibrated.null_space_map.n_dof,
+        configuration=configuration,
+        subject={name: (subject / name).read_text("utf-8") for name in FILES},
+        on_fault=say,
+    ) as writer:
+        yield writer
+
+
+@contextmanager
+def stopped_by_signals() -> Iterator[threading.Event]:
+    """Make Ctrl-C and SIGTERM set an event; a second Ctrl-C interrupts."""
+    stop = threading.Event()
+
+    def ask(number: int, _: object) -> None:
+        if stop.is_set() and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        stop.set()
+
+    before = {n: signal.signal(n, ask) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def say(sentence: str) -> None:
+    """Say something on a line of its own, whatever the last one holds."""
+    sys.stderr.write(f"\nikns: {sentence}\n")
