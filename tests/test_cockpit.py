@@ -213,8 +213,9 @@ def test_a_whole_trial_with_a_gamepad(chromium: Any, tmp_path: Path) -> None:
     assert row["outcome"] == "done"
     record = tracking_record(row)
     assert (record.time[0] < -4.9, record.time[-1] > 24.9) == (True, True)
-    # A hundred times a second; a busy machine may leave some out.
-    assert len(record.time) > 2000
+    # A hundred times a second; a busy machine leaves some out, but a curve that turns
+    # within a second or two needs ten.
+    assert len(record.time) > 300
     known = record.time[np.isfinite(record.c)]
     gap = np.diff(known, append=25.0)[known > -4.0].max()
     assert gap < 5.0
