@@ -107,7 +107,7 @@ def test_an_example_replaces_nothing_unless_told_and_never_results(
         ({"tracking": {"training": -1}}, "training from 0 trials .* -1"),
         ({"tracking": {"seconds": 5}}, "a profile of at least 12 s, found 5 s"),
         ({"tracking": {"seconds": 12}, "study": {"seed": 5}}, "no profile T1 of 12 s"),
-        ({"tracking": {"align": 0.0}}, "align = 5 s in .* simulated study, found 0"),
+        ({"tracking": {"align": -1.0}}, "align from 0 s"),
         ({"tracking": {"rest": -1.0}}, "rest from 0 s"),
         ({"tracking": {"margin": 0.0}}, "margin above 0 .* found 0"),
         ({"tracking": {"margin": float("nan")}}, "margin above 0 .* found nan"),

@@ -23,7 +23,13 @@ from ikns.experiments.visits import list_visits, read_visit, tracking_record
 STUDY = {
     "study": {"name": "quick", "seed": 5},
     "cohort": {"participants": 3},
-    "tracking": {"profiles": ["T1"], "repeats": 1, "training": 2, "seconds": 15},
+    "tracking": {
+        "profiles": ["T1"],
+        "repeats": 1,
+        "training": 2,
+        "seconds": 15,
+        "align": 2.0,
+    },
     "picking": {"objects": ["A"], "training": 1},
     "parameters": {"rate": 50, "point_seconds": 2},
 }
@@ -144,6 +150,7 @@ def test_a_cell_is_what_the_participant_does(done: Path) -> None:
             draw_profile("T1", step.seed, seconds=15.0),
             practised=2,
             rate=50.0,
+            align=2.0,
         )
         kept = tracking_record(row)
         assert kept.c.tobytes() == record.c.tobytes()

@@ -159,6 +159,7 @@ def _tracking(
             practised=practised,
             rate=parameters.rate,
             latency=parameters.latency,
+            align=design.align,
             settings=settings,
         )
         attempt = Attempt(step.key, "done", "", record)

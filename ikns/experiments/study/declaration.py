@@ -217,8 +217,3 @@ def _check_simulated(study: Study) -> None:
     for name, design in study.designs.items():
         for condition in design.conditions:
             choice(name, "conditions for virtual people", condition, _SIMULATED[name])
-    if study.tracking is not None and study.tracking.align != TrackingDesign.align:
-        raise InvalidInput(
-            f"expected align = {TrackingDesign.align:g} s in [tracking] of a simulated "
-            f"study, found {study.tracking.align:g} s."
-        )

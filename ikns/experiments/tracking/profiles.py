@@ -140,7 +140,9 @@ def draw_profile(name: str, seed: int, *, seconds: float = 25.0) -> Profile:
         profile = _drawn(name, character, seed, seconds, rng)
         if _fits(profile, character):
             return profile
-    raise InvalidInput(f"no profile {name} of {seconds:g} s could be drawn.")
+    raise InvalidInput(
+        f"no profile {name} of {seconds:g} s could be drawn; ask for a longer one."
+    )
 
 
 def _drawn(

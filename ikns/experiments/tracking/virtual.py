@@ -64,6 +64,7 @@ def virtual_step(
     direct: bool = False,
     rate: float = 100.0,
     latency: float = 0.05,
+    align: float = ALIGN,
     **arm_loop: Any,
 ) -> TrackingRecord:
     """Let a participant do one step of a schedule, training or trial.
@@ -85,6 +86,8 @@ def virtual_step(
         Frames per second.
     latency : float
         Of the system, s.
+    align : float
+        Time before the profile begins, s.
     **arm_loop
         Of :class:`ikns.simulation.operator.ArmLoop`.
     """
@@ -100,7 +103,7 @@ def virtual_step(
     driven: Driven
     if step.condition == "ikns" and not direct:
         loop = participant.arm_loop(
-            seconds=ALIGN + profile.seconds,
+            seconds=align + profile.seconds,
             rate=rate,
             seed=body,
             latency=latency,
@@ -110,4 +113,4 @@ def virtual_step(
     else:
         driven, start = Delay(latency, rate=rate), 0.5
     operator = Operator(ability, rate=rate, seed=noise, start=start)
-    return virtual_trial(operator, driven, profile)
+    return virtual_trial(operator, driven, profile, align=align)
