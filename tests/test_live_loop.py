@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikns.finger import Limiter, Limits
+from ikns.finger import SAFE_STATES, Limiter, Limits, Safety, SimulatedFinger
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -86,6 +86,35 @@ def test_what_the_limiter_sends_counts_as_within_limits(steps) -> None:
     assert chain.violations(told(times, sent), LIMITS, 0.0) == 0
 
 
+@given(
+    st.sampled_from(SAFE_STATES),
+    st.lists(
+        st.tuples(
+            st.floats(0, 1) | st.just(np.nan),
+            st.floats(1e-4, 0.3),
+            st.floats(1e-4, 0.05),
+            st.booleans(),
+        ),
+        min_size=1,
+        max_size=60,
+    ),
+)
+def test_what_a_finger_does_counts_as_within_limits(safe_state, steps) -> None:
+    # It moves when asked for its state, too, while it opens or holds.
+    now = 0.0
+    safety = Safety(limits=LIMITS, safe_state=safe_state)
+    with SimulatedFinger(safety=safety, flexion=0.5, clock=lambda: now) as finger:
+        record = []
+        for flexion, dt, wait, fails in steps:
+            now += dt
+            if fails:
+                finger.make_safe("a fault")
+            sent, then = finger.command(flexion), now
+            now += wait
+            record.append(chain.Told(then, then, sent, finger.state().flexion))
+    assert chain.violations(record, LIMITS, 0.0, between=True) == 0
+
+
 @pytest.mark.parametrize(
     ("sent", "beyond"),
     [
@@ -100,6 +129,13 @@ def test_what_the_limiter_sends_counts_as_within_limits(steps) -> None:
 def test_what_is_beyond_a_limit_is_counted(sent, beyond) -> None:
     times = [0.01 * k for k in range(len(sent))]
     assert chain.violations(told(times, sent), LIMITS, 0.0) > 0, beyond
+
+
+def test_what_is_far_beyond_is_counted_whatever_happens_between() -> None:
+    # In 15 ms 20 per second squared reach 0.3 per second, 0.003 in 10 ms.
+    for last in (0.0031, 0.021, 1.1):
+        record = told([0.0, 0.01, 0.02], [0.0, 0.0, last])
+        assert chain.violations(record, LIMITS, 0.0, between=True) > 0
 
 
 # --- the chain -----------------------------------------------------------------------

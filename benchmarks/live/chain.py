@@ -180,7 +180,8 @@ def violations(
     Times are known to their bounds, and flexion to the device's resolution, so a
     velocity is an interval. Mean velocities of neighboring steps differ by at most the
     acceleration times the longer of them; where the limiter steps `between` commands as
-    well, by that times the later and half of the earlier.
+    well (a drive's thread, or a simulated finger that is asked for its state while it
+    opens or holds), by that times the later and half of the earlier.
     After more than the limiter's longest step the finger has stood still, and motion
     may start from rest as if that much time had passed. A finger that had let go and
     takes hold again is told to stay where it is measured: that is no motion.

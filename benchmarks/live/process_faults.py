@@ -156,7 +156,7 @@ def _disk(name: str, seed: int, folder: Path) -> Outcome:
         after[-2],
         seconds,
         {"told": _SYNCED if deleted else _TOLD + room / 40e3},
-        violations(finger.told, finger.finger.safety.limits, 0.0),
+        violations(finger.told, finger.finger.safety.limits, 0.0, between=True),
         wrong,
         (),
         "holding" in after,

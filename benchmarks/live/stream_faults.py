@@ -288,7 +288,7 @@ def strike(name: str, seed: int, folder: Path) -> Outcome:
         fault.ends if ended in fault.ends.split(" or ") else ended,
         seconds,
         promised,
-        violations(finger.told, inner.safety.limits, 0.0),
+        violations(finger.told, inner.safety.limits, 0.0, between=True),
         wrong,
         remarks,
         "holding" in after,
