@@ -208,7 +208,12 @@ def violations(
             if speeds is not None:
                 apart = max(ends[0] - speeds[1], speeds[0] - ends[1])
                 lasts = most + length / 2 if between else max(most, length)
-                count += apart > limits.acceleration * lasts
+                if apart > limits.acceleration * lasts:
+                    # Where it is measured, or a step from rest on from there.
+                    near = resolution + limits.acceleration * most**2
+                    count += not abs(now.sent - now.measured) <= near
+                    speeds, before = None, now
+                    continue
             speeds, length = ends, most
         else:
             # From where it is measured it may already have made a step again.
