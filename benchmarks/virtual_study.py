@@ -61,7 +61,7 @@ def example(folder: Path, jobs: int, *, quick: bool) -> dict[str, Any]:
     """Time the study that ships."""
     init_study(folder)
     study = read_study(folder)
-    run = run_study(folder, n_jobs=jobs, participants=2 if quick else None)
+    run = run_study(folder, n_jobs=jobs, participants=1 if quick else None)
     visits = [read_visit(path) for path in list_visits(folder)]
     trials = {
         name: sum(len(v.attempts) for v in visits if v.about["experiment"] == name)
@@ -234,12 +234,13 @@ def main() -> None:
     parser.add_argument("--people", type=int, default=60, help="of the larger cohort")
     parser.add_argument("--kills", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0, help="of the kills' instants")
-    parser.add_argument("--quick", action="store_true", help="2 people, 1 kill")
+    parser.add_argument("--quick", action="store_true", help="few people, 1 kill")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     people, kills = options.people, options.kills
     if options.quick:
         people, kills = 2, 1
+        SMALL["cohort"] = {"participants": 2}
     warm_up()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
