@@ -1,7 +1,8 @@
 """A calibrated person: body, markers and null-space map, in memory and on disk.
 
 A subject folder is plain text: ``skeleton.urdf``, ``markers.toml``, ``map.json`` and
-``calibration.json``, the last two with a format version.
+``calibration.json``, the last two with a format version, and ``samples.csv`` where the
+still samples of the calibration are known.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ikns.errors import FileError, IknsError, InvalidInput, naming
 from ikns.marker_set import MarkerSet
@@ -25,8 +27,14 @@ __all__ = ["FILES", "FORMAT", "Subject"]
 
 #: Version of the folder's layout and of the JSON files in it.
 FORMAT = 1
-#: What a subject folder holds, and nothing else.
-FILES = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
+_NEEDED = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
+_SAMPLES = "samples.csv"
+#: What a subject folder holds, and nothing else; the last is not needed to use it.
+FILES = (*_NEEDED, _SAMPLES)
+
+#: Columns of the still samples: where the hand was, m in the thorax frame, and to which
+#: PCA point it counts, from 1; 0 to none.
+_COLUMNS = "x_m,y_m,z_m,point"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +53,9 @@ class Subject:
         How the calibration went: strings, finite numbers, None, lists and dicts.
     motions : tuple of Motion
         The explorations as tracked. They are not saved.
+    samples : (N, 4) array, optional
+        Still samples to draw: x, y, z of the hand, m in the thorax frame, and the PCA
+        point that each counts to, from 1; 0 where it was discarded.
     """
 
     skeleton: Skeleton
@@ -52,6 +63,7 @@ class Subject:
     chain: str
     report: dict[str, Any]
     motions: tuple[Motion, ...] = field(default=(), repr=False)
+    samples: NDArray[np.float64] | None = field(default=None, repr=False)
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Write the subject folder; it appears whole or not at all.
@@ -76,6 +88,16 @@ class Subject:
             self.skeleton.marker_set.write(part / "markers.toml")
             _write_json(part / "map.json", self._map())
             _write_json(part / "calibration.json", {"format": FORMAT} | self.report)
+            if self.samples is not None:
+                # A tenth of a millimeter is finer than cameras see.
+                np.savetxt(
+                    part / _SAMPLES,
+                    self.samples,
+                    fmt=["%.4f"] * 3 + ["%d"],
+                    delimiter=",",
+                    header=_COLUMNS,
+                    comments="",
+                )
 
     @classmethod
     def load(cls, folder: str | Path) -> Subject:
@@ -94,11 +116,11 @@ class Subject:
                 f"{place}: expected a folder that `ikns calibrate` wrote, found "
                 f"{'a file' if place.exists() else 'nothing there'}."
             )
-        missing = [name for name in FILES if not (place / name).is_file()]
+        missing = [name for name in _NEEDED if not (place / name).is_file()]
         if missing:
             raise FileError(
-                f"{place}: expected a subject folder with {', '.join(FILES)}, found no "
-                f"{', '.join(missing)}."
+                f"{place}: expected a subject folder with {', '.join(_NEEDED)}, found "
+                f"no {', '.join(missing)}."
             )
         urdf = place / "skeleton.urdf"
         worn = MarkerSet.load(place / "markers.toml")
@@ -136,7 +158,8 @@ class Subject:
             raise FileError(
                 f"{place / 'map.json'}: cannot be read as a null-space map: {fault}"
             ) from None
-        return cls(skeleton, learned, chain, report)
+        samples = _read_samples(place / _SAMPLES, n_points=len(learned.centers_))
+        return cls(skeleton, learned, chain, report, samples=samples)
 
     def _map(self) -> dict[str, Any]:
         learned = self.null_space_map
@@ -186,6 +209,30 @@ def _read_xml(path: Path) -> str:
     except (OSError, ValueError, ET.ParseError) as error:
         raise FileError(f"{path}: cannot be read as XML: {error}.") from None
     return text
+
+
+def _read_samples(path: Path, *, n_points: int) -> NDArray[np.float64] | None:
+    """Read the still samples; None where a folder has none."""
+    if not path.exists():
+        return None
+    try:
+        header, *rows = path.read_text(encoding="utf-8").splitlines()
+        if header != _COLUMNS:
+            raise InvalidInput(f"the columns {_COLUMNS} were expected, not {header}.")
+        samples = np.array([row.split(",") for row in rows], dtype=np.float64)
+        samples = samples.reshape(-1, 4) if not rows else samples
+        if samples.ndim != 2 or samples.shape[1] != 4 or not np.isfinite(samples).all():
+            raise InvalidInput("four finite numbers were expected in each row.")
+        point = samples[:, 3]
+        if np.any((point % 1 != 0) | (point < 0) | (point > n_points)):
+            raise InvalidInput(f"points 0 to {n_points} were expected.")
+    except (OSError, ValueError) as error:
+        fault = f"{error}" if isinstance(error, IknsError) else f"({error})."
+        raise FileError(
+            f"{path}: cannot be read as still samples: {fault} Nothing needs them but "
+            "pictures: the file can go."
+        ) from None
+    return samples
 
 
 def _read_json(path: Path) -> dict[str, Any]:

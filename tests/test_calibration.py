@@ -45,6 +45,17 @@ def test_every_sample_is_accounted_for() -> None:
             )
 
 
+def test_samples_to_draw_lie_about_their_points() -> None:
+    subject = small_person.subject()
+    learned, samples = subject.null_space_map, subject.samples
+    assert samples is not None
+    assert len(samples) == len(learned.labels_)  # short trials: all of them
+    for point, center in enumerate(learned.centers_, start=1):
+        own = samples[samples[:, 3] == point][:, :3]
+        assert len(own) == learned.counts_[point - 1]
+        assert np.linalg.norm(own - center, axis=1).max() <= learned.radius_
+
+
 def test_the_report_is_plain_json() -> None:
     text = json.dumps(small_person.subject().report, allow_nan=False)
     assert json.loads(text) == small_person.subject().report

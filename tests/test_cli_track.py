@@ -13,8 +13,11 @@ from command_line import check_refused, contents
 from visit_page import Page, play
 
 from ikns.cli import main
+from ikns.experiments.summary import summarize
 from ikns.experiments.visits import read_visit, tracking_record
 from ikns.session import read_run
+from ikns.subject import Subject
+from ikns.view.study_report.map_section import map_drawn
 
 SHORT = ["--profiles", "T1", "--repeats", "1", "--training", "0", "--seconds", "12"]
 
@@ -127,6 +130,20 @@ def test_the_arm_drives_the_pointer_and_the_finger(
     assert np.isin(known, c).all()
     assert main(["replay", str(session), "--json"]) == 0
     assert json.loads(capfd.readouterr().out)["same"]
+    # A report draws where the hand went, and from which samples the map was learned.
+    (group,) = summarize(folder).groups
+    drawn = map_drawn(group)
+    assert drawn is not None
+    left, right, *_ = drawn.figure.axes
+    hand = np.array([recorded.model[f"hand_{axis}"] for axis in "zxy"])
+    np.testing.assert_array_equal(left.lines[0].get_data_3d(), hand)
+    samples = Subject.load(files / "person").samples
+    assert samples is not None
+    clouds = {cloud.get_label(): cloud for cloud in right.collections}
+    for point in np.unique(samples[:, 3]):
+        name = f"point {point:.0f}" if point else "still, discarded"
+        of_point = samples[samples[:, 3] == point][:, [2, 0, 1]]
+        np.testing.assert_array_equal(np.transpose(clouds[name]._offsets3d), of_point)
 
 
 def test_nothing_is_written_where_the_source_does_not_answer(

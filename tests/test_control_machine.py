@@ -46,6 +46,28 @@ def call(machine, name, now):
 
 @given(
     st.lists(
+        st.tuples(st.sampled_from(CALLS), st.floats(0.0, 0.3, allow_nan=False)),
+        max_size=30,
+    ),
+    st.floats(1e-9, 0.1),
+)
+def test_the_watchdog_acts_at_its_deadline_and_not_before(calls, margin):
+    machine, now = SafetyMachine(), 0.0
+    for name, after in calls:
+        now += after
+        call(machine, name, now)
+    due = machine.deadline
+    if due == math.inf:
+        assert machine.check(now + 1e9) == ()
+        return
+    # After a second of silence due lies in the past: then it is due at once.
+    if due - margin > now:
+        assert machine.check(due - margin) == ()
+    assert len(machine.check(max(due, now) + margin)) == 1
+
+
+@given(
+    st.lists(
         st.tuples(st.sampled_from(CALLS), st.floats(-0.05, 0.3, allow_nan=False)),
         max_size=60,
     )

@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomli_w
 from distributed import LocalCluster
@@ -18,6 +19,7 @@ from ikns.experiments.study import read_study, run_study, workers
 from ikns.experiments.study.people import study_participant
 from ikns.experiments.tracking import draw_profile, measure, virtual_step
 from ikns.experiments.visits import list_visits, read_visit, tracking_record
+from ikns.subject import Subject
 
 #: Quick people: a coarse clock, one profile, short stays.
 STUDY = {
@@ -127,10 +129,10 @@ def test_a_cohort_grows_without_doing_anything_twice(
     assert (one.cells, one.simulated) == (2, 2)
     more = run_study(study, n_jobs=1, participants=2)
     assert (more.cells, more.found, more.simulated) == (4, 2, 2)
-    for path in list_visits(study):
-        name = path.relative_to(study).as_posix()
-        for file in path.iterdir():
-            assert file.read_bytes() == (done / name / file.name).read_bytes()
+    assert len(list_visits(study)) == 4
+    whole = contents(done)
+    for name, content in contents(study).items():
+        assert content == whole[name] or name in ("declared.json", ".run.lock")
     with pytest.raises(InvalidInput, match="expected 1 to 3 participants, found 4"):
         run_study(study, participants=4)
 
@@ -161,6 +163,18 @@ def test_a_cell_is_what_the_participant_does(done: Path) -> None:
     assert "simulated" in about["input"]["ikns"]
     assert about["design"] == study.tracking.arguments(seed=5)
     assert about["subject"]["stature_m"] == person.protocol.subject.adult.stature_m
+
+
+def test_the_first_participant_leaves_what_was_learned(done: Path) -> None:
+    study = read_study(done)
+    person = study_participant(0, seed=5, parameters=study.parameters)
+    for experiment in ("tracking", "picking"):
+        kept = Subject.load(done / "visits" / f"sub-01_{experiment}" / "subject")
+        learned, meant = kept.null_space_map, person.subject.null_space_map
+        np.testing.assert_array_equal(learned.directions_, meant.directions_)
+        assert kept.samples is not None
+        assert len(kept.samples) == len(meant.labels_)
+    assert not (done / "visits" / "sub-02_tracking" / "subject").exists()
 
 
 def test_a_picking_cell_is_what_the_participant_does(done: Path) -> None:

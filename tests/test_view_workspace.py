@@ -101,6 +101,9 @@ def test_workspace_stands_without_samples_facets_or_body() -> None:
     none = np.zeros((0, 3))
     figure = workspace_figure(none, none, np.zeros(0, int), box()[:2], simulated=False)
     assert png(figure).startswith(b"\x89PNG")
+    # No path is promised where there is none.
+    assert [t.get_text()[:1] for t in figure.texts].count("a") == 1
+    assert not any("hand went" in text.get_text() for text in figure.texts)
 
 
 def test_workspace_shows_the_body_in_front_of_which_the_hand_moved() -> None:

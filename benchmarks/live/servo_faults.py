@@ -55,8 +55,9 @@ SERVO_FAULTS = {
     "servo silent, 0.1 s": ServoFault("silence", 0.1, "active"),
     "servo silent, 1 s": ServoFault("silence", 1.0, "safe", _PATIENCE),
     "servo obeys but does not answer, 1 s": ServoFault("mute", 1.0, "safe", _PATIENCE),
-    # What comes too late prolongs the read that it disturbs.
-    "answers 0.2 s late, 1 s": ServoFault("delay", 1.0, "safe", _PATIENCE + _READ),
+    # A late answer may pass for a write's; one that then is no answer to the read is
+    # waited out once more.
+    "answers 0.2 s late, 1 s": ServoFault("delay", 1.0, "safe", _PATIENCE + 2 * _READ),
     "answers with a wrong checksum, 0.1 s": ServoFault("crc", 0.1, "active"),
     "answers with a wrong checksum, 1 s": ServoFault("crc", 1.0, "safe", _PATIENCE),
     "answers of another servo, 1 s": ServoFault("id", 1.0, "safe", _PATIENCE),

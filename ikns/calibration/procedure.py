@@ -27,6 +27,9 @@ from ikns.subject import Subject
 
 __all__ = ["calibrate"]
 
+#: Still samples that are kept to be drawn, at most; more would hide each other.
+_SHOWN = 3000
+
 
 def calibrate(
     static: Recording,
@@ -148,4 +151,6 @@ def calibrate(
         "extrinsic": extrinsic_report(skeleton, pairs, chain),
         "warnings": [str(warning.message) for warning in caught],
     }
-    return Subject(skeleton, learned, chain, report, motions)
+    step = len(x) // _SHOWN + 1
+    shown = np.column_stack([x, learned.labels_ + 1.0])[::step]
+    return Subject(skeleton, learned, chain, report, motions, shown)

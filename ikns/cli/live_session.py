@@ -56,7 +56,11 @@ def live_session(
         rate=rate,
         n_dof=calibrated.null_space_map.n_dof,
         configuration=configuration,
-        subject={name: (subject / name).read_text("utf-8") for name in FILES},
+        subject={
+            name: (subject / name).read_text("utf-8")
+            for name in FILES
+            if (subject / name).is_file()
+        },
         on_fault=say,
     ) as writer:
         yield writer

@@ -71,6 +71,13 @@ class SafetyMachine:
         self._now = -math.inf
         self._seen = -math.inf
 
+    @property
+    def deadline(self) -> float:
+        """When :meth:`check` has something to do if no valid pose comes before, s."""
+        if self.state == "active":
+            return self._seen + self.hold_after
+        return self._seen + self.safe_after if self.state == "holding" else math.inf
+
     def arm(self, now: float, reason: str = "asked to arm") -> Changes:
         """Allow the finger to become active."""
         return self._go(now, "armed", reason) if self.state == "disarmed" else ()

@@ -289,9 +289,9 @@ class _Loop:
 
     def patience(self) -> float:
         """How long to wait for a frame before something else is to be done, s."""
-        if self._rehearsal is None:
-            return _BEAT
-        left = self._rehearsal[0] - _AHEAD - time.monotonic()
+        left = self._controller.machine.deadline - self.elapsed()
+        if self._rehearsal is not None:
+            left = min(left, self._rehearsal[0] - _AHEAD - time.monotonic())
         return min(max(left, 0.0), _BEAT)
 
     def rehearse(self) -> bool:

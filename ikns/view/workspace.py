@@ -94,7 +94,8 @@ def workspace_figure(
         _draw_samples(right, still, of_sample, len(point))
         _draw_points(right, point)
         _frame(right, [still, point], rightwards=rightwards, tick=0.1)
-        _title(figure, left, "a   where the hand went")
+        went = np.isfinite(path).any()
+        _title(figure, left, f"a   where the {'hand went' if went else 'volume is'}")
         _title(figure, right, "b   still samples, colored by PCA point")
         _legend(figure, right)
     return figure

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import platform
+import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,6 +25,7 @@ from ikns.experiments.tracking.virtual import virtual_step
 from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import table_bytes, tracking_row
 from ikns.simulation.operator import Participant
+from ikns.subject import Subject
 
 __all__ = ["Cell", "Task", "simulate", "visit_name"]
 
@@ -71,11 +74,15 @@ class Cell:
         Its ``visit.json``.
     attempts : bytes
         Its Parquet file.
+    others : dict of str to bytes
+        Other files, by their names in the folder: of the first participant's subject,
+        to show what was learned from.
     """
 
     name: str
     about: dict[str, Any]
     attempts: bytes
+    others: dict[str, bytes] = field(default_factory=dict, repr=False)
 
 
 def visit_name(experiment: str, number: int, variation: str = "") -> str:
@@ -130,8 +137,20 @@ def simulate(task: Task) -> list[Cell]:
             rows, reason = [], str(error)
         about = _about(task, experiment, parameters, person, reason)
         name = visit_name(experiment, task.number, task.variation)
-        cells.append(Cell(name, about, table_bytes(experiment, rows)))
+        others = {}
+        if person is not None and task.number == 0:
+            others = _subject_files(person.subject)
+        cells.append(Cell(name, about, table_bytes(experiment, rows), others))
     return cells
+
+
+def _subject_files(subject: Subject) -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as folder:
+        subject.save(Path(folder) / "subject")
+        return {
+            path.relative_to(folder).as_posix(): path.read_bytes()
+            for path in sorted(Path(folder).glob("subject/*"))
+        }
 
 
 def _attempts(

@@ -114,7 +114,9 @@ def run_study(
             if not done:
                 keep_declared(top, study)
             for cell in finished:
-                write_visit(top / "visits" / cell.name, cell.about, cell.attempts)
+                write_visit(
+                    top / "visits" / cell.name, cell.about, cell.attempts, cell.others
+                )
                 done += 1
                 if cell.about["reason"]:
                     failed[cell.name] = cell.about["reason"]

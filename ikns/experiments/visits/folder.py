@@ -134,7 +134,12 @@ def write_attempts(folder: str | Path, rows: Iterable[Mapping[str, Any]]) -> Pat
     return _new(path / _ALL, content)
 
 
-def write_visit(folder: str | Path, about: Mapping[str, Any], attempts: bytes) -> Path:
+def write_visit(
+    folder: str | Path,
+    about: Mapping[str, Any],
+    attempts: bytes,
+    others: Mapping[str, bytes] | None = None,
+) -> Path:
     """Write a visit that is over: the folder appears whole or not at all.
 
     Parameters
@@ -146,6 +151,8 @@ def write_visit(folder: str | Path, about: Mapping[str, Any], attempts: bytes) -
         See :func:`create_visit`.
     attempts : bytes
         Of :func:`ikns.experiments.visits.table_bytes`.
+    others : mapping of str to bytes, optional
+        Further files, by their names in the folder, such as ``subject/map.json``.
 
     Raises
     ------
@@ -161,6 +168,9 @@ def write_visit(folder: str | Path, about: Mapping[str, Any], attempts: bytes) -
     shutil.rmtree(part, ignore_errors=True)
     create_visit(part, about)
     _write(part / _ALL, attempts)
+    for name, content in (others or {}).items():
+        (part / name).parent.mkdir(exist_ok=True)
+        _write(part / name, content)
     try:
         part.rename(path)
         _sync(path.parent)

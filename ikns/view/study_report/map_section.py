@@ -69,20 +69,24 @@ def _subjects(visit: Path, session: str) -> Iterator[tuple[Subject, Array]]:
 
 def _drawn(subject: Subject, hand: Array, who: str, simulated: bool) -> Drawn:
     learned = subject.null_space_map
-    path = "Path of the hand while tracking, " if len(hand) > 1 else ""
+    seen = np.empty((0, 4)) if subject.samples is None else subject.samples
+    parts = [
+        *(["Path of the hand while tracking"] if len(hand) > 1 else []),
+        *([f"{len(seen)} still samples of the calibration"] if len(seen) else []),
+        f"PCA points of {who} and the volume in which their directions are "
+        "interpolated, in the thorax frame.",
+    ]
     return Drawn(
         "workspace",
         workspace_figure(
             hand,
-            np.empty((0, 3)),
-            np.empty(0, dtype=np.int64),
+            seen[:, :3],
+            seen[:, 3].astype(np.int64) - 1,
             learned.centers_,
             facets=getattr(learned.interpolator_, "hull_facets", None),
             arms=arm_points(subject.skeleton, subject.skeleton.neutral()),
             simulated=simulated,
         ),
-        f"{path}PCA points of {who} and the volume in which their directions are "
-        "interpolated, in the thorax frame. The samples of the calibration are not "
-        "kept with a subject.",
+        ", ".join(parts),
         "Two 3-D views of the PCA points in front of the body",
     )
