@@ -1,6 +1,7 @@
 """Recordings for the tests, real and simulated; in CI nothing may be skipped."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,11 @@ from hypothesis import settings
 # A kernel compiles in its first example, which then takes seconds.
 settings.register_profile("ikns", deadline=None)
 settings.load_profile("ikns")
+
+# A shell starts what it puts into the background deaf to Ctrl-C, and so would be every
+# program that a test starts and interrupts.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 _BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 DATA = Path(os.environ.get("IKNS_TEST_DATA", _BESIDE))
