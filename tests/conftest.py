@@ -12,10 +12,14 @@ from hypothesis import settings
 settings.register_profile("ikns", deadline=None)
 settings.load_profile("ikns")
 
-# A shell starts what it puts into the background deaf to Ctrl-C, and so would be every
-# program that a test starts and interrupts.
-if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+# A shell starts what it puts into the background deaf to Ctrl-C, nohup to the end of the
+# terminal, and so would be every program that a test starts and interrupts.
+for number, usual in (
+    (signal.SIGINT, signal.default_int_handler),
+    (signal.SIGHUP, signal.SIG_DFL),
+):
+    if signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, usual)
 
 _BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 DATA = Path(os.environ.get("IKNS_TEST_DATA", _BESIDE))
