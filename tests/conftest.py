@@ -12,8 +12,8 @@ from hypothesis import settings
 settings.register_profile("ikns", deadline=None)
 settings.load_profile("ikns")
 
-# A shell starts what it puts into the background deaf to Ctrl-C, nohup to the end of the
-# terminal, and so would be every program that a test starts and interrupts.
+# A shell starts what it puts into the background deaf to Ctrl-C, nohup to the end of
+# the terminal, and so would be every program that a test starts and interrupts.
 for number, usual in (
     (signal.SIGINT, signal.default_int_handler),
     (signal.SIGHUP, signal.SIG_DFL),
