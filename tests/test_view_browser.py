@@ -142,7 +142,10 @@ def test_the_map_is_there_and_slider_and_legend_change_it(
     assert changed[50:250].sum() > 50
     assert tab.page.inner_text("#c") == f"c = {mapped().c[0]:.2f}"
 
-    # The legend switches things off.
+    # The legend, closed in a small window, switches things off.
+    assert not tab.page.get_by_label("interpolation volume").is_visible()
+    tab.page.click("#legend summary")
+    at_zero = tab.pixels()
     tab.page.get_by_label("interpolation volume").uncheck()
     assert np.any(np.abs(at_zero - tab.pixels()) > 0.02, axis=2).sum() > 500
     visible = 'viewer.scene_tree.find(["ikns", "volume"]).object.visible'

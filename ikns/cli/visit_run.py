@@ -421,6 +421,8 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _tell(who: Whose, conductor: Conductor, *, as_json: bool) -> None:
+    from ikns.experiments.statistics.wording import counted
+
     results, left = conductor.results, conductor.shown["left"]
     figures = "time" if conductor.desk.experiment == "picking" else "rmse"
     result = {
@@ -447,7 +449,7 @@ def _tell(who: Whose, conductor: Conductor, *, as_json: bool) -> None:
                 for a in results
             ],
         ),
-        f"{left} trials left; the same command goes on with them."
+        f"{counted(left, 'trial')} left; the same command goes on."
         if left
         else "All trials are done.",
         f"Wrote {who.folder}",

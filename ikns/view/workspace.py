@@ -145,14 +145,15 @@ def _draw_volume(axes: Any, centers: Array, facets: ArrayLike | None) -> None:
 
 def _draw_samples(axes: Any, samples: Array, labels: Array, n_points: int) -> None:
     dots = {"s": 12, "linewidths": 0, "depthshade": False}
-    axes.scatter(
-        *_drawn(samples[labels < 0]),
-        color=GREY,
-        alpha=0.35,
-        zorder=6,
-        label="still, discarded",
-        **dots,
-    )
+    if (labels < 0).any():
+        axes.scatter(
+            *_drawn(samples[labels < 0]),
+            color=GREY,
+            alpha=0.35,
+            zorder=6,
+            label="still, discarded",
+            **dots,
+        )
     for point in range(n_points):
         axes.scatter(
             *_drawn(samples[labels == point]),

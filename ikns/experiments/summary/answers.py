@@ -7,7 +7,12 @@ that was declared before the data were seen, and a test of its own.
 from __future__ import annotations
 
 from ikns.experiments.statistics import Equivalence, PairedT, SuccessTest
-from ikns.experiments.statistics.wording import interval_text, number, p_text
+from ikns.experiments.statistics.wording import (
+    counted,
+    interval_text,
+    number,
+    p_text,
+)
 from ikns.experiments.summary.picking import PickComparison, PickingSummary
 from ikns.experiments.summary.tracking import UNITS, Comparison, TrackingSummary
 
@@ -39,7 +44,7 @@ def people(count: int, *, simulated: bool) -> str:
     ('1 simulated participant', '10 participants')
     """
     kind = "simulated participant" if simulated else "participant"
-    return f"{count} {kind}" + "s" * (count != 1)
+    return counted(count, kind)
 
 
 def tracking_answer(

@@ -32,6 +32,8 @@ if (!picture) {
 }
 viewer.controls.update();
 
+// A small window, such as the one in the experimenter's panel, is left to the body.
+find("legend").open = picture || innerHeight >= 500;
 for (const layer of scene.layers) {
   const item = document.createElement("li"), label = document.createElement("label");
   const box = document.createElement("input"), dot = document.createElement("i");
@@ -47,7 +49,7 @@ for (const layer of scene.layers) {
   show();
   label.append(box, dot, layer.name);
   item.append(label);
-  find("legend").append(item);
+  find("legend").lastElementChild.append(item);
 }
 
 const animator = viewer.animator, slider = find("time");

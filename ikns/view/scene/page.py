@@ -74,7 +74,7 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
 <div id="pane"></div>
 <header id="head" class="panel">{badge}<h1>{title}</h1>
 <p>{escape(scene.caption)}</p></header>
-<ul id="legend" class="panel"></ul>
+<details id="legend" class="panel"><summary>Layers</summary><ul></ul></details>
 <div id="player" class="panel" hidden>
 <button id="play" type="button">&#9654;</button>
 <input id="time" type="range" min="0" step="any" value="0" aria-label="Time">
