@@ -21,7 +21,7 @@ def main(session: Path) -> None:
     while True:
         now = time.monotonic() - start
         run.row("markers", [frame, now, now, *[0.1 * k for k in range(6)]])
-        run.row("model", [0.5] * 16 + [1.0, 2.0, 0.0, 0.0])
+        run.row("model", [0.5] * 17 + [1.0, 2.0, 0.0, 0.0])
         if frame % 50 == 0:
             run.row("events", [now, 0.0, "tick", str(frame)])
         sys.stdout.write(f"{frame} {now}\n")

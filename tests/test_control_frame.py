@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ikns.calibration import in_sight
+from ikns.calibration import in_sight, sight_needs
 from ikns.control import FrameSolver
 from ikns.errors import InvalidInput
 from ikns.marker_ik import MarkerIK
@@ -85,6 +85,8 @@ def test_a_frame_is_its_steps_one_by_one(skeleton, chain, settings):
     recording = Recording(
         np.arange(len(frames)) / 100, frames, skeleton.marker_set.labels
     )
+    needs = [columns for columns, _ in sight_needs(skeleton, chain).values()]
+    chain_markers = np.concatenate(needs)
     shown = np.all(list(in_sight(skeleton, recording, chain).values()), axis=0)
     assert shown.any()
     inside = 0
@@ -94,6 +96,10 @@ def test_a_frame_is_its_steps_one_by_one(skeleton, chain, settings):
         np.testing.assert_array_equal(frame.q, pose.q)
         np.testing.assert_array_equal(frame.hand_in_thorax, place)
         assert frame.residual == pose.residual
+        away = np.linalg.norm(skeleton.markers_in_world(pose.q) - seen, axis=1)
+        # pin's forward kinematics against our own: rounding of places of up to 1 m.
+        worst = np.nanmax(away[chain_markers])
+        assert frame.worst_residual == pytest.approx(worst, abs=1e-14)
         assert (frame.iterations, frame.converged) == (pose.iterations, pose.converged)
         assert frame.in_sight == known
         assert frame.inside == (known and within)
@@ -113,7 +119,7 @@ def test_without_markers_the_pose_stays_and_there_is_no_signal(skeleton):
     before = solver.solve(frames[0])
     gone = solver.solve(np.full_like(frames[0], np.nan))
     np.testing.assert_array_equal(gone.q, before.q)
-    assert np.isnan(gone.residual)
+    assert np.isnan([gone.residual, gone.worst_residual]).all()
     assert np.isnan(gone.c).all()
     assert not gone.in_sight
     assert not gone.inside

@@ -15,8 +15,9 @@ import numpy as np
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.diagram import NOT_FINITE, OUTSIDE_HULL
+from ikns._kernels.marker_errors import marker_errors
 from ikns._kernels.marker_ik import solve_frame
-from ikns._kernels.marker_problem import cut, unpack
+from ikns._kernels.marker_problem import MarkerProblem, Scratch, cut, unpack
 from ikns._kernels.natural_neighbor import natural_weights
 from ikns._kernels.paths import Paths, place_frames
 from ikns._kernels.tree import Floats, Indices
@@ -74,7 +75,7 @@ def control_frame(
     weights: Floats,
     place: Floats,
     c: Floats,
-) -> tuple[float, int, bool, bool, int]:
+) -> tuple[float, float, int, bool, bool, int]:
     """Solve a frame.
 
     Parameters
@@ -102,6 +103,9 @@ def control_frame(
     Returns
     -------
     residual : float
+        As from marker inverse kinematics.
+    worst : float
+        Largest distance of a marker of the chain's links, m; NaN without any.
     iterations : int
     converged : bool
         As from marker inverse kinematics.
@@ -112,9 +116,11 @@ def control_frame(
         says it.
     """
     problem = unpack(whole, real)
+    s = cut(problem, work)
     residual, iterations, converged = solve_frame(
-        problem, cut(problem, work), markers, q, from_scratch, q
+        problem, s, markers, q, from_scratch, q
     )
+    worst = _worst_residual(problem, s, control_map.link, q)
     known = _in_sight(markers, control_map.link, control_map.need)
     n_angles = len(q) - 7
     place_frames(paths, q[7:].reshape(1, n_angles), rotation, position)
@@ -127,7 +133,7 @@ def control_frame(
     for k in range(len(c)):
         c[k] = np.nan
     if not known:
-        return residual, iterations, converged, known, NOT_FINITE
+        return residual, worst, iterations, converged, known, NOT_FINITE
     if len(control_map.indices):
         status = natural_weights(
             control_map.numbers, control_map.indices, place, cavity_work, weights
@@ -143,7 +149,35 @@ def control_frame(
         q[7:],
         c,
     )
-    return residual, iterations, converged, known, status
+    return residual, worst, iterations, converged, known, status
+
+
+@compiled
+def _worst_residual(
+    problem: MarkerProblem, s: Scratch, link: Indices, q: Floats
+) -> float:
+    """Compare the markers taken last with a pose, which they need not have led to."""
+    marker_errors(
+        problem.tree,
+        problem.marker_joint,
+        problem.marker_position,
+        s.weight,
+        s.target,
+        q,
+        s.origin,
+        s.rotation,
+        s.translation,
+        s.x,
+        s.error,
+    )
+    largest = -1.0
+    for m in range(len(link)):
+        if link[m] >= 0 and s.weight[m] > 0:
+            square = 0.0
+            for k in range(3):
+                square += s.error[m, k] ** 2
+            largest = max(largest, square)
+    return np.sqrt(largest) if largest >= 0 else np.nan
 
 
 @compiled

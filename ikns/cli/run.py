@@ -179,7 +179,8 @@ def _line(s: Status) -> str:
     place = "inside" if s.inside else "OUTSIDE"
     return (
         f"{s.state:<9} {s.rate:5.0f}/s  p99 {1e3 * s.latency:5.2f} ms  "
-        f"residual {1e3 * s.residual:4.1f} mm  {place:<7}  c {s.c:5.2f}  "
+        f"residual {1e3 * s.residual:4.1f}, worst {1e3 * s.worst_residual:3.0f} mm  "
+        f"{place:<7}  c {s.c:5.2f}  "
         f"flexion {s.flexion:4.2f} ({s.measured:4.2f})  misses {s.misses}"
     )
 

@@ -6,54 +6,28 @@ import math
 import textwrap
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.errors import InvalidInput, NotEnoughData, naming
+from ikns.cli.plan_inputs import Assumed, Planned, assume, planned
+from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
     from ikns.experiments.statistics.assumed_spread import AssumedSpread
     from ikns.experiments.statistics.plan import Plan
     from ikns.experiments.statistics.power import Power
-    from ikns.experiments.study import Study
 
 __all__ = ["plan"]
-
-Experiment = Literal["tracking", "picking"]
 
 #: What is compared, in which unit, and over what a participant's trials are averaged.
 _VALUE = {
     "tracking": ("RMSE", "of 100", "trajectories"),
     "picking": ("time", "s", "objects"),
 }
-_PAPER_LEVELS = {"tracking": 3, "picking": 11}
-_PAPER_REPEATS = {"tracking": 3, "picking": 1}
-
-
-class _Design(NamedTuple):
-    """What is planned, and which of it overrides a declaration."""
-
-    experiment: Experiment
-    margin: float | None
-    participants: int | None
-    levels: int
-    repeats: int
-    seed: int
-    conditions: tuple[str, str] | None
-    others: list[str]
-    warnings: list[str]
-
-
-class _Assumed(NamedTuple):
-    """Where the spread is from."""
-
-    found: AssumedSpread
-    simulated: bool
-    warnings: list[str]
 
 
 def plan(
@@ -129,7 +103,7 @@ def plan(
     from ikns.experiments.statistics.plan import plan_participants
 
     refuse_picture(figure, force=force)
-    design = _design(
+    design = planned(
         study,
         experiment,
         margin=margin,
@@ -145,7 +119,7 @@ def plan(
             "file or by --margin, or a --difference to be shown, found neither."
         )
     with progress() as report:
-        assumed = _spread(
+        assumed = assume(
             design,
             given=(spread, level_spread, trial_spread),
             pilot=pilot,
@@ -191,164 +165,7 @@ def plan(
     )
 
 
-def _design(
-    study: Path | None,
-    experiment: Experiment | None,
-    *,
-    margin: float | None,
-    participants: int | None,
-    levels: int | None,
-    repeats: int | None,
-    seed: int | None,
-) -> _Design:
-    """Take what the study declares, and what the options say instead."""
-    if study is None:
-        name: Experiment = experiment or "tracking"
-        return _Design(
-            name,
-            margin,
-            participants,
-            levels or _PAPER_LEVELS[name],
-            repeats or _PAPER_REPEATS[name],
-            seed or 0,
-            None,
-            [],
-            [],
-        )
-    from ikns.experiments.study import read_study
-
-    found = read_study(study)
-    name = experiment or ("tracking" if found.tracking is not None else "picking")
-    said = _declared(found, name, study)
-    warned = [
-        f"{option} {given:g} instead of the {declared:g} that {study} declares."
-        for option, given, declared in (
-            ("--margin", margin, said["margin"]),
-            ("--participants", participants, said["participants"]),
-            ("--levels", levels, said["levels"]),
-            ("--repeats", repeats, said["repeats"]),
-        )
-        if given is not None and declared is not None and given != declared
-    ]
-    first, *others = said["conditions"]
-    if len(others) > 1:
-        warned.append(
-            f"planned for {first} against {others[0]}; the other comparisons of "
-            f"{study} need a plan of their own."
-        )
-    return _Design(
-        name,
-        said["margin"] if margin is None else margin,
-        participants or said["participants"],
-        levels or said["levels"],
-        repeats or said["repeats"],
-        found.seed if seed is None else seed,
-        (first, others[0]),
-        [f"Plan {x} with --experiment {x}." for x in found.designs if x != name]
-        if experiment is None
-        else [],
-        warned,
-    )
-
-
-def _declared(found: Study, experiment: Experiment, study: Path) -> dict[str, Any]:
-    """Read one experiment of a study in the words of both."""
-    people = found.participants if found.participants > 1 else None
-    if experiment == "tracking" and found.tracking is not None:
-        tracking = found.tracking
-        return {
-            "margin": tracking.margin,
-            "participants": people,
-            "levels": len(tracking.profiles),
-            "repeats": tracking.repeats,
-            "conditions": tracking.conditions,
-        }
-    if experiment == "picking" and found.picking is not None:
-        picking = found.picking
-        return {
-            "margin": picking.margin_s,
-            "participants": people,
-            "levels": len(picking.objects),
-            "repeats": picking.repeats,
-            "conditions": picking.conditions,
-        }
-    raise InvalidInput(
-        f"{study}: expected a study with [{experiment}], found only "
-        f"[{', '.join(found.designs)}]."
-    )
-
-
-def _spread(
-    design: _Design,
-    *,
-    given: tuple[float | None, float | None, float | None],
-    pilot: Path | None,
-    report: Any,
-) -> _Assumed:
-    """Find the spread: given, of a pilot, or of the paper."""
-    from ikns.experiments.statistics.assumed_spread import AssumedSpread, paper_spread
-    from ikns.experiments.statistics.power import Design, Spread
-
-    if any(part is not None for part in given):
-        if pilot is not None:
-            raise InvalidInput("expected --spread or --pilot, found both.")
-        parts = Spread(*(part or 0.0 for part in given))
-        mean = parts.of_subject_mean(Design(2, design.levels, design.repeats))
-        return _Assumed(AssumedSpread(parts, "as given", mean), False, [])
-    if pilot is None:
-        return _Assumed(paper_spread(design.experiment), False, [])
-    return _of_pilot(pilot, design, report)
-
-
-def _of_pilot(pilot: Path, design: _Design, report: Any) -> _Assumed:
-    """Measure the trials of a pilot again, from its visits."""
-    import numpy as np
-
-    from ikns.experiments.statistics.assumed_spread import pilot_spread
-    from ikns.experiments.summary import summarize
-
-    summary = summarize(pilot, progress=report)
-    groups = [g for g in summary.groups if getattr(g, design.experiment) is not None]
-    if not groups:
-        raise NotEnoughData(
-            f"{pilot}: expected visits of {design.experiment}, found none."
-        )
-    part = getattr(groups[0], design.experiment)
-    trials = part.trials()
-    if design.experiment == "tracking":
-        value, level = "rmse", "trajectory"
-    else:  # failures at the limit, as they will be tested
-        value, level = "time", "object"
-        late = np.where(trials["success"], trials["time"], trials["limit"])
-        trials = {**trials, "time": late}
-    with naming(str(pilot)):
-        found = pilot_spread(
-            trials,
-            value,
-            level=level,
-            conditions=design.conditions or _two(part),
-            simulated=part.simulated,
-        )
-    warned = [left.reason for left in summary.left_out]
-    if groups[0].simulated:
-        warned.append(
-            f"the pilot {pilot} is simulated: virtual participants spread as their "
-            "parameters say, people as they do."
-        )
-    if len(groups) > 1:
-        warned.append(f"the simulated participants of {pilot} are left out.")
-    return _Assumed(found, groups[0].simulated, warned)
-
-
-def _two(part: Any) -> tuple[str, str]:
-    if len(part.conditions) < 2:
-        raise NotEnoughData(
-            f"expected two conditions to compare, found {', '.join(part.conditions)}."
-        )
-    return part.conditions[0], part.conditions[1]
-
-
-def _assumption(found: AssumedSpread, design: _Design) -> str:
+def _assumption(found: AssumedSpread, design: Planned) -> str:
     """Say how much the differences are taken to spread, and who says so."""
     quantity, unit, over = _VALUE[design.experiment]
     parts = found.spread
@@ -395,8 +212,8 @@ def _curve_table(made: Plan, title: str) -> Any:
 def _result(
     study: Path | None,
     pilot: Path | None,
-    design: _Design,
-    assumed: _Assumed,
+    design: Planned,
+    assumed: Assumed,
     made: Plan,
 ) -> dict[str, Any]:
     quantity, unit, _ = _VALUE[design.experiment]
@@ -441,7 +258,7 @@ def _result(
 
 
 def _draw(
-    path: Path, made: Plan, assumed: _Assumed, *, aim: str, target: float, said: str
+    path: Path, made: Plan, assumed: Assumed, *, aim: str, target: float, said: str
 ) -> None:
     from ikns.view.power import power_figure
 

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 import typer
 
 from ikns.cli.options import AsJson
-from ikns.cli.visit_run import Arm, Screens, chosen, conduct, names, whose
+from ikns.cli.visit_drivers import Arm, Screens
+from ikns.cli.visit_run import chosen, conduct, names, whose
 from ikns.errors import InvalidInput
 
 __all__ = ["track"]

@@ -1,8 +1,7 @@
-"""What ``ikns track`` and ``ikns pick`` share: whose visit it is, what drives it."""
+"""What ``ikns track`` and ``ikns pick`` share: whose visit it is, how it goes."""
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 import webbrowser
 from collections.abc import Callable, Mapping, Sequence
@@ -10,30 +9,31 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import ikns
-from ikns.cli.live_session import live_session, software, stopped_by_signals
+from ikns.cli.live_session import software, stopped_by_signals
 from ikns.cli.output import show, table
-from ikns.cli.simulated import is_simulated
+from ikns.cli.visit_drivers import (
+    PAGE,
+    Arm,
+    Screens,
+    arm_driver,
+    arm_is_simulated,
+    arm_subject,
+    finger_opener,
+    input_said,
+    open_arm_source,
+    virtual_driver,
+)
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Conductor, Desk, Driver
-    from ikns.finger import Finger
     from ikns.runtime import Status
-    from ikns.session import RunWriter
-    from ikns.stream import Source
 
-__all__ = ["Arm", "Screens", "Whose", "chosen", "conduct", "names", "whose"]
+__all__ = ["Whose", "chosen", "conduct", "names", "whose"]
 
-#: What a page can drive, and how the visit names it.
-_PAGE = {
-    "gamepad": "gamepad at the participant's page",
-    "keyboard": "keyboard at the participant's page, 0.5 per second",
-    "mouse": "mouse at the participant's page",
-}
-_RING = "button that types a space at the participant's page"
 #: A virtual operator begins after this long, s.
 _VIRTUAL_WAIT = 2.0
 
@@ -60,52 +60,6 @@ class Whose:
     number: int
     stored: dict[str, Any]
     study: Any = None
-
-
-@dataclass(frozen=True)
-class Arm:
-    """What the condition "ikns" needs.
-
-    Parameters
-    ----------
-    subject : Path or None
-    source, finger : str or None
-        Addresses; without a finger nothing moves.
-    session : Path or None
-        Where its runs go; by default into the visit's folder.
-    smooth : bool
-    safe_state : str
-    hold_speed : float or None
-    view : bool
-        Whether the panel shows the body.
-    """
-
-    subject: Path | None
-    source: str | None
-    finger: str | None
-    session: Path | None
-    smooth: bool
-    safe_state: Literal["limp", "hold", "open"]
-    hold_speed: float | None
-    view: bool
-
-
-@dataclass(frozen=True)
-class Screens:
-    """Where the pages are served."""
-
-    host: str
-    port: int
-    browser: bool
-    rate: float
-    stick: str = "left"
-
-    def __post_init__(self) -> None:
-        """Refuse a rate that is none."""
-        if not 0 < self.rate <= 1000:
-            raise InvalidInput(
-                f"expected a --rate above 0 and up to 1000 Hz, found {self.rate:g}."
-            )
 
 
 def names(text: str) -> list[str]:
@@ -212,10 +166,10 @@ def conduct(
             "expected people or the virtual operator in a visit, found "
             f"{', '.join(conditions)}."
         )
-    subject = _subject(arm) if "ikns" in conditions else None
-    _finger(arm)
+    subject = arm_subject(arm) if "ikns" in conditions else None
+    finger_opener(arm)
     check_port(screens.host, screens.port)
-    simulated = virtual or (subject is not None and _simulated(subject, arm))
+    simulated = virtual or (subject is not None and arm_is_simulated(subject, arm))
     if who.study is not None and who.study.simulated != simulated:
         words = {True: "simulated", False: "with people"}
         raise InvalidInput(
@@ -229,7 +183,7 @@ def conduct(
         address = ""
         if subject is not None:
             # Sources that do not answer are told before anything is written.
-            with _open_source(arm, subject):
+            with open_arm_source(arm, subject):
                 ikns.warm_up()
         book = VisitBook(
             who.folder,
@@ -241,7 +195,7 @@ def conduct(
                 "variation_settings": {},
                 "participant_number": who.number,
                 "seed": seed,
-                "input": {name: _said(name, arm, screens) for name in conditions},
+                "input": {name: input_said(name, arm, screens) for name in conditions},
                 "session": _relative(session, who.folder) if subject else None,
                 "versions": software(),
             }
@@ -255,17 +209,17 @@ def conduct(
         conductor = Conductor(
             desk,
             book,
-            borne={*_PAGE, "ring"},
+            borne={*PAGE, "ring"},
             rest=rest,
             auto=_VIRTUAL_WAIT if virtual else None,
         )
-        held = {name: HeldInput() for name in _PAGE if name in conditions}
+        held = {name: HeldInput() for name in PAGE if name in conditions}
         drivers: Drivers = {}
         for name, one in held.items():
             drivers[name] = lambda one=one: nullcontext(one)  # type: ignore[misc]
         if virtual:
             drivers["virtual"] = lambda: nullcontext(
-                _operator(desk, screens, who, seed)
+                virtual_driver(desk, rate=screens.rate, seed=[seed, who.number])
             )
         if subject is not None:
             if arm.view:
@@ -276,10 +230,12 @@ def conduct(
                 )
                 address = window.url
                 shown.append(take)
-            drivers["ikns"] = lambda: _live(arm, subject, session, who, shown)
+            drivers["ikns"] = lambda: arm_driver(
+                arm, subject, session, who.participant, shown
+            )
         presses: SimpleQueue[None] = SimpleQueue()
         if "ring" in conditions:
-            drivers["ring"] = lambda: ring_driver(presses, _finger(arm))
+            drivers["ring"] = lambda: ring_driver(presses, finger_opener(arm))
         cockpit = stack.enter_context(
             Cockpit(
                 conductor,
@@ -305,113 +261,6 @@ def conduct(
             webbrowser.open(cockpit.url)
         carry_out(conductor, drivers, stop=stop, rate=screens.rate)
     _tell(who, conductor, as_json=as_json)
-
-
-def _subject(arm: Arm) -> ikns.Subject:
-    for name, value in (("--subject", arm.subject), ("--source", arm.source)):
-        if value is None:
-            raise InvalidInput(
-                f"the condition ikns needs {name}, found none; other --conditions need "
-                "nothing but a browser."
-            )
-    assert arm.subject is not None
-    return ikns.Subject.load(arm.subject)
-
-
-def _simulated(subject: ikns.Subject, arm: Arm) -> bool:
-    assert arm.subject is not None
-    assert arm.source is not None
-    scheme, _, rest = arm.source.partition(":")
-    played = [Path(rest.partition("?")[0])] if scheme == "replay" else []
-    return is_simulated(subject, arm.subject, played)
-
-
-def _open_source(arm: Arm, subject: ikns.Subject) -> AbstractContextManager[Source]:
-    from ikns.stream import open_source
-
-    assert arm.source is not None
-    return open_source(arm.source, needs=subject.skeleton.marker_set)
-
-
-def _live(
-    arm: Arm,
-    subject: ikns.Subject,
-    session: Path,
-    who: Whose,
-    shown: Sequence[Callable[[Status], None]],
-) -> AbstractContextManager[Driver]:
-    from ikns.control.controller import Settings
-    from ikns.experiments.conduct.live import live_driver
-
-    settings = Settings(hold_speed=arm.hold_speed)
-
-    def open_session(source: Source) -> AbstractContextManager[RunWriter]:
-        assert arm.subject is not None
-        return live_session(
-            session,
-            subject,
-            arm.subject,
-            {
-                **software(),
-                "source": arm.source,
-                "source_labels": list(source.labels),
-                "finger": arm.finger,
-                "safe_state": arm.safe_state,
-                "settings": dataclasses.asdict(settings),
-            },
-            rate=source.rate,
-            participant=who.participant,
-            resume=(session / "dataset_description.json").exists(),
-        )
-
-    def tell(status: Status) -> None:
-        for one in shown:
-            one(status)
-
-    return live_driver(
-        lambda: _open_source(arm, subject),
-        subject,
-        finger=_finger(arm),
-        open_session=open_session,
-        settings=settings,
-        smooth=arm.smooth,
-        on_status=tell if shown else None,
-    )
-
-
-def _finger(arm: Arm) -> Callable[[], Finger] | None:
-    from ikns.finger import Safety, open_finger
-
-    if arm.finger is None:
-        return None
-    address, safety = arm.finger, Safety(safe_state=arm.safe_state)
-    open_finger(address, safety=safety)  # an address that is none is told now
-    return lambda: open_finger(address, safety=safety)
-
-
-def _operator(desk: Any, screens: Screens, who: Whose, seed: int) -> Driver:
-    """Make a virtual operator with a stick, practised."""
-    import numpy as np
-
-    from ikns.experiments.conduct import VirtualInput
-    from ikns.simulation.operator import Delay, Operator, typical
-
-    rng = np.random.default_rng([seed, who.number])
-    operator = Operator(typical("gamepad").practised(9), rate=screens.rate, seed=rng)
-    return VirtualInput(operator, Delay(0.05, rate=screens.rate), desk.trial)
-
-
-def _said(condition: str, arm: Arm, screens: Screens) -> str:
-    """Say what drives a condition, for those who read the visit later."""
-    if condition == "ikns":
-        smooth = ", smoothed" if arm.smooth else ""
-        return f"{arm.source}{smooth}"
-    if condition == "gamepad":
-        stick = "right trigger" if screens.stick == "trigger" else "left stick, up"
-        return f"{_PAGE[condition]}, {stick}"
-    if condition == "ring":
-        return _RING
-    return _PAGE.get(condition, f"{condition} operator")
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -40,6 +40,8 @@ class ControlFrame(NamedTuple):
         Whether the hand is among the points of the map; false out of sight.
     residual : float
         Root mean square marker distance, m; NaN without markers.
+    worst_residual : float
+        Largest distance of a marker of the chain's segments, m; NaN without any.
     iterations : int
     converged : bool
     """
@@ -50,6 +52,7 @@ class ControlFrame(NamedTuple):
     in_sight: bool
     inside: bool
     residual: float
+    worst_residual: float
     iterations: int
     converged: bool
 
@@ -139,7 +142,7 @@ class FrameSolver:
             )
         self._markers[:] = seen
         place, c = np.empty(3), np.empty(self.null_space_map.directions_.shape[1])
-        residual, iterations, converged, known, status = control_frame(
+        residual, worst, iterations, converged, known, status = control_frame(
             *self._ik.packed,
             self._paths,
             self._map,
@@ -159,8 +162,9 @@ class FrameSolver:
         if status == UNSURE:  # never seen; the slow way then
             angles = q[7:][self._map.columns]
             c = np.reshape(self.null_space_map.control_signal(angles, place), -1)
+        inside = status == INSIDE_HULL
         return ControlFrame(
-            c, q, place, known, status == INSIDE_HULL, residual, iterations, converged
+            c, q, place, known, inside, residual, worst, iterations, converged
         )
 
 

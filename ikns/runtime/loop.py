@@ -55,8 +55,8 @@ class Status:
         So far; frames that took longer than a frame's time.
     latency : float
         99th percentile from receipt to command, s.
-    residual : float
-        Of the last pose, m.
+    residual, worst_residual : float
+        Of the last pose: all markers, and the farthest of the chain, m.
     inside : bool
         Whether the hand is within the points of the map.
     c, flexion, measured : float
@@ -72,6 +72,7 @@ class Status:
     misses: int
     latency: float
     residual: float
+    worst_residual: float
     inside: bool
     c: float
     flexion: float
@@ -341,6 +342,7 @@ class _Loop:
             misses=report.misses,
             latency=report.stages["total"].percentile(99),
             residual=math.nan if last is None else last.solved.residual,
+            worst_residual=math.nan if last is None else last.solved.worst_residual,
             inside=last is not None and last.solved.inside,
             c=math.nan if last is None else float(last.solved.c[0]),
             flexion=self._controller.flexion,
@@ -404,6 +406,7 @@ class _Loop:
                 sent,
                 self._measured,
                 solved.residual,
+                solved.worst_residual,
                 float(solved.inside),
                 float(STATES.index(decision.state)),
                 *durations,

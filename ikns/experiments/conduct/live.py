@@ -136,6 +136,7 @@ class LiveDriver:
             "latency": status.latency,
             "misses": status.misses,
             "residual": status.residual,
+            "worst_residual": status.worst_residual,
             "inside": status.inside,
         }
 
