@@ -6,7 +6,8 @@ clock, which processes share.
 
 1. At the cameras' pace, a session being written: from receipt to the finger's command
    in one process, and, side by side with that, from the call that sends a frame over
-   LSL in another process. Then 1000 Hz.
+   LSL in another process. Then 1000 Hz, and 100 Hz beside a thread that computes a
+   fifth of the time, as the server of a page does.
 2. At full speed: frames a second, and memory.
 3. Faults of source, servo, program and disk, each at random instants: state that the
    loop ends in, time until then against the stated one, commands beyond the limits of
@@ -59,6 +60,8 @@ def paces(pool: Executor, folder: Path, seconds: float, fast: float) -> dict[str
     found = {name: future.result() for name, future in wanted.items()}
     run = pool.submit(pace.replayed, folder, 1000.0, fast, True)
     found["in process, 1000 Hz"] = run.result()
+    run = pool.submit(pace.replayed, folder, 100.0, fast, True, busy=0.2)
+    found["in process, 100 Hz, busy thread"] = run.result()
     return {name: asdict(one) for name, one in found.items()}
 
 

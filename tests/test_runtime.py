@@ -353,11 +353,18 @@ def test_garbage_is_collected_before_the_finger_is_connected(subject, exploring)
     assert finger.frozen > 0
 
 
-def test_the_collector_is_as_it_was(subject, exploring):
+def test_the_interpreter_is_as_it_was(subject, exploring):
     import gc
+    import sys
 
+    before, during = sys.getswitchinterval(), []
     with source(exploring, speed=0) as stream:
-        run(stream, subject)
+        run(
+            stream,
+            subject,
+            on_decision=lambda *_: during.append(sys.getswitchinterval()),
+        )
+    assert max(during) < before == sys.getswitchinterval()
     assert gc.isenabled()
     assert gc.get_freeze_count() == 0
 

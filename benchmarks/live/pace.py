@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -123,15 +124,31 @@ def frame_rate(source: Source) -> float:
     return source.rate * source.speed
 
 
-def replayed(folder: Path, rate: float, seconds: float, session: bool) -> Pace:
-    """Play a recording into the loop of the same process."""
+def replayed(
+    folder: Path, rate: float, seconds: float, session: bool, *, busy: float = 0.0
+) -> Pace:
+    """Play a recording into the loop of the same process.
+
+    Beside it a thread may be busy, for a share of 16 ms, a page's time between draws.
+    """
     _, recording = person.load(folder)
     played = person.retimed(recording, rate)
     frames = round(rate * seconds)
     timed = _Timed(Source(Replay(played, loop=True)), frames)
+    over = Event()
+    if busy:
+        Thread(target=_compute, args=(busy, over), daemon=True).start()
     report = _run(timed, folder, played, session)
+    over.set()
     due = timed.received[0] + (timed.device - timed.device[0])
     return _pace(timed, report, timed.received, due, frames)
+
+
+def _compute(share: float, over: Event) -> None:
+    while not over.wait((1 - share) * 0.016):
+        until = time.monotonic() + share * 0.016
+        while time.monotonic() < until:
+            sum(range(50))
 
 
 def over_lsl(folder: Path, rate: float, seconds: float, session: bool) -> Pace:

@@ -8,28 +8,28 @@ from __future__ import annotations
 
 import gc
 import math
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ikns.control.controller import Controller, Decision, Settings
 from ikns.control.frame import FrameSolver
-from ikns.control.machine import Changes, Transition
+from ikns.control.machine import Changes
 from ikns.errors import MarkerMismatch
 from ikns.finger import Finger
+from ikns.runtime.report import Report, Status
 from ikns.session import RunWriter, micro
 from ikns.session.channels import STATES
 from ikns.stream import Frame, Source
-from ikns.stream.delays import Delays
 from ikns.subject import Subject
 
-__all__ = ["Report", "Status", "run"]
+__all__ = ["run"]
 
 #: The finger and the watchdog are looked after this often while no frame comes, s.
 _BEAT = 0.02
@@ -37,88 +37,12 @@ _BEAT = 0.02
 #: thread sleeps, code and data leave the processor's caches: the same frame then takes
 #: four times as long (benchmarks/live_loop.py). A rehearsal takes a third of this.
 _AHEAD = 1.5e-3
+#: For which other threads may keep the interpreter while the loop waits for it, s:
+#: what a frame takes. A page's server that computes a fifth of the time made the 99th
+#: percentile of a frame 3.4 ms at Python's own 5 ms, and 1.3 to 1.8 ms at this.
+_TURN = 5e-4
 #: What is sent when nothing may be: the finger stays where it is.
 _NOTHING = math.nan
-
-
-@dataclass(frozen=True)
-class Status:
-    """How it goes, for a line on a screen.
-
-    Parameters
-    ----------
-    time : float
-        Since the start, s.
-    rate : float
-        Frames per second over the last second or so.
-    frames, misses : int
-        So far; frames that took longer than a frame's time.
-    latency : float
-        99th percentile from receipt to command, s.
-    residual, worst_residual : float
-        Of the last pose: all markers, and the farthest of the chain, m.
-    inside : bool
-        Whether the hand is within the points of the map.
-    c, flexion, measured : float
-        Raw signal, what is asked, what the finger measured.
-    state : str
-    q : (nq,) array
-        Configuration of the last frame; NaN before the first.
-    """
-
-    time: float
-    rate: float
-    frames: int
-    misses: int
-    latency: float
-    residual: float
-    worst_residual: float
-    inside: bool
-    c: float
-    flexion: float
-    measured: float
-    state: str
-    q: NDArray[np.float64]
-
-
-@dataclass
-class Report:
-    """What happened, all told.
-
-    Parameters
-    ----------
-    frames, misses : int
-        Frames taken; those that took longer than a frame's time from receipt to
-        command.
-    rehearsals : int
-        Times that the caches were warmed before a frame was due.
-    seconds : float
-    stages : dict of Delays
-        ``solve`` (markers to decision), ``command`` (telling the finger), ``total``
-        (receipt to command), ``loop`` (all of an iteration, logging included).
-    transitions : list of Transition
-        From the start on; the last thousand.
-    source : dict
-        What was dropped, late, repeated or out of order.
-    fault : str
-        Why it ended, where it was not asked to.
-    lost_rows : int
-        Rows of the session that could not be written.
-    """
-
-    frames: int = 0
-    misses: int = 0
-    rehearsals: int = 0
-    seconds: float = 0.0
-    stages: dict[str, Delays] = field(
-        default_factory=lambda: {
-            name: Delays() for name in ("solve", "command", "total", "loop")
-        }
-    )
-    transitions: list[Transition] = field(default_factory=list)
-    source: dict[str, Any] = field(default_factory=dict)
-    fault: str = ""
-    lost_rows: int = 0
 
 
 def run(
@@ -191,8 +115,7 @@ def run(
     solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     solver.reset()
     stopped = threading.Event() if stop is None else stop
-    # Collecting garbage keeps every thread waiting, a finger's among them.
-    with _no_collector(), _hands_on(finger):
+    with _first_in_line(), _hands_on(finger):
         loop.begin()
         try:
             while not (stopped.is_set() or source.ended or loop.elapsed() >= duration):
@@ -424,18 +347,22 @@ def _hands_on(finger: Finger | None) -> Iterator[None]:
 
 
 @contextmanager
-def _no_collector() -> Iterator[None]:
-    """Keep Python's collector of cycles, which may take milliseconds, out of the loop.
+def _first_in_line() -> Iterator[None]:
+    """Let no other thread of the process keep the loop waiting for long.
 
-    The loop makes no cycles, so nothing piles up meanwhile.
+    Python's collector of cycles may take milliseconds; the loop makes no cycles, so
+    nothing piles up meanwhile. And a thread that computes keeps the interpreter for
+    5 ms by default, ten times as long as a frame takes.
     """
-    was_on = gc.isenabled()
+    was_on, interval = gc.isenabled(), sys.getswitchinterval()
     gc.collect()
     gc.freeze()
     gc.disable()
+    sys.setswitchinterval(min(interval, _TURN))
     try:
         yield
     finally:
+        sys.setswitchinterval(interval)
         gc.unfreeze()
         if was_on:
             gc.enable()
