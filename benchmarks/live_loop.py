@@ -7,7 +7,8 @@ clock, which processes share.
 1. At the cameras' pace, a session being written: from receipt to the finger's command
    in one process, and, side by side with that, from the call that sends a frame over
    LSL in another process. Then 1000 Hz, and 100 Hz beside a thread that computes a
-   fifth of the time, as the server of a page does.
+   fifth of the time, as the server of a page does, and beside programs that keep all
+   cores busy, without and, where the system allows it, with `--realtime`.
 2. At full speed: frames a second, and memory.
 3. Faults of source, servo, program and disk, each at random instants: state that the
    loop ends in, time until then against the stated one, commands beyond the limits of
@@ -35,6 +36,8 @@ from live import full_speed, pace, person, process_faults, servo_faults, stream_
 from live.outcome import LONGEST_STALL, Outcome, Summary, summarize
 
 import ikns
+from ikns.errors import InvalidInput
+from ikns.runtime import check_realtime
 
 PLACES = {"stream": stream_faults, "servo": servo_faults, "program": process_faults}
 FAULTS = {
@@ -60,8 +63,18 @@ def paces(pool: Executor, folder: Path, seconds: float, fast: float) -> dict[str
     found = {name: future.result() for name, future in wanted.items()}
     run = pool.submit(pace.replayed, folder, 1000.0, fast, True)
     found["in process, 1000 Hz"] = run.result()
-    run = pool.submit(pace.replayed, folder, 100.0, fast, True, busy=0.2)
-    found["in process, 100 Hz, busy thread"] = run.result()
+    beside: dict[str, dict[str, Any]] = {
+        "a busy thread": {"busy": 0.2},
+        "busy programs": {"programs": os.cpu_count()},
+    }
+    try:
+        check_realtime()
+        beside["them, in real time"] = beside["busy programs"] | {"realtime": True}
+    except InvalidInput as error:
+        sys.stderr.write(f"{error}\n")
+    for what, load in beside.items():
+        run = pool.submit(pace.replayed, folder, 100.0, fast, True, **load)
+        found[f"in process, 100 Hz, beside {what}"] = run.result()
     return {name: asdict(one) for name, one in found.items()}
 
 

@@ -97,6 +97,20 @@ def test_bad_input_is_one_sentence(files, tmp_path, capfd, more, says):
     assert says in check_refused(run_argv(files, *given), tmp_path, capfd)
 
 
+@pytest.mark.parametrize("command", ["run", "track"])
+def test_real_time_that_is_not_allowed_is_told(
+    files, tmp_path, capfd, monkeypatch, command
+):
+    def refuse(*_):
+        raise PermissionError("Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    argv = run_argv(files, "--realtime")
+    if command == "track":
+        argv = ["track", str(tmp_path / "visit"), "--conditions", "ikns", *argv[1:]]
+    assert "/etc/security/limits.conf" in check_refused(argv, tmp_path, capfd)
+
+
 def test_a_source_without_the_labels_is_refused(files, data, tmp_path, capfd):
     argv = run_argv(files, "--source", f"replay:{data}/box_lift/markers_analogs.c3d")
     assert "expected markers" in check_refused(argv, tmp_path, capfd)

@@ -1,5 +1,6 @@
 import dataclasses
 import math
+import os
 import threading
 import time
 
@@ -367,6 +368,54 @@ def test_the_interpreter_is_as_it_was(subject, exploring):
     assert max(during) < before == sys.getswitchinterval()
     assert gc.isenabled()
     assert gc.get_freeze_count() == 0
+
+
+@pytest.fixture(name="scheduler")
+def _scheduler(monkeypatch):
+    """Stand in for the system's scheduler: policies that were asked for."""
+    asked = [os.SCHED_OTHER]
+    monkeypatch.setattr(os, "sched_getscheduler", lambda _: asked[-1])
+    monkeypatch.setattr(os, "sched_getparam", lambda _: os.sched_param(0))
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda _, policy, __: asked.append(policy)
+    )
+    return asked
+
+
+def test_real_time_lasts_as_long_as_the_run(subject, exploring, scheduler):
+    during = set()
+    with source(exploring, speed=0) as stream:
+        run(
+            stream,
+            subject,
+            on_decision=lambda *_: during.add(scheduler[-1]),
+            realtime=True,
+        )
+    assert during == {os.SCHED_RR}
+    assert scheduler == [os.SCHED_OTHER, os.SCHED_RR, os.SCHED_OTHER]
+
+
+def test_without_being_asked_the_scheduler_is_left_alone(subject, exploring, scheduler):
+    with source(exploring, speed=0) as stream:
+        run(stream, subject)
+    assert scheduler == [os.SCHED_OTHER]
+
+
+def test_real_time_that_is_not_allowed_leaves_the_finger_untouched(
+    subject, exploring, scheduler, monkeypatch
+):
+    def refuse(*_):
+        raise PermissionError("Operation not permitted")
+
+    class Untouched(SimulatedFinger):
+        def connect(self):
+            pytest.fail("connected")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    with source(exploring, speed=0) as stream:
+        with pytest.raises(InvalidInput, match=r"rtprio 1 for the user"):
+            run(stream, subject, Untouched(), realtime=True)
+    assert scheduler == [os.SCHED_OTHER]
 
 
 def test_every_decision_is_handed_on_with_its_time(subject, exploring, tmp_path):

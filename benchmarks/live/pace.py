@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import tempfile
 import time
 from contextlib import ExitStack
@@ -125,11 +127,19 @@ def frame_rate(source: Source) -> float:
 
 
 def replayed(
-    folder: Path, rate: float, seconds: float, session: bool, *, busy: float = 0.0
+    folder: Path,
+    rate: float,
+    seconds: float,
+    session: bool,
+    *,
+    busy: float = 0.0,
+    programs: int = 0,
+    realtime: bool = False,
 ) -> Pace:
     """Play a recording into the loop of the same process.
 
-    Beside it a thread may be busy, for a share of 16 ms, a page's time between draws.
+    Beside it a thread may be busy, for a share of 16 ms, a page's time between draws,
+    and so may whole programs.
     """
     _, recording = person.load(folder)
     played = person.retimed(recording, rate)
@@ -138,7 +148,11 @@ def replayed(
     over = Event()
     if busy:
         Thread(target=_compute, args=(busy, over), daemon=True).start()
-    report = _run(timed, folder, played, session)
+    with ExitStack() as stack:
+        for _ in range(programs):
+            endless = [sys.executable, "-c", "while True: pass"]
+            stack.callback(subprocess.Popen(endless).kill)
+        report = _run(timed, folder, played, session, realtime=realtime)
     over.set()
     due = timed.received[0] + (timed.device - timed.device[0])
     return _pace(timed, report, timed.received, due, frames)
@@ -189,7 +203,14 @@ def _send(
         result.recv()  # the reader has all
 
 
-def _run(timed: _Timed, folder: Path, recording: Recording, session: bool) -> Any:
+def _run(
+    timed: _Timed,
+    folder: Path,
+    recording: Recording,
+    session: bool,
+    *,
+    realtime: bool = False,
+) -> Any:
     subject, _ = person.load(folder)
     with ExitStack() as stack:
         writer = None
@@ -198,7 +219,7 @@ def _run(timed: _Timed, folder: Path, recording: Recording, session: bool) -> An
             writer = stack.enter_context(
                 session_for(place, subject, folder / "person", recording)
             )
-        return run(timed, subject, timed, session=writer)
+        return run(timed, subject, timed, session=writer, realtime=realtime)
 
 
 def _pace(

@@ -83,6 +83,13 @@ def pick(
     view: Annotated[
         bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
     ] = True,
+    realtime: Annotated[
+        bool,
+        typer.Option(
+            "--realtime",
+            help="For ikns: before other programs, where the system allows it.",
+        ),
+    ] = False,
     host: Annotated[
         str,
         typer.Option(
@@ -155,6 +162,7 @@ def pick(
             safe_state=safe_state,
             hold_speed=hold_speed,
             view=view,
+            realtime=realtime,
         ),
         Screens(host, port, browser, 100.0),
         conditions=design["conditions"],

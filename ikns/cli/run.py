@@ -65,6 +65,12 @@ def run(
     view: Annotated[
         bool, typer.Option("--view", help="Show the body live in a browser.")
     ] = False,
+    realtime: Annotated[
+        bool,
+        typer.Option(
+            "--realtime", help="Before other programs, where the system allows it."
+        ),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
@@ -73,6 +79,7 @@ def run(
     """
     from ikns.control.controller import Settings
     from ikns.finger import Safety, open_finger
+    from ikns.runtime import check_realtime
     from ikns.runtime import run as drive
     from ikns.stream import open_source
 
@@ -80,6 +87,8 @@ def run(
         raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
     if resume and session is None:
         raise InvalidInput("--resume needs the --session to go on with.")
+    if realtime:
+        check_realtime()
     settings = Settings(hold_speed=hold_speed)
     calibrated = ikns.Subject.load(subject)
     device = open_finger(finger, safety=Safety(safe_state=safe_state))
@@ -130,6 +139,7 @@ def run(
             stop=stop,
             on_status=_each(shown) if shown else None,
             status_every=1 / 30 if view else _LINE_EVERY,
+            realtime=realtime,
         )
     result = _result(report) | {"session": session}
     show(

@@ -96,6 +96,13 @@ def track(
     view: Annotated[
         bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
     ] = True,
+    realtime: Annotated[
+        bool,
+        typer.Option(
+            "--realtime",
+            help="For ikns: before other programs, where the system allows it.",
+        ),
+    ] = False,
     rate: Annotated[
         float, typer.Option(help="How often a page's signal is written down, Hz.")
     ] = 100.0,
@@ -185,6 +192,7 @@ def track(
             safe_state=safe_state,
             hold_speed=None,
             view=view,
+            realtime=realtime,
         ),
         Screens(host, port, browser, rate, stick),
         conditions=design["conditions"],

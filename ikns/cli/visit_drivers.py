@@ -59,6 +59,8 @@ class Arm:
     hold_speed : float or None
     view : bool
         Whether the panel shows the body.
+    realtime : bool
+        Whether its loop runs before other programs.
     """
 
     subject: Path | None
@@ -69,6 +71,7 @@ class Arm:
     safe_state: Literal["limp", "hold", "open"]
     hold_speed: float | None
     view: bool
+    realtime: bool
 
 
 @dataclass(frozen=True)
@@ -95,8 +98,10 @@ def arm_subject(arm: Arm) -> ikns.Subject:
     Raises
     ------
     InvalidInput
-        Without a subject or a source.
+        Without a subject or a source, or when the system does not allow real time.
     """
+    from ikns.runtime import check_realtime
+
     for name, value in (("--subject", arm.subject), ("--source", arm.source)):
         if value is None:
             raise InvalidInput(
@@ -104,6 +109,8 @@ def arm_subject(arm: Arm) -> ikns.Subject:
                 "nothing but a browser."
             )
     assert arm.subject is not None
+    if arm.realtime:
+        check_realtime()
     return ikns.Subject.load(arm.subject)
 
 
@@ -168,6 +175,7 @@ def arm_driver(
         settings=settings,
         smooth=arm.smooth,
         on_status=tell if shown else None,
+        realtime=arm.realtime,
     )
 
 

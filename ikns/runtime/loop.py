@@ -6,9 +6,7 @@ One thread, no waiting but for the next frame. The finger hears from it at least
 
 from __future__ import annotations
 
-import gc
 import math
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -23,6 +21,7 @@ from ikns.control.frame import FrameSolver
 from ikns.control.machine import Changes
 from ikns.errors import MarkerMismatch
 from ikns.finger import Finger
+from ikns.runtime.priority import first_in_line
 from ikns.runtime.report import Report, Status
 from ikns.session import RunWriter, micro
 from ikns.session.channels import STATES
@@ -37,10 +36,6 @@ _BEAT = 0.02
 #: thread sleeps, code and data leave the processor's caches: the same frame then takes
 #: four times as long (benchmarks/live_loop.py). A rehearsal takes a third of this.
 _AHEAD = 1.5e-3
-#: For which other threads may keep the interpreter while the loop waits for it, s:
-#: what a frame takes. A page's server that computes a fifth of the time made the 99th
-#: percentile of a frame 3.4 ms at Python's own 5 ms, and 1.3 to 1.8 ms at this.
-_TURN = 5e-4
 #: What is sent when nothing may be: the finger stays where it is.
 _NOTHING = math.nan
 
@@ -57,6 +52,7 @@ def run(
     on_status: Callable[[Status], None] | None = None,
     status_every: float = 0.2,
     on_decision: Callable[[float, float, Decision], None] | None = None,
+    realtime: bool = False,
 ) -> Report:
     """Drive a finger with a person's null space until the source ends.
 
@@ -85,6 +81,8 @@ def run(
         Called after each frame's command with the time of its receipt (s, of
         `time.monotonic`), the flexion asked and the :class:`Decision`, from the loop,
         so it must not wait.
+    realtime : bool
+        Run before all ordinary programs of the machine, where the system allows it.
 
     Returns
     -------
@@ -92,6 +90,8 @@ def run(
 
     Raises
     ------
+    InvalidInput
+        When it does not allow it.
     MarkerMismatch
         When the source lacks markers that the subject wears.
     FingerError
@@ -115,7 +115,7 @@ def run(
     solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     solver.reset()
     stopped = threading.Event() if stop is None else stop
-    with _first_in_line(), _hands_on(finger):
+    with first_in_line(realtime=realtime), _hands_on(finger):
         loop.begin()
         try:
             while not (stopped.is_set() or source.ended or loop.elapsed() >= duration):
@@ -344,25 +344,3 @@ def _hands_on(finger: Finger | None) -> Iterator[None]:
         return
     with finger:
         yield
-
-
-@contextmanager
-def _first_in_line() -> Iterator[None]:
-    """Let no other thread of the process keep the loop waiting for long.
-
-    Python's collector of cycles may take milliseconds; the loop makes no cycles, so
-    nothing piles up meanwhile. And a thread that computes keeps the interpreter for
-    5 ms by default, ten times as long as a frame takes.
-    """
-    was_on, interval = gc.isenabled(), sys.getswitchinterval()
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    sys.setswitchinterval(min(interval, _TURN))
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(interval)
-        gc.unfreeze()
-        if was_on:
-            gc.enable()

@@ -71,7 +71,14 @@ class LiveDriver:
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def begin(self, source: Source, subject: Subject, settings: Settings) -> None:
+    def begin(
+        self,
+        source: Source,
+        subject: Subject,
+        settings: Settings,
+        *,
+        realtime: bool = False,
+    ) -> None:
         """Let the loop run."""
 
         def loop() -> None:
@@ -86,6 +93,7 @@ class LiveDriver:
                     on_status=self._told,
                     status_every=_STATUS_EVERY,
                     on_decision=self._decided,
+                    realtime=realtime,
                 )
             except (IknsError, OSError) as error:
                 self.fault = str(error)
@@ -181,6 +189,7 @@ def live_driver(
     settings: Settings | None = None,
     smooth: bool = False,
     on_status: Callable[[Status], None] | None = None,
+    realtime: bool = False,
 ) -> Iterator[LiveDriver]:
     """Run the live loop for a while.
 
@@ -199,6 +208,8 @@ def live_driver(
         See :class:`LiveDriver`.
     on_status : callable, optional
         Called from the loop some 30 times a second, so it must not wait.
+    realtime : bool
+        See :func:`ikns.runtime.run`.
     """
     with ExitStack() as stack:
         source = stack.enter_context(open_source())
@@ -207,5 +218,6 @@ def live_driver(
             finger() if finger else None, writer, smooth=smooth, on_status=on_status
         )
         stack.callback(driver.end)
-        driver.begin(source, subject, Settings() if settings is None else settings)
+        chosen = Settings() if settings is None else settings
+        driver.begin(source, subject, chosen, realtime=realtime)
         yield driver
