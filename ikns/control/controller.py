@@ -126,6 +126,7 @@ class Controller:
         self._device_time = -math.inf
         self._hand = (math.nan,) * 3
         self._markers = b""
+        self._counted: tuple[float, NDArray[np.float64] | None] = (-math.inf, None)
 
     @property
     def smoothing_delay(self) -> float:
@@ -159,17 +160,21 @@ class Controller:
             self._device_time, self._markers = device_time, seen
         solved = self.solver.solve(markers)
         c = float(solved.c[0])
-        valid = bool(
-            new
-            and solved.in_sight
-            and math.isfinite(c)
-            and solved.residual <= self.settings.max_residual
-            and solved.worst_residual <= self.settings.max_worst_residual
+        astray = bool(
+            solved.residual > self.settings.max_residual
+            or solved.worst_residual > self.settings.max_worst_residual
         )
+        valid = new and solved.in_sight and math.isfinite(c) and not astray
         machine = self.machine
         changes = machine.pose(receive_time) if valid else machine.check(receive_time)
         if valid:
+            self._counted = receive_time, solved.q
             self._follow(c, solved.hand_in_thorax, dt)
+        elif astray:
+            # Such a pose is no place to start the next from; nor is one of long ago.
+            at, q = self._counted
+            recent = receive_time - at < self.settings.safe_after
+            self.solver.reset(q if recent else None)
         return Decision(solved, valid, self.flexion, machine.state, changes)
 
     def check(self, now: float) -> Changes:
