@@ -115,6 +115,17 @@ def test_a_pose_that_explains_nothing_does_not_count(subject, exploring, limit):
     assert not made.frame(frames(subject, exploring)[0], 0.0, 0.0).valid
 
 
+@pytest.mark.parametrize("name", ["residual", "worst_residual"])
+def test_a_distance_that_is_no_number_does_not_count(subject, exploring, name):
+    made = controller(subject)
+    markers = frames(subject, exploring)[0]
+    good = made.frame(markers, 0.0, 0.0)
+    assert good.valid
+    found = good.solved._replace(**{name: math.nan})
+    made.solver.solve = lambda _: found
+    assert not made.frame(markers + 1e-3, 0.02, 0.02).valid
+
+
 @given(data=st.data())
 def test_a_marker_half_a_meter_astray_never_counts(subject, exploring, data):
     # With all markers in sight no posture brings one there and leaves the others; of

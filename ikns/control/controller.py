@@ -160,17 +160,16 @@ class Controller:
             self._device_time, self._markers = device_time, seen
         solved = self.solver.solve(markers)
         c = float(solved.c[0])
-        astray = bool(
-            solved.residual > self.settings.max_residual
-            or solved.worst_residual > self.settings.max_worst_residual
-        )
-        valid = new and solved.in_sight and math.isfinite(c) and not astray
+        most, worst = self.settings.max_residual, self.settings.max_worst_residual
+        # Without a number nothing is explained.
+        explained = solved.residual <= most and solved.worst_residual <= worst
+        valid = bool(new and solved.in_sight and math.isfinite(c) and explained)
         machine = self.machine
         changes = machine.pose(receive_time) if valid else machine.check(receive_time)
         if valid:
             self._counted = receive_time, solved.q
             self._follow(c, solved.hand_in_thorax, dt)
-        elif astray:
+        elif solved.residual > most or solved.worst_residual > worst:
             # Such a pose is no place to start the next from; nor is one of long ago.
             at, q = self._counted
             recent = receive_time - at < self.settings.safe_after
