@@ -85,9 +85,13 @@ def knock(
             frames = 0
             while frames < 10 and (answer := await link.read_message()) is not None:
                 frames += json.loads(answer)["kind"] == "now"
-        if link.close_code is not None:
-            message = {"closed": link.close_code}
+        shown_out = link.close_code
         link.close()
+        if shown_out is not None:
+            return {"closed": shown_out}
+        # Hear the server say so, too: our socket is closed only then.
+        while await link.read_message() is not None:
+            pass
         return message
 
     return asyncio.run(asyncio.wait_for(come(), 10))
