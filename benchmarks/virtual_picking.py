@@ -35,7 +35,7 @@ from functools import partial
 
 import numpy as np
 
-from ikns.control.controller import Settings
+from ikns.control.settings import Settings
 from ikns.experiments.picking import OBJECT_IDS, load_objects, pick_schedule
 from ikns.experiments.picking.virtual import VIRTUAL_CONDITIONS, virtual_pick_step
 from ikns.simulation.operator import draw_participant

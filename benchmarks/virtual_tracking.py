@@ -27,7 +27,7 @@ from functools import partial
 
 import numpy as np
 
-from ikns.control.controller import Settings
+from ikns.control.settings import Settings
 from ikns.experiments.tracking import (
     CHARACTERS,
     draw_profile,

@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 from ikns.session import open_run
+from ikns.session.channels import model_channels
 
 
 def main(session: Path) -> None:
@@ -16,12 +17,13 @@ def main(session: Path) -> None:
         configuration={},
         subject={"map.json": "{}"},
     )
+    figures = [0.5] * (len(model_channels(["elbow"])) - 4)
     start = time.monotonic()
     frame = 0
     while True:
         now = time.monotonic() - start
         run.row("markers", [frame, now, now, *[0.1 * k for k in range(6)]])
-        run.row("model", [0.5] * 17 + [1.0, 2.0, 0.0, 0.0])
+        run.row("model", figures + [1.0, 2.0, 0.0, 0.0])
         if frame % 50 == 0:
             run.row("events", [now, 0.0, "tick", str(frame)])
         sys.stdout.write(f"{frame} {now}\n")

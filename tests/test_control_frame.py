@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 
 from ikns.calibration import in_sight, sight_needs
 from ikns.control import FrameSolver
@@ -89,7 +90,7 @@ def test_a_frame_is_its_steps_one_by_one(skeleton, chain, settings):
     chain_markers = np.concatenate(needs)
     shown = np.all(list(in_sight(skeleton, recording, chain).values()), axis=0)
     assert shown.any()
-    inside = 0
+    inside, worn = 0, skeleton.markers_in_world(poses[0])
     steps = one_by_one(skeleton, learned, chain, frames)
     for seen, known, (pose, place, c, within) in zip(frames, shown, steps, strict=True):
         frame = solver.solve(seen)
@@ -100,6 +101,12 @@ def test_a_frame_is_its_steps_one_by_one(skeleton, chain, settings):
         # pin's forward kinematics against our own: rounding of places of up to 1 m.
         worst = np.nanmax(away[chain_markers])
         assert frame.worst_residual == pytest.approx(worst, abs=1e-14)
+        # scipy's distances of what is seen against those of the model in any posture:
+        # the same rounding.
+        off = [
+            np.nanmax([0.0, *np.abs(pdist(seen[c]) - pdist(worn[c]))]) for c in needs
+        ]
+        assert frame.intermarker_error == pytest.approx(max(off), abs=1e-14)
         assert (frame.iterations, frame.converged) == (pose.iterations, pose.converged)
         assert frame.in_sight == known
         assert frame.inside == (known and within)
@@ -120,6 +127,7 @@ def test_without_markers_the_pose_stays_and_there_is_no_signal(skeleton):
     gone = solver.solve(np.full_like(frames[0], np.nan))
     np.testing.assert_array_equal(gone.q, before.q)
     assert np.isnan([gone.residual, gone.worst_residual]).all()
+    assert gone.intermarker_error == 0
     assert np.isnan(gone.c).all()
     assert not gone.in_sight
     assert not gone.inside

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ikns.control.controller import Settings
 from ikns.control.machine import SafetyMachine
+from ikns.control.settings import Settings
 from ikns.control.smoothing import OneEuro
 from ikns.errors import InvalidInput
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.control.controller import Settings
+from ikns.control.settings import Settings
 from ikns.errors import InvalidInput
 from ikns.experiments.tracking import (
     draw_profile,

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from ikns.calibration import sight_needs
 from ikns.control import FrameSolver
-from ikns.control.controller import Controller, Settings
+from ikns.control.controller import Controller
+from ikns.control.settings import Settings
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.finger import SimulatedFinger
 from ikns.recording import Recording
@@ -109,13 +110,16 @@ def test_a_device_clock_that_starts_anew_is_followed(subject, exploring):
     assert made.frame(markers[1], 0.0, 0.02).valid
 
 
-@pytest.mark.parametrize("limit", ["max_residual", "max_worst_residual"])
+LIMITS = ["max_residual", "max_worst_residual", "max_intermarker_error"]
+
+
+@pytest.mark.parametrize("limit", LIMITS)
 def test_a_pose_that_explains_nothing_does_not_count(subject, exploring, limit):
     made = controller(subject, **{limit: 1e-9})
     assert not made.frame(frames(subject, exploring)[0], 0.0, 0.0).valid
 
 
-@pytest.mark.parametrize("name", ["residual", "worst_residual"])
+@pytest.mark.parametrize("name", [limit.removeprefix("max_") for limit in LIMITS])
 def test_a_distance_that_is_no_number_does_not_count(subject, exploring, name):
     made = controller(subject)
     markers = frames(subject, exploring)[0]
@@ -126,20 +130,66 @@ def test_a_distance_that_is_no_number_does_not_count(subject, exploring, name):
     assert not made.frame(markers + 1e-3, 0.02, 0.02).valid
 
 
+def of_chain(subject):
+    """Columns of the chain's markers, by segment."""
+    needs = sight_needs(subject.skeleton, subject.chain).values()
+    return [columns for columns, _ in needs]
+
+
+@given(data=st.data())
+def test_a_marker_that_leaves_its_segment_is_named(subject, exploring, data):
+    # Pulled by 0.25 m straight away from the middle of the others of its segment. One
+    # of them at least lies on that side of it, so their distance d grows to
+    # sqrt(d^2 + 0.25^2) or more: by 85 mm where d is up to 0.33 m, as here.
+    segments = [own for own in of_chain(subject) if len(own) >= 3]
+    seen = frames(subject, exploring)
+    own = data.draw(st.sampled_from(segments))
+    k, which = data.draw(st.integers(0, len(seen) - 1)), data.draw(st.sampled_from(own))
+    others = [column for column in own if column != which]
+    assume(np.isfinite(seen[k, own]).all())
+    away = seen[k, which] - seen[k, others].mean(axis=0)
+    markers = seen[k].copy()
+    markers[which] += 0.25 * away / np.linalg.norm(away)
+    made = controller(subject)
+    assume(made.frame(seen[k], 0.0, 0.0).valid)  # in sight
+    decision = made.frame(markers, 0.02, 0.02)
+    assert not decision.valid
+    label = subject.skeleton.marker_set.labels[which]
+    assert label in decision.refused
+    assert "farther apart than at calibration" in decision.refused
+
+
+def test_a_refusal_says_what_to_look_after(subject, exploring):
+    seen = frames(subject, exploring)
+    labels = subject.skeleton.marker_set.labels
+    made = controller(subject)
+    assert made.frame(seen[0], 0.0, 0.0).refused == ""
+    assert made.frame(seen[0], 0.02, 0.02).refused == "the same picture again"
+    hidden = seen[1].copy()
+    hidden[of_chain(subject)[-1]] = np.nan
+    assert "right hand is not in sight" in made.frame(hidden, 0.04, 0.04).refused
+    alone = next(own for own in of_chain(subject) if len(own) == 1)[0]
+    astray = seen[2].copy()
+    astray[alone] += 1.0
+    told = made.frame(astray, 0.06, 0.06).refused
+    assert told.startswith(f"{labels[alone]} is ")
+    anywhere = seen[3] + np.random.default_rng(0).normal(0, 0.5, seen[3].shape)
+    assert "than at calibration" in made.frame(anywhere, 0.08, 0.08).refused
+
+
 @given(data=st.data())
 def test_a_marker_half_a_meter_astray_never_counts(subject, exploring, data):
     # With all markers in sight no posture brings one there and leaves the others; of
     # 20000 draws on other people none did.
-    needs = sight_needs(subject.skeleton, subject.chain).values()
-    of_chain = np.concatenate([columns for columns, _ in needs]).tolist()
+    chain = np.concatenate(of_chain(subject)).tolist()
     seen = frames(subject, exploring)
     k = data.draw(st.integers(1, len(seen) - 1))
-    markers, which = seen[k].copy(), data.draw(st.sampled_from(of_chain))
+    markers, which = seen[k].copy(), data.draw(st.sampled_from(chain))
     angle = data.draw(st.floats(-math.pi, math.pi))
     height = data.draw(st.floats(-1, 1))
     around = math.sqrt(1 - height**2)
     where = [around * math.cos(angle), around * math.sin(angle), height]
-    assume(np.isfinite(markers[of_chain]).all())
+    assume(np.isfinite(markers[chain]).all())
     markers[which] += 0.5 * np.array(where)
     made = controller(subject)
     assume(made.frame(seen[k - 1], 0.0, 0.0).valid)  # in sight
@@ -152,12 +202,11 @@ def test_after_a_marker_was_astray_the_next_frame_counts_again(
 ):
     # The arm is in sight, and one marker is off by a meter for 60 ms: what was found
     # meanwhile must not be where the solver starts from.
-    needs = sight_needs(subject.skeleton, subject.chain).values()
-    of_chain = np.concatenate([columns for columns, _ in needs]).tolist()
+    chain = np.concatenate(of_chain(subject)).tolist()
     seen = frames(subject, exploring)
     k = data.draw(st.integers(1, len(seen) - 5))
-    assume(np.isfinite(seen[k - 1 : k + 4, of_chain]).all())
-    which = data.draw(st.sampled_from(of_chain))
+    assume(np.isfinite(seen[k - 1 : k + 4, chain]).all())
+    which = data.draw(st.sampled_from(chain))
     sign, axis = data.draw(st.sampled_from([-1, 1])), data.draw(st.integers(0, 2))
     made, undisturbed = controller(subject), controller(subject)
     before = made.frame(seen[k - 1], 0.0, 0.0)

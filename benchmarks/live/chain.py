@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from ikns.control.controller import Settings
+from ikns.control.settings import Settings
 from ikns.errors import FileError
 from ikns.finger import Finger, FingerState, Limits
 from ikns.recording import Recording

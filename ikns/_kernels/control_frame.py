@@ -45,6 +45,10 @@ class ControlMap(NamedTuple):
         Link that a marker shows, or -1.
     need : (L,) integer array
         Markers of a link that must be seen.
+    pair : (N, 2) integer array
+        Markers of the same link, two and two.
+    apart : (N,) array
+        How far apart they are on the link, m.
     """
 
     points: Floats
@@ -57,6 +61,8 @@ class ControlMap(NamedTuple):
     hands: Indices
     link: Indices
     need: Indices
+    pair: Indices
+    apart: Floats
 
 
 @compiled
@@ -75,7 +81,7 @@ def control_frame(
     weights: Floats,
     place: Floats,
     c: Floats,
-) -> tuple[float, float, int, bool, bool, int]:
+) -> tuple[float, float, float, int, bool, bool, int]:
     """Solve a frame.
 
     Parameters
@@ -106,6 +112,9 @@ def control_frame(
         As from marker inverse kinematics.
     worst : float
         Largest distance of a marker of the chain's links, m; NaN without any.
+    intermarker : float
+        Largest difference of a distance between two markers of a link from what it is
+        on that link, m; 0 where no two are seen.
     iterations : int
     converged : bool
         As from marker inverse kinematics.
@@ -121,6 +130,7 @@ def control_frame(
         problem, s, markers, q, from_scratch, q
     )
     worst = _worst_residual(problem, s, control_map.link, q)
+    intermarker = _intermarker_error(markers, control_map.pair, control_map.apart)
     known = _in_sight(markers, control_map.link, control_map.need)
     n_angles = len(q) - 7
     place_frames(paths, q[7:].reshape(1, n_angles), rotation, position)
@@ -133,7 +143,7 @@ def control_frame(
     for k in range(len(c)):
         c[k] = np.nan
     if not known:
-        return residual, worst, iterations, converged, known, NOT_FINITE
+        return residual, worst, intermarker, iterations, converged, known, NOT_FINITE
     if len(control_map.indices):
         status = natural_weights(
             control_map.numbers, control_map.indices, place, cavity_work, weights
@@ -149,7 +159,7 @@ def control_frame(
         q[7:],
         c,
     )
-    return residual, worst, iterations, converged, known, status
+    return residual, worst, intermarker, iterations, converged, known, status
 
 
 @compiled
@@ -178,6 +188,20 @@ def _worst_residual(
                 square += s.error[m, k] ** 2
             largest = max(largest, square)
     return np.sqrt(largest) if largest >= 0 else np.nan
+
+
+@compiled
+def _intermarker_error(markers: Floats, pair: Indices, apart: Floats) -> float:
+    largest = 0.0
+    for i in range(len(pair)):
+        square = total = 0.0
+        for k in range(3):
+            first, second = markers[pair[i, 0], k], markers[pair[i, 1], k]
+            total += abs(first) + abs(second)
+            square += (first - second) ** 2
+        if np.isfinite(total):
+            largest = max(largest, abs(np.sqrt(square) - apart[i]))
+    return largest
 
 
 @compiled

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -77,7 +78,7 @@ def run(
 
     Research software, not a medical device.
     """
-    from ikns.control.controller import Settings
+    from ikns.control.settings import Settings
     from ikns.finger import Safety, open_finger
     from ikns.runtime import check_realtime
     from ikns.runtime import run as drive
@@ -170,7 +171,9 @@ def _status_line() -> Iterator[list[Callable[[Status], None]]]:
         nonlocal last
         if status.time - last >= _LINE_EVERY:
             last = status.time
-            sys.stderr.write(f"\r\x1b[K{_line(status)}")
+            # A line that wraps could not be written over.
+            room = shutil.get_terminal_size().columns - 1
+            sys.stderr.write(f"\r\x1b[K{_line(status)[:room]}")
             sys.stderr.flush()
 
     yield [write]
@@ -186,12 +189,16 @@ def _each(shown: list[Callable[[Status], None]]) -> Callable[[Status], None]:
 
 
 def _line(s: Status) -> str:
+    """Say how it goes, what matters most first: a narrow terminal cuts the rest."""
     place = "inside" if s.inside else "OUTSIDE"
+    pose = (
+        f"{place:<7}  residual {1e3 * s.residual:4.1f}, worst "
+        f"{1e3 * s.worst_residual:3.0f} mm"
+    )
     return (
-        f"{s.state:<9} {s.rate:5.0f}/s  p99 {1e3 * s.latency:5.2f} ms  "
-        f"residual {1e3 * s.residual:4.1f}, worst {1e3 * s.worst_residual:3.0f} mm  "
-        f"{place:<7}  c {s.c:5.2f}  "
-        f"flexion {s.flexion:4.2f} ({s.measured:4.2f})  misses {s.misses}"
+        f"{s.state:<9} c {s.c:5.2f}  flexion {s.flexion:4.2f} ({s.measured:4.2f})  "
+        f"{s.refused or pose}  {s.rate:5.0f}/s  p99 {1e3 * s.latency:5.2f} ms  "
+        f"misses {s.misses}"
     )
 
 

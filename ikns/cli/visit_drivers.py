@@ -139,7 +139,7 @@ def arm_driver(
     shown: Sequence[Callable[[Status], None]],
 ) -> AbstractContextManager[Driver]:
     """Make the live loop drive, with a session of its own; every status is shown."""
-    from ikns.control.controller import Settings
+    from ikns.control.settings import Settings
     from ikns.experiments.conduct.live import live_driver
 
     settings = Settings(hold_speed=arm.hold_speed)

@@ -7,7 +7,6 @@ same times give the same answers, bit for bit, live and replayed from a session.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,62 +14,18 @@ from numpy.typing import NDArray
 
 from ikns.control.frame import ControlFrame, FrameSolver
 from ikns.control.machine import Changes, SafetyMachine, State
+from ikns.control.refusal import explains, refusal
+from ikns.control.settings import Settings
 from ikns.control.smoothing import OneEuro
-from ikns.errors import InvalidInput
 
-__all__ = ["Controller", "Decision", "Settings"]
+__all__ = ["Controller", "Decision"]
 
 #: A device clock that runs back by more than this was started anew, s.
 _RESTART = 1.0
 #: Cut-off of the hand's speed, Hz: natural reaches lie below it.
 _SPEED_CUTOFF = 5.0
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How the control signal becomes a flexion.
-
-    Parameters
-    ----------
-    cutoff, beta : float
-        Of the smoothing, Hz and Hz per (unit of c / s); see
-        :class:`ikns.control.smoothing.OneEuro`. The defaults are ours: with a share
-        ``a = w dt / (1 + w dt)`` of each innovation (w = 2 pi times the cut-off) they
-        leave ``sqrt(a / (2 - a))``, a quarter, of white noise of 100 Hz at rest and
-        cost ``dt (1 - a) / a = 1 / w``, 80 ms; where c moves by 1 per second, 16 ms.
-    dead_band : float
-        Smaller changes of flexion are not passed on.
-    hold_speed : float, optional
-        While the hand is faster, the flexion stays as it is, m/s. Default: never.
-    max_residual : float
-        A pose that explains the markers worse than this is none, m, root mean square.
-    max_worst_residual : float
-        Nor is one that leaves a marker of the chain farther off, m. The default is a
-        little more than the 70 mm that two people came to in daily activities
-        (``benchmarks/stray_marker.py``).
-    hold_after, safe_after : float
-        See :class:`ikns.control.machine.SafetyMachine`, s.
-    """
-
-    cutoff: float = 2.0
-    beta: float = 3.0
-    dead_band: float = 0.005
-    hold_speed: float | None = None
-    max_residual: float = 0.05
-    max_worst_residual: float = 0.08
-    hold_after: float = 0.1
-    safe_after: float = 0.5
-
-    def __post_init__(self) -> None:
-        """Refuse what makes no sense."""
-        if not 0 <= self.dead_band < 1:
-            raise InvalidInput(
-                f"expected a dead band from 0 to below 1, found {self.dead_band:g}."
-            )
-        for name in ("hold_speed", "max_residual", "max_worst_residual"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < math.inf:
-                raise InvalidInput(f"expected a positive {name}, found {value:g}.")
+#: Why there is no pose while no frame has come since the last that counted.
+_SILENCE = "no frame came"
 
 
 class Decision(NamedTuple):
@@ -80,8 +35,8 @@ class Decision(NamedTuple):
     ----------
     solved : ControlFrame
         Pose and raw control signal.
-    valid : bool
-        Whether the pose counts.
+    refused : str
+        Why the frame does not count, in words; empty if it does.
     flexion : float
         What the finger is asked, 0 to 1; NaN before the first pose.
     state : str
@@ -91,10 +46,15 @@ class Decision(NamedTuple):
     """
 
     solved: ControlFrame
-    valid: bool
+    refused: str
     flexion: float
     state: State
     changes: Changes
+
+    @property
+    def valid(self) -> bool:
+        """Whether the frame counts."""
+        return not self.refused
 
 
 class Controller:
@@ -126,6 +86,7 @@ class Controller:
         self._device_time = -math.inf
         self._hand = (math.nan,) * 3
         self._markers = b""
+        self._why = _SILENCE
         self._counted: tuple[float, NDArray[np.float64] | None] = (-math.inf, None)
 
     @property
@@ -159,26 +120,27 @@ class Controller:
         else:
             self._device_time, self._markers = device_time, seen
         solved = self.solver.solve(markers)
-        c = float(solved.c[0])
-        most, worst = self.settings.max_residual, self.settings.max_worst_residual
-        # Without a number nothing is explained.
-        explained = solved.residual <= most and solved.worst_residual <= worst
-        valid = bool(new and solved.in_sight and math.isfinite(c) and explained)
+        refused = refusal(self.solver, self.settings, markers, solved, new=new)
         machine = self.machine
-        changes = machine.pose(receive_time) if valid else machine.check(receive_time)
-        if valid:
+        if refused:
+            self._why = refused
+            changes = machine.check(receive_time, refused)
+            # Its pose may be wrong and no place to start the next from; nor is one of
+            # long ago.
+            if not explains(solved, self.settings):
+                at, q = self._counted
+                recent = receive_time - at < self.settings.safe_after
+                self.solver.reset(q if recent else None)
+        else:
+            changes = machine.pose(receive_time, self._why)
+            self._why = _SILENCE
             self._counted = receive_time, solved.q
-            self._follow(c, solved.hand_in_thorax, dt)
-        elif solved.residual > most or solved.worst_residual > worst:
-            # Such a pose is no place to start the next from; nor is one of long ago.
-            at, q = self._counted
-            recent = receive_time - at < self.settings.safe_after
-            self.solver.reset(q if recent else None)
-        return Decision(solved, valid, self.flexion, machine.state, changes)
+            self._follow(float(solved.c[0]), solved.hand_in_thorax, dt)
+        return Decision(solved, refused, self.flexion, machine.state, changes)
 
     def check(self, now: float) -> Changes:
         """Ask the watchdog while no frame comes."""
-        return self.machine.check(now)
+        return self.machine.check(now, self._why)
 
     def _follow(self, c: float, hand: NDArray[np.float64], dt: float) -> None:
         place = tuple(hand.tolist())

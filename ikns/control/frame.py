@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +43,9 @@ class ControlFrame(NamedTuple):
         Root mean square marker distance, m; NaN without markers.
     worst_residual : float
         Largest distance of a marker of the chain's segments, m; NaN without any.
+    intermarker_error : float
+        Largest difference between the distance of two markers of a segment and what it
+        is on the person's skeleton, m; 0 where no two are seen.
     iterations : int
     converged : bool
     """
@@ -53,6 +57,7 @@ class ControlFrame(NamedTuple):
     inside: bool
     residual: float
     worst_residual: float
+    intermarker_error: float
     iterations: int
     converged: bool
 
@@ -142,7 +147,7 @@ class FrameSolver:
             )
         self._markers[:] = seen
         place, c = np.empty(3), np.empty(self.null_space_map.directions_.shape[1])
-        residual, worst, iterations, converged, known, status = control_frame(
+        residual, worst, apart, iterations, converged, known, status = control_frame(
             *self._ik.packed,
             self._paths,
             self._map,
@@ -164,7 +169,7 @@ class FrameSolver:
             c = np.reshape(self.null_space_map.control_signal(angles, place), -1)
         inside = status == INSIDE_HULL
         return ControlFrame(
-            c, q, place, known, inside, residual, worst, iterations, converged
+            c, q, place, known, inside, residual, worst, apart, iterations, converged
         )
 
 
@@ -172,9 +177,14 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
     labels = list(skeleton.marker_set.labels)
     link = np.full(len(labels), -1, dtype=np.int64)
     need: list[int] = []
+    pairs: list[tuple[int, int]] = []
     for columns, least in sight_needs(skeleton, chain).values():
         link[columns] = len(need)
         need.append(least)
+        pairs += combinations(columns, 2)
+    pair = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    # On one link, so these are its own coordinates.
+    first, second = skeleton.marker_positions[pair.T]
     interpolator = learned.interpolator_
     numbers, indices = np.empty(0), np.empty(0, dtype=np.int64)
     if isinstance(interpolator, NaturalNeighborInterpolator):
@@ -191,4 +201,6 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
         hands=np.array(hands, dtype=np.int64),
         link=link,
         need=np.array(need, dtype=np.int64),
+        pair=pair,
+        apart=np.linalg.norm(first - second, axis=1),
     )

@@ -88,25 +88,29 @@ class SafetyMachine:
         ready = self.state == "armed" and now - self._seen <= self.hold_after
         return self._go(now, "active", reason) if ready else ()
 
-    def pose(self, now: float) -> Changes:
-        """Tell that a valid pose has come."""
+    def pose(self, now: float, why: str = "") -> Changes:
+        """Tell that a valid pose has come, and why there was none before."""
         # The watchdog speaks first: what comes after too long a silence is too late.
-        late = self.check(now)
+        late = self.check(now, why)
         if self.state != "safe":
             self._seen = self._at(now)
         if self.state == "holding":
             return late + self._go(now, "active", "poses are back")
         return late
 
-    def check(self, now: float) -> Changes:
-        """Ask the watchdog; to be called at least as often as the finger is told."""
+    def check(self, now: float, why: str = "") -> Changes:
+        """Ask the watchdog; to be called at least as often as the finger is told.
+
+        `why` there is no pose, if known, goes into the reason.
+        """
         now = self._at(now)
         silence = now - self._seen
+        reason = f"no valid pose for {silence:.3f} s" + (f": {why}" if why else "")
         moving = self.state in ("active", "holding")
         if moving and silence > self.safe_after:
-            return self._go(now, "safe", f"no valid pose for {silence:.3f} s")
+            return self._go(now, "safe", reason)
         if self.state == "active" and silence > self.hold_after:
-            return self._go(now, "holding", f"no valid pose for {silence:.3f} s")
+            return self._go(now, "holding", reason)
         return ()
 
     def stop(self, now: float, reason: str) -> Changes:

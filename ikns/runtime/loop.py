@@ -16,9 +16,10 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.control.controller import Controller, Decision, Settings
+from ikns.control.controller import Controller, Decision
 from ikns.control.frame import FrameSolver
 from ikns.control.machine import Changes
+from ikns.control.settings import Settings
 from ikns.errors import MarkerMismatch
 from ikns.finger import Finger
 from ikns.runtime.priority import first_in_line
@@ -266,6 +267,7 @@ class _Loop:
             latency=report.stages["total"].percentile(99),
             residual=math.nan if last is None else last.solved.residual,
             worst_residual=math.nan if last is None else last.solved.worst_residual,
+            refused="" if last is None else last.refused,
             inside=last is not None and last.solved.inside,
             c=math.nan if last is None else float(last.solved.c[0]),
             flexion=self._controller.flexion,
@@ -330,6 +332,7 @@ class _Loop:
                 self._measured,
                 solved.residual,
                 solved.worst_residual,
+                solved.intermarker_error,
                 float(solved.inside),
                 float(STATES.index(decision.state)),
                 *durations,

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.control.controller import Controller, Settings
+from ikns.control.controller import Controller
 from ikns.control.frame import FrameSolver
+from ikns.control.settings import Settings
 from ikns.errors import FileError
 from ikns.session import Run
 from ikns.session.channels import STATES

@@ -30,6 +30,8 @@ class Status:
         99th percentile from receipt to command, s.
     residual, worst_residual : float
         Of the last pose: all markers, and the farthest of the chain, m.
+    refused : str
+        Why the last frame did not count; empty if it did.
     inside : bool
         Whether the hand is within the points of the map.
     c, flexion, measured : float
@@ -46,6 +48,7 @@ class Status:
     latency: float
     residual: float
     worst_residual: float
+    refused: str
     inside: bool
     c: float
     flexion: float

@@ -119,6 +119,7 @@ def model_channels(joint_names: Sequence[str], n_dof: int = 1) -> list[Channel]:
     health = [
         Channel("residual", "MISC", "m"),
         Channel("worst_residual", "MISC", "m"),
+        Channel("intermarker_error", "MISC", "m"),
         Channel("inside", "MISC", "n/a", form="%d"),
         Channel("state", "MISC", "n/a", form="%d"),
         Channel("solve_time", "MISC", "s"),

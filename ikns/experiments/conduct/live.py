@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Any
 
-from ikns.control.controller import Decision, Settings
+from ikns.control.controller import Decision
+from ikns.control.settings import Settings
 from ikns.errors import IknsError
 from ikns.experiments.conduct.inputs import STALE, Sample
 from ikns.finger import Finger
@@ -145,6 +146,7 @@ class LiveDriver:
             "misses": status.misses,
             "residual": status.residual,
             "worst_residual": status.worst_residual,
+            "refused": status.refused,
             "inside": status.inside,
         }
 

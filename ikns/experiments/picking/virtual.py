@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.control.controller import Settings
+from ikns.control.settings import Settings
 from ikns.errors import InvalidInput
 from ikns.experiments.picking.objects import PickObject, load_objects
 from ikns.experiments.picking.schedule import PickStep

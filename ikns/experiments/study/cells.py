@@ -166,7 +166,7 @@ def _attempts(
 def _tracking(
     person: Participant, design: TrackingDesign, seed: int, parameters: Parameters
 ) -> Iterator[dict[str, Any]]:
-    from ikns.control.controller import Settings
+    from ikns.control.settings import Settings
 
     settings = Settings() if parameters.smoothing else None
     trials = _trials(design.steps(person.number, seed=seed))

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ikns._kernels.tree import place_joints
-from ikns.control.controller import Controller, Settings
+from ikns.control.controller import Controller
 from ikns.control.frame import FrameSolver
+from ikns.control.settings import Settings
 from ikns.errors import InvalidInput
 from ikns.simulation.artifacts import occlusions
 from ikns.simulation.grasp.route import Route

@@ -13,8 +13,9 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from ikns._kernels.tree import place_joints
-from ikns.control.controller import Controller, Settings
+from ikns.control.controller import Controller
 from ikns.control.frame import ControlFrame, FrameSolver
+from ikns.control.settings import Settings
 from ikns.errors import InvalidInput
 from ikns.simulation.arm import Arm
 from ikns.simulation.artifacts import SoftTissue, occlusions

@@ -83,6 +83,7 @@ function facts() {
   if ("rate" in drive) rows.push(["Frames", number(drive.rate, 0, " /s")]);
   if ("latency" in drive) rows.push(["Receipt to command, p99", number(known(drive.latency) ? 1000 * drive.latency : null, 2, " ms")]);
   if ("misses" in drive) rows.push(["Late frames", String(drive.misses), drive.misses ? "" : "good"]);
+  if (known(drive.refused)) rows.push(["Pose", drive.refused || "counts", drive.refused ? "bad" : ""]);
   if ("residual" in drive) rows.push(["Residual", number(known(drive.residual) ? 1000 * drive.residual : null, 1, " mm")]);
   if ("worst_residual" in drive) rows.push(["Farthest marker", number(known(drive.worst_residual) ? 1000 * drive.worst_residual : null, 0, " mm")]);
   if ("inside" in drive) rows.push(["Hand", drive.inside ? "inside the points" : "outside the points", drive.inside ? "" : "bad"]);
