@@ -8,15 +8,20 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import small_person
+import typer
 from command_line import calibrate, contents, one_sentence, read_csv
+from rich.markup import render
 
 import ikns
 from ikns.cli import main
+from ikns.cli.app import app
 
 HEAVY = {
     "sklearn",
@@ -43,6 +48,24 @@ def test_nothing_heavy_is_loaded_before_it_is_needed(line: str) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert HEAVY.isdisjoint(done.stderr.split())
+
+
+def commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:
+    yield name, command
+    for part, below in getattr(command, "commands", {}).items():
+        yield from commands(below, f"{name} {part}")
+
+
+COMMANDS = dict(commands(typer.main.get_command(app), "ikns"))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_nothing_of_a_help_text_is_taken_for_markup(name: str) -> None:
+    # Brackets would be, and vanish.
+    command = COMMANDS[name]
+    assert command.help
+    for text in [command.help, *(getattr(p, "help", None) for p in command.params)]:
+        assert render(text or "").plain == (text or "")
 
 
 def test_every_public_name_exists() -> None:

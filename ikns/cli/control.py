@@ -1,4 +1,4 @@
-"""``ikns control``: the control signal that a recording would have sent."""
+"""``ikns control``: the control signal of a recording."""
 
 from __future__ import annotations
 
@@ -34,7 +34,11 @@ def control(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write what the live loop would have sent: c from 0 to 1, frame by frame."""
+    """Write the control signal of a recording: c from 0 to 1, frame by frame.
+
+    It is the map's own; `ikns run --source replay:FILE` also smooths it and leaves out
+    frames that do not count.
+    """
     from ikns.calibration import track_chain
 
     refuse_overwriting(out, force=force)

@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
 from ikns.cli.options import AsJson
 from ikns.cli.visit_drivers import Arm, Screens
+from ikns.cli.visit_options import (
+    Browser,
+    ForIkns,
+    FromStudy,
+    Host,
+    Number,
+    Participant,
+    Port,
+    Realtime,
+    Rest,
+    SafeState,
+    SessionFolder,
+    SourceAddress,
+    View,
+    VisitFolder,
+)
 from ikns.cli.visit_run import chosen, conduct, names, whose
 from ikns.errors import InvalidInput
 
@@ -19,88 +34,50 @@ _INPUTS = ("ikns", "ring")
 
 
 def pick(
-    visit: Annotated[
-        Path | None,
-        typer.Argument(help="Folder of the visit; one that exists goes on."),
-    ] = None,
-    study: Annotated[
-        Path | None,
-        typer.Option(help="Study folder: design and place of the visit are its."),
-    ] = None,
-    participant: Annotated[
-        str | None, typer.Option(help="Pseudonym, letters and digits [default: 01].")
-    ] = None,
-    number: Annotated[
-        int | None,
-        typer.Option(help="Participant's number from 0, which sets the order."),
-    ] = None,
+    visit: VisitFolder = None,
+    study: FromStudy = None,
+    participant: Participant = None,
+    number: Number = None,
     conditions: Annotated[
-        str | None, typer.Option(help="ikns, ring [default: ikns,ring].")
+        str | None, typer.Option(help="ikns, ring.", show_default="ikns,ring")
     ] = None,
     objects: Annotated[
         str | None,
-        typer.Option(help="Codes of the paper's table, such as A,B, or all [default]."),
-    ] = None,
-    repeats: Annotated[
-        int | None, typer.Option(help="Of each object in each condition [default: 1].")
-    ] = None,
-    training: Annotated[
-        int | None, typer.Option(help="Objects before each condition [default: 10].")
-    ] = None,
-    limit: Annotated[
-        float | None, typer.Option(help="Seconds for an object [default: 20].")
-    ] = None,
-    rest: Annotated[
-        float | None, typer.Option(help="Seconds between conditions [default: 120].")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Of the orders [default: 0].")
-    ] = None,
-    subject: Annotated[
-        Path | None, typer.Option(help="For ikns: folder that `ikns calibrate` wrote.")
-    ] = None,
-    source: Annotated[
-        str | None,
         typer.Option(
-            help="For ikns: replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST."
+            help="Codes of the paper's table, such as A,B, or all.", show_default="all"
         ),
     ] = None,
+    repeats: Annotated[
+        int | None,
+        typer.Option(help="Of each object in each condition.", show_default="1"),
+    ] = None,
+    training: Annotated[
+        int | None,
+        typer.Option(help="Objects before each condition.", show_default="10"),
+    ] = None,
+    limit: Annotated[
+        float | None, typer.Option(help="Seconds for an object.", show_default="20")
+    ] = None,
+    rest: Rest = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Of the orders.", show_default="0")
+    ] = None,
+    subject: ForIkns = None,
+    source: SourceAddress = None,
     finger: Annotated[
         str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
     ] = "sim:",
-    session: Annotated[
-        Path | None,
-        typer.Option(help="For ikns: where its runs go [default: in the visit]."),
-    ] = None,
-    safe_state: Annotated[
-        Literal["limp", "hold", "open"],
-        typer.Option(help="What the finger does when poses fail to come."),
-    ] = "limp",
+    session: SessionFolder = None,
+    safe_state: SafeState = "limp",
     hold_speed: Annotated[
         float | None,
         typer.Option(help="For ikns: hold the finger while the hand is faster, m/s."),
     ] = None,
-    view: Annotated[
-        bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
-    ] = True,
-    realtime: Annotated[
-        bool,
-        typer.Option(
-            "--realtime",
-            help="For ikns: before other programs, where the system allows it.",
-        ),
-    ] = False,
-    host: Annotated[
-        str,
-        typer.Option(
-            help="Address to serve the pages at; any but this machine's own needs the "
-            "token in the address that is printed, and is not encrypted."
-        ),
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="0 takes a free one.")] = 0,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the pages.")
-    ] = True,
+    view: View = True,
+    realtime: Realtime = False,
+    host: Host = "127.0.0.1",
+    port: Port = 0,
+    browser: Browser = True,
     as_json: AsJson = False,
 ) -> None:
     """Pick objects up and put them down with the robot finger, against the clock.

@@ -4,13 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
 from ikns.cli.options import AsJson
 from ikns.cli.visit_drivers import Arm, Screens
+from ikns.cli.visit_options import (
+    Browser,
+    ForIkns,
+    FromStudy,
+    Host,
+    Number,
+    Participant,
+    Port,
+    Realtime,
+    Rest,
+    SafeState,
+    SessionFolder,
+    SourceAddress,
+    View,
+    VisitFolder,
+)
 from ikns.cli.visit_run import chosen, conduct, names, whose
 from ikns.errors import InvalidInput
 
@@ -20,103 +35,63 @@ _INPUTS = ("ikns", "gamepad", "keyboard", "mouse", "virtual")
 
 
 def track(
-    visit: Annotated[
-        Path | None,
-        typer.Argument(help="Folder of the visit; one that exists goes on."),
-    ] = None,
-    study: Annotated[
-        Path | None,
-        typer.Option(help="Study folder: design and place of the visit are its."),
-    ] = None,
-    participant: Annotated[
-        str | None, typer.Option(help="Pseudonym, letters and digits [default: 01].")
-    ] = None,
-    number: Annotated[
-        int | None,
-        typer.Option(help="Participant's number from 0, which sets the order."),
-    ] = None,
+    visit: VisitFolder = None,
+    study: FromStudy = None,
+    participant: Participant = None,
+    number: Number = None,
     conditions: Annotated[
         str | None,
         typer.Option(
-            help="ikns, gamepad, keyboard, mouse, or virtual: who plays by itself "
-            "[default: ikns,gamepad]."
+            help="ikns, gamepad, keyboard, mouse, or virtual: who plays by itself.",
+            show_default="ikns,gamepad",
         ),
     ] = None,
     profiles: Annotated[
-        str | None, typer.Option(help="Curves [default: T1,T2,T3].")
+        str | None, typer.Option(help="Curves.", show_default="T1,T2,T3")
     ] = None,
     repeats: Annotated[
-        int | None, typer.Option(help="Of each curve in each condition [default: 3].")
+        int | None,
+        typer.Option(help="Of each curve in each condition.", show_default="3"),
     ] = None,
     training: Annotated[
-        int | None, typer.Option(help="Trials before each condition [default: 10].")
+        int | None,
+        typer.Option(help="Trials before each condition.", show_default="10"),
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(help="Of a curve [default: 25].")
+        float | None, typer.Option(help="Of a curve.", show_default="25")
     ] = None,
     align: Annotated[
-        float | None, typer.Option(help="Seconds before a curve [default: 5].")
+        float | None, typer.Option(help="Seconds before a curve.", show_default="5")
     ] = None,
-    rest: Annotated[
-        float | None, typer.Option(help="Seconds between conditions [default: 120].")
-    ] = None,
+    rest: Rest = None,
     seed: Annotated[
-        int | None, typer.Option(help="Of the curves [default: 0].")
+        int | None, typer.Option(help="Of the curves.", show_default="0")
     ] = None,
-    subject: Annotated[
-        Path | None, typer.Option(help="For ikns: folder that `ikns calibrate` wrote.")
-    ] = None,
-    source: Annotated[
-        str | None,
-        typer.Option(
-            help="For ikns: replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST."
-        ),
-    ] = None,
+    subject: ForIkns = None,
+    source: SourceAddress = None,
     finger: Annotated[
         str | None, typer.Option(help="For ikns: sim: or dynamixel:/dev/ttyUSB0.")
     ] = None,
-    session: Annotated[
-        Path | None,
-        typer.Option(help="For ikns: where its runs go [default: in the visit]."),
-    ] = None,
+    session: SessionFolder = None,
     smooth: Annotated[
         bool,
         typer.Option(
             "--smooth", help="The pointer shows the smoothed flexion, not c itself."
         ),
     ] = False,
-    safe_state: Annotated[
-        Literal["limp", "hold", "open"],
-        typer.Option(help="What the finger does when poses fail to come."),
-    ] = "limp",
+    safe_state: SafeState = "limp",
     stick: Annotated[
         Literal["left", "trigger"],
         typer.Option(help="Of the gamepad: left stick, up, or right trigger."),
     ] = "left",
-    view: Annotated[
-        bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
-    ] = True,
-    realtime: Annotated[
-        bool,
-        typer.Option(
-            "--realtime",
-            help="For ikns: before other programs, where the system allows it.",
-        ),
-    ] = False,
+    view: View = True,
+    realtime: Realtime = False,
     rate: Annotated[
         float, typer.Option(help="How often a page's signal is written down, Hz.")
     ] = 100.0,
-    host: Annotated[
-        str,
-        typer.Option(
-            help="Address to serve the pages at; any but this machine's own needs the "
-            "token in the address that is printed, and is not encrypted."
-        ),
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="0 takes a free one.")] = 0,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the pages.")
-    ] = True,
+    host: Host = "127.0.0.1",
+    port: Port = 0,
+    browser: Browser = True,
     as_json: AsJson = False,
 ) -> None:
     """Follow curves with the arm's null space, a gamepad, keyboard or mouse.

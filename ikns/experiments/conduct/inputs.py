@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -11,7 +12,7 @@ from ikns.experiments.tracking.profiles import Profile
 from ikns.simulation.operator import Delay, Operator
 from ikns.stream.delays import Delays
 
-__all__ = ["Driver", "HeldInput", "Sample", "VirtualInput"]
+__all__ = ["Driver", "HeldInput", "Sample", "Samples", "VirtualInput"]
 
 #: A page that says nothing for longer than this has no control signal, s: at 60 per
 #: second twelve messages in a row are missing.
@@ -31,6 +32,37 @@ class Sample(NamedTuple):
 
     time: float
     c: float
+
+
+class Samples:
+    """Samples on their way from the thread that makes them to the one that takes them.
+
+    Examples
+    --------
+    >>> way = Samples()
+    >>> way.put(Sample(10.0, 0.25))
+    >>> way.take(10.1), way.take(10.2), way.take(10.3)
+    ([Sample(time=10.0, c=0.25)], [], [Sample(time=10.3, c=nan)])
+    """
+
+    def __init__(self) -> None:
+        self._queue: deque[Sample] = deque(maxlen=10_000)
+        self._last = -math.inf
+
+    def put(self, sample: Sample) -> None:
+        """Send one, from any thread."""
+        self._queue.append(sample)
+
+    def take(self, now: float) -> list[Sample]:
+        """Return those since the last call; one without a signal if none come."""
+        samples = []
+        while self._queue:
+            samples.append(self._queue.popleft())
+        if samples:
+            self._last = samples[-1].time
+        elif now - self._last > STALE:
+            samples.append(Sample(now, math.nan))
+        return samples
 
 
 class Driver(Protocol):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 from ikns.control.controller import Decision
 from ikns.control.settings import Settings
 from ikns.errors import IknsError
-from ikns.experiments.conduct.inputs import STALE, Sample
+from ikns.experiments.conduct.inputs import Sample, Samples
 from ikns.finger import Finger
 from ikns.runtime import Report, Status, run
 from ikns.session import RunWriter
@@ -62,8 +61,7 @@ class LiveDriver:
         self.report: Report | None = None
         self._finger, self._writer, self._smooth = finger, writer, smooth
         self._on_status = on_status
-        self._samples: deque[Sample] = deque(maxlen=10_000)
-        self._last = -math.inf
+        self._samples = Samples()
         self._status: Status | None = None
         self._finger_is = ""
         self._start = math.nan
@@ -121,14 +119,7 @@ class LiveDriver:
 
     def take(self, now: float) -> list[Sample]:
         """Return the frames since the last call, each at its receipt."""
-        samples = []
-        while self._samples:
-            samples.append(self._samples.popleft())
-        if samples:
-            self._last = samples[-1].time
-        elif now - self._last > STALE:
-            samples.append(Sample(now, math.nan))
-        return samples
+        return self._samples.take(now)
 
     def facts(self) -> dict[str, Any]:
         """How the loop and its finger are doing."""
@@ -161,7 +152,7 @@ class LiveDriver:
 
     def _decided(self, received: float, flexion: float, decision: Decision) -> None:
         c = flexion if self._smooth else float(decision.solved.c[0])
-        self._samples.append(Sample(received, c if decision.valid else math.nan))
+        self._samples.put(Sample(received, c if decision.valid else math.nan))
 
     def _told(self, status: Status) -> None:
         now = time.monotonic()

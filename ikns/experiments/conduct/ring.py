@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from queue import Empty, SimpleQueue
 from typing import Any
 
 from ikns.errors import IknsError
-from ikns.experiments.conduct.inputs import STALE, Sample
+from ikns.experiments.conduct.inputs import Sample, Samples
 from ikns.finger import Finger
 from ikns.finger.inputs import RingButton
 
@@ -40,8 +38,7 @@ class RingDriver:
     def __init__(self, presses: SimpleQueue[None], finger: Finger | None) -> None:
         self.fault = ""
         self._presses, self._finger = presses, finger
-        self._samples: deque[Sample] = deque(maxlen=10_000)
-        self._last = -math.inf
+        self._samples = Samples()
         self._facts: dict[str, Any] = {"kind": "ring"}
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="ring", daemon=True)
@@ -58,14 +55,7 @@ class RingDriver:
 
     def take(self, now: float) -> list[Sample]:
         """Return what was told the finger since the last call."""
-        samples = []
-        while self._samples:
-            samples.append(self._samples.popleft())
-        if samples:
-            self._last = samples[-1].time
-        elif now - self._last > STALE:
-            samples.append(Sample(now, math.nan))
-        return samples
+        return self._samples.take(now)
 
     def facts(self) -> dict[str, Any]:
         """Return how the finger is doing."""
@@ -111,7 +101,7 @@ class RingDriver:
                     "flexion": c,
                     "measured": state.flexion,
                 }
-            self._samples.append(Sample(now, c))
+            self._samples.put(Sample(now, c))
             due = max(due + 1 / _RATE, time.monotonic())
             self._stop.wait(due - time.monotonic())
 

@@ -1,0 +1,78 @@
+"""Options of the commands that run an experiment with a person."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+__all__ = [
+    "Browser",
+    "ForIkns",
+    "FromStudy",
+    "Host",
+    "Number",
+    "Participant",
+    "Port",
+    "Realtime",
+    "Rest",
+    "SafeState",
+    "SessionFolder",
+    "SourceAddress",
+    "View",
+    "VisitFolder",
+]
+
+VisitFolder = Annotated[
+    Path | None, typer.Argument(help="Folder of the visit; one that exists goes on.")
+]
+FromStudy = Annotated[
+    Path | None,
+    typer.Option(help="Study folder: design and place of the visit are its."),
+]
+Participant = Annotated[
+    str | None, typer.Option(help="Pseudonym, letters and digits.", show_default="01")
+]
+Number = Annotated[
+    int | None, typer.Option(help="Participant's number from 0, which sets the order.")
+]
+Rest = Annotated[
+    float | None, typer.Option(help="Seconds between conditions.", show_default="120")
+]
+ForIkns = Annotated[
+    Path | None, typer.Option(help="For ikns: folder that `ikns calibrate` wrote.")
+]
+SourceAddress = Annotated[
+    str | None,
+    typer.Option(help="For ikns: replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST."),
+]
+SessionFolder = Annotated[
+    Path | None,
+    typer.Option(help="For ikns: where its runs go.", show_default="in the visit"),
+]
+SafeState = Annotated[
+    Literal["limp", "hold", "open"],
+    typer.Option(help="What the finger does when poses fail to come."),
+]
+View = Annotated[
+    bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
+]
+Realtime = Annotated[
+    bool,
+    typer.Option(
+        "--realtime",
+        help="For ikns: before other programs, where the system allows it.",
+    ),
+]
+Host = Annotated[
+    str,
+    typer.Option(
+        help="Address to serve the pages at; any but this machine's own needs the "
+        "token in the address that is printed, and is not encrypted."
+    ),
+]
+Port = Annotated[int, typer.Option(help="0 takes a free one.")]
+Browser = Annotated[
+    bool, typer.Option("--browser/--no-browser", help="Open the pages.")
+]
