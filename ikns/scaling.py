@@ -61,6 +61,10 @@ POSE_SD = 1.0
 GAIN_TOLERANCE = 1e-4
 #: So many frames that show every marker are enough to average; noise is then a third.
 COMPLETE_FRAMES = 10
+#: A marker that the static trial does not show is worn on only where its nominal place
+#: is known this well, standard deviation of all directions together, m: to landmarks,
+#: that is, not to clusters.
+_KNOWN_PLACE = 0.02
 #: Steps until the fit is given up; it takes about ten.
 _MAX_STEPS = 100
 
@@ -82,7 +86,8 @@ class ScalingReport:
     used, unused : tuple of str
         Markers that the static trial showed, and those that it lacked.
     dropped : tuple of str
-        Static-only markers, no longer worn.
+        Markers no longer worn: static-only ones, and those that the static trial lacked
+        though nobody can tell where they sit without it.
     held : tuple of str
         Joints that the markers cannot observe.
     duration : float
@@ -126,7 +131,8 @@ def scale(
     Returns
     -------
     skeleton : Skeleton
-        A new skeleton without the static-only markers.
+        A new skeleton with the markers whose places are known, without the static-only
+        ones.
     report : ScalingReport
 
     Raises
@@ -143,9 +149,16 @@ def scale(
     factors, positions, q, covariance, converged = _fit(dressed, target)
     sized = dressed.resized(_named(factors))
     nominal = sized.marker_positions
-    skeleton = sized.with_markers(worn.at(positions).without_static())
-    at_fit = sized.with_markers(worn.at(positions)).markers_in_world(q)
     seen = _seen(target)
+    placed = worn.at(positions)
+    kept = tuple(
+        marker
+        for marker, shown in zip(placed.markers, seen, strict=True)
+        if not marker.static_only
+        and (shown or np.linalg.norm(marker.placement_sd) < _KNOWN_PLACE)
+    )
+    skeleton = sized.with_markers(replace(placed, markers=kept))
+    at_fit = sized.with_markers(placed).markers_in_world(q)
     sd = np.sqrt(np.diag(covariance))
     lengths = skeleton.segment_lengths
     labels = np.array(worn.labels)
@@ -164,7 +177,7 @@ def scale(
         ),
         used=tuple(map(str, labels[seen])),
         unused=tuple(map(str, labels[~seen])),
-        dropped=tuple(m.label for m in worn.markers if m.static_only),
+        dropped=tuple(m.label for m in placed.markers if m not in kept),
         held=worn.held,
         duration=duration,
         converged=converged,

@@ -45,6 +45,36 @@ def test_every_sample_is_accounted_for() -> None:
             )
 
 
+def test_markers_that_the_static_trial_lacks_are_left_out_and_named() -> None:
+    run = small_person.protocol()
+    static = run.static.recording
+    shown = [la for la in static.labels if la not in ("RUPA", "LUPA", "RWRA")]
+    points = run.points.recording
+    worn = points.select([la for la in points.labels if la != "LUPA"])
+    subject = calibrate(static.select(shown), [worn], min_still=0.2)
+    named = [w for w in subject.report["warnings"] if "left out, as nobody" in w]
+    # The left one is not worn, the wrist's place is known.
+    assert len(named) == 1
+    assert "none of RUPA:" in named[0]
+    assert "RUPA" not in subject.skeleton.marker_set.labels
+
+
+def test_a_marker_that_is_not_where_it_was_is_named() -> None:
+    run = small_person.protocol()
+    points = run.points.recording
+    markers = points.markers.copy()
+    first, second = (points.labels.index(name) for name in ("RUPA", "RELB"))
+    markers[:, [first, second]] = markers[:, [second, first]]
+    mistaken = Recording(points.time, markers, points.labels, "points.c3d")
+    subject = calibrate(run.static.recording, [mistaken], min_still=0.2)
+    told = [w for w in subject.report["warnings"] if "another's name" in w]
+    assert len(told) == 1
+    assert told[0].startswith("points.c3d: ")
+    assert {"RUPA", "RELB"} & set(told[0].split())
+    fine = small_person.subject().report["warnings"]
+    assert not any("another's name" in w for w in fine)
+
+
 def test_samples_to_draw_lie_about_their_points() -> None:
     subject = small_person.subject()
     learned, samples = subject.null_space_map, subject.samples

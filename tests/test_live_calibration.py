@@ -351,6 +351,57 @@ def test_hidden_markers_are_told():
     assert not at_point(None).usable  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("names", [("RUPA", "RELB"), ("RUPA", "RFRM")])
+def test_markers_with_each_others_names_are_told(names):
+    recording = piece(small_person.protocol(), 0)
+    first, second = (recording.labels.index(name) for name in names)
+    markers = recording.markers.copy()
+    markers[:, [first, second]] = markers[:, [second, first]]
+    verdict = at_point(Recording(recording.time, markers, recording.labels, "p"))
+    assert not verdict.keep
+    assert set(names) & set(verdict.reason.replace(",", " ").split())
+    assert "carries another's name" in verdict.reason
+
+
+@pytest.mark.parametrize("change", [0.03, -0.03])
+def test_a_marker_that_was_put_elsewhere_is_told(change):
+    recording = piece(small_person.protocol(), 0)
+    # Along the line to its neighbor, so that their distance changes by all of it.
+    first, second = (recording.labels.index(name) for name in ("RWRA", "RWRB"))
+    markers = recording.markers.copy()
+    line = markers[:, first] - markers[:, second]
+    length = np.linalg.norm(line, axis=1, keepdims=True)
+    markers[:, first] += change * line / length
+    verdict = at_point(Recording(recording.time, markers, recording.labels, "p"))
+    assert not verdict.keep
+    # 1 mm of noise in each direction at both ends, static and here: the median of 75
+    # frames is 0.2 mm off.
+    side = "farther apart" if change > 0 else "closer"
+    told = [f"RWRA and RWRB are {mm} mm {side} than in" for mm in (29, 30, 31)]
+    assert any(words in verdict.reason for words in told), verdict.reason
+
+
+def test_a_marker_that_the_static_trial_never_shows_is_told():
+    static = small_person.protocol().static.recording
+    step = Step("static", "static", 1.2)
+    hidden = static.markers.copy()
+    hidden[:, static.labels.index("RUPA")] = np.nan
+    verdict = judge().judge(
+        step, Recording(static.time, hidden, static.labels, "static")
+    )
+    assert not verdict.keep
+    assert verdict.usable
+    assert "Never in sight: RUPA;" in verdict.reason
+    # Nor are those of an arm that wears none, or that the cameras do not know at all.
+    left = [i for i, label in enumerate(static.labels) if label.startswith("L")]
+    hidden = static.markers.copy()
+    hidden[:, left] = np.nan
+    one_arm = Recording(static.time, hidden, static.labels, "static")
+    assert judge().judge(step, one_arm).keep
+    unknown = static.select([la for la in static.labels if la != "RUPA"])
+    assert judge().judge(step, unknown).keep
+
+
 def test_a_person_who_moves_in_the_static_trial_is_told_the_marker():
     static = small_person.protocol().static.recording
     moving = static.markers.copy()

@@ -6,6 +6,22 @@ chain, `report` what is written down.
 
 from ikns.calibration.elbow import elbow_reference
 from ikns.calibration.procedure import calibrate
-from ikns.calibration.sight import in_sight, sight_needs, track_chain
+from ikns.calibration.sight import (
+    in_sight,
+    marker_fault,
+    say_apart,
+    segment_pairs,
+    sight_needs,
+    track_chain,
+)
 
-__all__ = ["calibrate", "elbow_reference", "in_sight", "sight_needs", "track_chain"]
+__all__ = [
+    "calibrate",
+    "elbow_reference",
+    "in_sight",
+    "marker_fault",
+    "say_apart",
+    "segment_pairs",
+    "sight_needs",
+    "track_chain",
+]

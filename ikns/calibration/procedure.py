@@ -16,12 +16,13 @@ from ikns.calibration.report import (
     points_report,
     static_report,
 )
-from ikns.calibration.sight import track_chain
+from ikns.calibration.sight import marker_fault, track_chain
 from ikns.errors import InvalidInput, NotEnoughData, naming
+from ikns.marker_set import MarkerSet
 from ikns.motion import chain_joints
 from ikns.nullspace_map import MapWarning, NullSpaceMap, still
 from ikns.recording import Recording
-from ikns.scaling import scale
+from ikns.scaling import ScalingReport, scale
 from ikns.skeleton import Skeleton
 from ikns.subject import Subject
 
@@ -149,8 +150,38 @@ def calibrate(
         ],
         "points": points_report(learned, rate=explorations[0].rate),
         "extrinsic": extrinsic_report(skeleton, pairs, chain),
-        "warnings": [str(warning.message) for warning in caught],
+        "warnings": [
+            *_left_out(static, scaling, marker_set, explorations),
+            *(
+                f"{recording.source}: {fault}"
+                for recording in explorations
+                if (fault := marker_fault(skeleton, recording, chain))
+            ),
+            *(str(warning.message) for warning in caught),
+        ],
     }
     step = len(x) // _SHOWN + 1
     shown = np.column_stack([x, learned.labels_ + 1.0])[::step]
     return Subject(skeleton, learned, chain, report, motions, shown)
+
+
+def _left_out(
+    static: Recording,
+    scaling: ScalingReport,
+    marker_set: str | Path,
+    explorations: Sequence[Recording],
+) -> list[str]:
+    """Name markers that are worn, but that the static trial does not show."""
+    worn = MarkerSet.load(marker_set)
+    seen = np.zeros(len(worn.labels), dtype=bool)
+    for recording in explorations:
+        markers = worn.pick(recording.labels, recording.markers)
+        seen |= np.isfinite(markers).all(axis=2).any(axis=0)
+    lost = {label for label, s in zip(worn.labels, seen, strict=True) if s}
+    lost &= set(scaling.unused) & set(scaling.dropped)
+    if not lost:
+        return []
+    return [
+        f"{static.source}: expected every marker in sight, found none of "
+        f"{', '.join(sorted(lost))}: left out, as nobody can tell where they sit."
+    ]

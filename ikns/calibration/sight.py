@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +21,22 @@ from ikns.motion import Motion, chain_sides
 from ikns.recording import Recording
 from ikns.skeleton import Skeleton
 
-__all__ = ["in_sight", "sight_needs", "track_chain"]
+__all__ = [
+    "in_sight",
+    "marker_fault",
+    "say_apart",
+    "segment_pairs",
+    "sight_needs",
+    "track_chain",
+]
 
 #: Markers that fix the thorax, to which all else is relative. A limb needs fewer: its
 #: joints tie it to the thorax.
 _FIX = 3
+#: Most that the distance of two markers of a segment may differ from the static trial,
+#: median, m. Real people's differ by 2 to 4 mm, for moments by up to 24
+#: (benchmarks/stray_marker.py).
+_MOST_CHANGE = 0.02
 
 
 def track_chain(
@@ -85,6 +97,57 @@ def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], in
         link: (own, min(_FIX, len(own)) if link == "thorax" else 1)
         for link, own in columns.items()
     }
+
+
+def segment_pairs(
+    skeleton: Skeleton, chain: str
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Markers of the same segment of a chain, or of the thorax, two and two.
+
+    Segments hardly stretch: where a distance differs, a marker has moved, or is taken
+    for another.
+
+    Returns
+    -------
+    pairs : (N, 2) integer array
+        Columns of the skeleton's marker set.
+    apart : (N,) array
+        How far apart they are on the person, m.
+    """
+    needs = sight_needs(skeleton, chain).values()
+    found = [pair for columns, _ in needs for pair in combinations(columns, 2)]
+    pairs = np.array(found, dtype=np.int64).reshape(-1, 2)
+    # On one link, so these are its own coordinates.
+    first, second = skeleton.marker_positions[pairs.T]
+    return pairs, np.linalg.norm(first - second, axis=1)
+
+
+def say_apart(skeleton: Skeleton, pair: NDArray[np.int64], change: float) -> str:
+    """Say that two markers are nearer or farther than on the person, by so many m."""
+    first, second = (skeleton.marker_set.labels[column] for column in pair)
+    side = "farther apart" if change > 0 else "closer"
+    return f"{first} and {second} are {abs(1000 * change):.0f} mm {side}"
+
+
+def marker_fault(skeleton: Skeleton, recording: Recording, chain: str) -> str:
+    """Say which marker of a chain is not where it was; empty where none is.
+
+    Told by the distances within segments, their median over the recording.
+    """
+    markers = skeleton.marker_set.pick(recording.labels, recording.markers)
+    pairs, worn = segment_pairs(skeleton, chain)
+    first, second = np.moveaxis(markers[:, pairs], 2, 0)
+    apart = np.linalg.norm(first - second, axis=2)
+    change = np.zeros(len(pairs))
+    seen = np.isfinite(apart).any(axis=0)
+    change[seen] = np.nanmedian(apart[:, seen], axis=0) - worn[seen]
+    if not (np.abs(change) > _MOST_CHANGE).any():
+        return ""
+    k = int(np.abs(change).argmax())
+    return (
+        f"{say_apart(skeleton, pairs[k], change[k])} than in the static trial: a "
+        "marker moved or carries another's name."
+    )
 
 
 def in_sight(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns._kernels.control_frame import ControlMap, control_frame
 from ikns._kernels.diagram import INSIDE_HULL, UNSURE, new_work
-from ikns.calibration import sight_needs
+from ikns.calibration import segment_pairs, sight_needs
 from ikns.errors import InvalidInput
 from ikns.interpolation import NaturalNeighborInterpolator
 from ikns.marker_ik.kernel import KernelSolver
@@ -177,14 +176,10 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
     labels = list(skeleton.marker_set.labels)
     link = np.full(len(labels), -1, dtype=np.int64)
     need: list[int] = []
-    pairs: list[tuple[int, int]] = []
     for columns, least in sight_needs(skeleton, chain).values():
         link[columns] = len(need)
         need.append(least)
-        pairs += combinations(columns, 2)
-    pair = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    # On one link, so these are its own coordinates.
-    first, second = skeleton.marker_positions[pair.T]
+    pair, apart = segment_pairs(skeleton, chain)
     interpolator = learned.interpolator_
     numbers, indices = np.empty(0), np.empty(0, dtype=np.int64)
     if isinstance(interpolator, NaturalNeighborInterpolator):
@@ -202,5 +197,5 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
         link=link,
         need=np.array(need, dtype=np.int64),
         pair=pair,
-        apart=np.linalg.norm(first - second, axis=1),
+        apart=apart,
     )

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.calibration import sight_needs
+from ikns.calibration import say_apart, segment_pairs, sight_needs
 from ikns.control.frame import ControlFrame, FrameSolver
 from ikns.control.settings import Settings
 
@@ -68,19 +66,11 @@ def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
 
 def _apart(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
     """Name the two markers whose distance is farthest off."""
-    needs = sight_needs(solver.skeleton, solver.chain).values()
-    pairs = np.array([pair for own, _ in needs for pair in combinations(own, 2)])
-    away, worn = (
-        np.linalg.norm(np.subtract(*places[pairs.T]), axis=1)
-        for places in (markers, solver.skeleton.marker_positions)
-    )
-    k = int(np.nanargmax(np.abs(away - worn)))
-    labels = solver.skeleton.marker_set.labels
-    side = "farther apart" if away[k] > worn[k] else "closer"
-    return (
-        f"{labels[pairs[k, 0]]} and {labels[pairs[k, 1]]} are "
-        f"{_mm(abs(away[k] - worn[k]))} {side} than at calibration"
-    )
+    pairs, worn = segment_pairs(solver.skeleton, solver.chain)
+    first, second = markers[pairs.T]
+    change = np.linalg.norm(first - second, axis=1) - worn
+    k = int(np.nanargmax(np.abs(change)))
+    return f"{say_apart(solver.skeleton, pairs[k], change[k])} than at calibration"
 
 
 def _astray(

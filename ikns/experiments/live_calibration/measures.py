@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.calibration import marker_fault
 from ikns.motion import Motion
 from ikns.recording import Recording
 from ikns.rigid import rigid_transform
@@ -31,10 +32,19 @@ MOST_RESIDUAL = 0.03
 SEEN_SHARE = 0.5
 
 
-def tracking_fault(motion: Motion, known: NDArray[np.bool_]) -> str:
-    """Say what is wrong with the tracking; empty where nothing is."""
+def tracking_fault(
+    skeleton: Skeleton,
+    recording: Recording,
+    motion: Motion,
+    known: NDArray[np.bool_],
+    *,
+    chain: str,
+) -> str:
+    """Say what is wrong with markers or tracking; empty where nothing is."""
     if known.mean() < SEEN_SHARE:
         return f"The arm was in sight in {percent(known):.0f} % of the frames only."
+    if fault := marker_fault(skeleton, recording, chain):
+        return fault
     residual = median(motion.residual)
     if residual > MOST_RESIDUAL:
         return (

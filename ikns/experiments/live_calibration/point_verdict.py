@@ -84,7 +84,7 @@ def judge_point(
     }
     # As in the calibration, which leaves a point with fewer out.
     enough = max(int(np.ceil(min_still * recording.rate)), len(chain_joints(chain)) + 1)
-    reason = tracking_fault(motion, known)
+    reason = tracking_fault(skeleton, recording, motion, known, chain=chain)
     if gate.sum() < enough:
         speed = median(motion.hand_speed(chain))
         return Verdict(

@@ -6,6 +6,7 @@ A verdict recommends; the experimenter decides. Points have a file of their own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -123,11 +124,37 @@ def judge_static(
         )
     elif not report.converged:
         reason = "The body could not be fitted to the markers."
+    elif lost := _lost(worn, seen.any(axis=0), recording.labels, report.dropped):
+        reason = (
+            f"Never in sight: {', '.join(lost)}; what the static trial does not show "
+            "cannot be used later."
+        )
     elif np.mean(seen[:, seen.any(axis=0)]) < SEEN_SHARE:
         reason = f"{values['missing_percent']:.0f} % of the markers were missing."
     return Verdict(
         not reason, True, reason or "The person stood still.", values, skeleton=skeleton
     )
+
+
+def _lost(
+    worn: MarkerSet,
+    seen: NDArray[np.bool_],
+    labels: Sequence[str],
+    dropped: Sequence[str],
+) -> list[str]:
+    """Name markers that the calibration will do without though they may be worn.
+
+    They are of segments of which something was seen, and the recording knows them.
+    """
+    shown = {m.link for m, s in zip(worn.markers, seen, strict=True) if s}
+    return [
+        m.label
+        for m, s in zip(worn.markers, seen, strict=True)
+        if not (s or m.static_only)
+        and m.link in shown
+        and m.label in dropped
+        and {m.label, *m.aliases} & set(labels)
+    ]
 
 
 def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdict:
@@ -158,7 +185,7 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
         return Verdict(False, False, "The hand was hardly ever in sight.", values)
     box = minimum_bounding_box(explored)
     values["box_cm"] = np.round(200 * box.half_lengths, 1).tolist()
-    reason = tracking_fault(motion, known)
+    reason = tracking_fault(skeleton, recording, motion, known, chain=chain)
     if not reason and 2 * box.half_lengths.min() < LEAST_BOX:
         reason = (
             f"The hand explored a volume only {200 * box.half_lengths.min():.0f} cm "
