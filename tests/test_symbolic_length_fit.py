@@ -77,6 +77,22 @@ def test_turning_joints_show_lengths_that_misplaced_markers_hide(generic):
         assert sd < found.static_length_sd[part]
 
 
+def test_a_marker_that_the_static_trial_lacks_takes_no_part(generic):
+    body = person(generic)
+    recording = filmed(body, exercise(body), source="simulated exercise")
+    static = standing(body)
+    without = static.select([label for label in static.labels if label != "RUPA"])
+    settings = {"n_frames": 20, "marker_sd": 1e-3}
+    skeleton, found = fit_lengths(generic, without, [recording], **settings)
+    assert "RUPA" not in skeleton.marker_set.labels
+    # Whatever the moving frames show of it.
+    elsewhere = recording.markers.copy()
+    elsewhere[:, recording.labels.index("RUPA")] += 0.3
+    moved = Recording(recording.time, elsewhere, recording.labels, recording.source)
+    _, same = fit_lengths(generic, without, [moved], **settings)
+    assert same.lengths == found.lengths
+
+
 def test_joints_that_do_not_turn_add_nothing(generic):
     body = person(generic)
     still = filmed(body, np.tile(standing_angles(), (60, 1)), noise=1e-4, seed=3)

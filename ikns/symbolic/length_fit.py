@@ -123,7 +123,7 @@ def fit_lengths(
     Returns
     -------
     skeleton : Skeleton
-        A new skeleton without the static-only markers.
+        A new skeleton with the markers that :func:`ikns.scale` keeps.
     report : LengthFit
 
     Raises
@@ -156,7 +156,8 @@ def fit_lengths(
     worth = min(independent_frames / len(q), 1.0)
     pulls = np.r_[1.0, np.full(len(q), worth)] / POSE_SD**2
 
-    tracked = [m for m, marker in enumerate(worn.markers) if not marker.static_only]
+    kept = set(scaled.marker_set.labels)
+    tracked = [m for m, label in enumerate(worn.labels) if label in kept]
     trust = np.zeros((len(q), len(worn.markers)))
     trust[:, tracked] = seen * [worn.markers[m].weight for m in tracked]
     every = np.full((len(q), len(worn.markers), 3), np.nan)
@@ -189,8 +190,10 @@ def fit_lengths(
             break
         sd = after
     sized = dressed.resized(_named(sizes))
-    places = sized.marker_positions + offsets
-    skeleton = sized.with_markers(worn.at(places).without_static())
+    placed = worn.at(sized.marker_positions + offsets).markers
+    skeleton = sized.with_markers(
+        replace(worn, markers=tuple(m for m in placed if m.label in kept))
+    )
     return skeleton, _report(skeleton, worn, found, before, sd, len(trust))
 
 
