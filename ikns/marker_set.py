@@ -7,7 +7,7 @@ millimeters in the file and meters here, for the generic body.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -185,8 +185,12 @@ class MarkerSet:
 
     def without_static(self) -> MarkerSet:
         """Return the set as it is worn after the static trial."""
-        kept = tuple(marker for marker in self.markers if not marker.static_only)
-        return replace(self, markers=kept)
+        return self.only(m.label for m in self.markers if not m.static_only)
+
+    def only(self, labels: Iterable[str]) -> MarkerSet:
+        """Return the set with these markers alone, in its own order."""
+        kept = set(labels)
+        return replace(self, markers=tuple(m for m in self.markers if m.label in kept))
 
     def at(self, positions: NDArray[np.float64]) -> MarkerSet:
         """Return the set with the markers at these places, (M, 3) m in their links."""

@@ -151,13 +151,15 @@ def scale(
     nominal = sized.marker_positions
     seen = _seen(target)
     placed = worn.at(positions)
-    kept = tuple(
-        marker
-        for marker, shown in zip(placed.markers, seen, strict=True)
-        if not marker.static_only
-        and (shown or np.linalg.norm(marker.placement_sd) < _KNOWN_PLACE)
+    skeleton = sized.with_markers(
+        placed.only(
+            marker.label
+            for marker, shown in zip(worn.markers, seen, strict=True)
+            if not marker.static_only
+            and (shown or np.linalg.norm(marker.placement_sd) < _KNOWN_PLACE)
+        )
     )
-    skeleton = sized.with_markers(replace(placed, markers=kept))
+    kept = skeleton.marker_set.labels
     at_fit = sized.with_markers(placed).markers_in_world(q)
     sd = np.sqrt(np.diag(covariance))
     lengths = skeleton.segment_lengths
@@ -177,7 +179,7 @@ def scale(
         ),
         used=tuple(map(str, labels[seen])),
         unused=tuple(map(str, labels[~seen])),
-        dropped=tuple(m.label for m in placed.markers if m not in kept),
+        dropped=tuple(label for label in worn.labels if label not in kept),
         held=worn.held,
         duration=duration,
         converged=converged,

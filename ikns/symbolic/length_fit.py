@@ -156,7 +156,7 @@ def fit_lengths(
     worth = min(independent_frames / len(q), 1.0)
     pulls = np.r_[1.0, np.full(len(q), worth)] / POSE_SD**2
 
-    kept = set(scaled.marker_set.labels)
+    kept = scaled.marker_set.labels
     tracked = [m for m, label in enumerate(worn.labels) if label in kept]
     trust = np.zeros((len(q), len(worn.markers)))
     trust[:, tracked] = seen * [worn.markers[m].weight for m in tracked]
@@ -190,10 +190,8 @@ def fit_lengths(
             break
         sd = after
     sized = dressed.resized(_named(sizes))
-    placed = worn.at(sized.marker_positions + offsets).markers
-    skeleton = sized.with_markers(
-        replace(worn, markers=tuple(m for m in placed if m.label in kept))
-    )
+    places = sized.marker_positions + offsets
+    skeleton = sized.with_markers(worn.at(places).only(kept))
     return skeleton, _report(skeleton, worn, found, before, sd, len(trust))
 
 
