@@ -1,15 +1,22 @@
+import fcntl
 import json
 import os
+import pty
+import re
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import time
 import urllib.request
+from dataclasses import replace
 
 import pytest
 from command_line import check_refused, contents
 
 from ikns.cli import main
+from ikns.files import read, write_c3d
 
 PROGRAM = "import sys; from ikns.cli import main; sys.exit(main(sys.argv[1:]))"
 
@@ -58,6 +65,58 @@ def test_a_table_for_people(files, capsys):
     out, _ = capsys.readouterr()
     assert "receipt to command" in out
     assert "disarmed to armed" in out
+
+
+def on_a_terminal(argv, columns):
+    """Lines written over each other on a terminal so many columns wide."""
+    ours, theirs = pty.openpty()
+    size = struct.pack("HHHH", 24, columns, 0, 0)
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, size)
+    environment = {k: v for k, v in os.environ.items() if k != "COLUMNS"}
+    said = b""
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, *argv],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        env=environment,
+    ) as process:
+        os.close(theirs)
+        while True:
+            try:
+                said += os.read(ours, 4096)
+            except OSError:  # nobody holds the other end any more
+                break
+    os.close(ours)
+    assert process.returncode == 0, said
+    lines = re.split(r"\r\x1b\[K", said.decode())[1:]
+    return [line.splitlines()[0] for line in lines]
+
+
+@pytest.mark.parametrize("columns", [80, 160])
+def test_the_line_on_a_terminal_says_how_it_goes(files, columns):
+    argv = run_argv(files, "--dry-run")
+    argv[argv.index("--source") + 1] = f"replay:{files / 'free.c3d'}"
+    lines = on_a_terminal(argv, columns)
+    assert len(lines) > 2
+    assert max(map(len, lines)) < columns
+    going = next(line for line in lines if line.startswith("active"))
+    told = ["c ", "flexion ", "residual ", "worst "]
+    if columns == 160:
+        told += ["/s", "p99 ", "misses "]
+    assert all(word in going for word in told), going
+    assert "inside" in going.lower() or "outside" in going.lower()
+
+
+def test_the_line_names_a_marker_that_is_astray(files, tmp_path):
+    recording = read(files / "free.c3d")
+    markers = recording.markers.copy()
+    markers[:, recording.labels.index("RUPA"), 0] += 0.3
+    write_c3d(tmp_path / "astray.c3d", replace(recording, markers=markers))
+    argv = run_argv(files, "--dry-run")
+    argv[argv.index("--source") + 1] = f"replay:{tmp_path / 'astray.c3d'}"
+    lines = on_a_terminal(argv, 80)
+    assert any("RUPA" in line and "mm" in line for line in lines), lines
 
 
 def test_a_replay_that_differs_says_so(files, tmp_path, capsys):

@@ -95,6 +95,7 @@ def test_the_arm_drives_the_pointer_and_the_finger(
         assert drive["state"] == "active"
         assert drive["finger"] == "active"
         assert drive["latency"] > 0
+        assert isinstance(drive["refused"], str)
         assert panel.hello["view"].startswith("http://127.0.0.1:")
         if how == "signal":
             os.kill(os.getpid(), signal.SIGINT)
