@@ -101,9 +101,9 @@ def test_the_line_on_a_terminal_says_how_it_goes(files, columns):
     assert len(lines) > 2
     assert max(map(len, lines)) < columns
     going = next(line for line in lines if line.startswith("active"))
-    told = ["c ", "flexion ", "residual ", "worst "]
+    told = ["c ", "flexion ", "/s ", "p99 ", "residual ", " mm"]
     if columns == 160:
-        told += ["/s", "p99 ", "misses "]
+        told += ["worst ", "misses "]
     assert all(word in going for word in told), going
     assert "inside" in going.lower() or "outside" in going.lower()
 

@@ -190,15 +190,14 @@ def _each(shown: list[Callable[[Status], None]]) -> Callable[[Status], None]:
 
 def _line(s: Status) -> str:
     """Say how it goes, what matters most first: a narrow terminal cuts the rest."""
+    drive = f"{s.state:<7} c {s.c:5.2f} flexion {s.flexion:4.2f} ({s.measured:4.2f})"
+    pace = f"{s.rate:4.0f}/s p99 {1e3 * s.latency:4.2f} ms"
+    if s.refused:
+        return f"{drive} {s.refused} {pace} misses {s.misses}"
     place = "inside" if s.inside else "OUTSIDE"
-    pose = (
-        f"{place:<7}  residual {1e3 * s.residual:4.1f}, worst "
-        f"{1e3 * s.worst_residual:3.0f} mm"
-    )
     return (
-        f"{s.state:<9} c {s.c:5.2f}  flexion {s.flexion:4.2f} ({s.measured:4.2f})  "
-        f"{s.refused or pose}  {s.rate:5.0f}/s  p99 {1e3 * s.latency:5.2f} ms  "
-        f"misses {s.misses}"
+        f"{drive} {pace} {place:<7} residual {1e3 * s.residual:4.1f} mm "
+        f"worst {1e3 * s.worst_residual:3.0f} mm misses {s.misses}"
     )
 
 
