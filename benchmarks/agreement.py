@@ -18,12 +18,12 @@ import numpy as np
 import pinocchio
 from scipy.spatial.transform import Rotation
 
-from ikns.files import read
-from ikns.marker_ik import LIMIT, PRIOR, MarkerIK
-from ikns.recording import Recording
-from ikns.scaling import scale
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import scale
+from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
+from ikns.recording.files import read
+from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
-from ikns.skeleton import Skeleton
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 #: Radians or meters; what is called the same.

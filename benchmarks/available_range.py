@@ -19,11 +19,11 @@ from collections import Counter
 import casadi
 import numpy as np
 
+from ikns.body.chains import chain_joints
 from ikns.calibration import elbow_reference
 from ikns.errors import InvalidInput
-from ikns.motion import chain_joints
-from ikns.nullspace_map import NullSpaceMap, null_space_samples
-from ikns.nullspace_map.samples import still
+from ikns.nullspace.map import NullSpaceMap, null_space_samples
+from ikns.nullspace.map.samples import still
 from ikns.simulation import simulate_protocol, virtual_subject
 from ikns.symbolic import HeldHand
 

@@ -22,13 +22,13 @@ import pinocchio
 import sklearn
 
 import ikns
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate, track_chain
-from ikns.files import write_c3d
-from ikns.marker_ik import MarkerIK
-from ikns.nullspace_map import NullSpaceMap, null_space_samples
-from ikns.scaling import scale
+from ikns.calibration.scaling import scale
+from ikns.motion.marker_ik import MarkerIK
+from ikns.nullspace.map import NullSpaceMap, null_space_samples
+from ikns.recording.files import write_c3d
 from ikns.simulation import simulate_protocol, virtual_subject
-from ikns.skeleton import Skeleton
 
 
 def round_of_steps(folder: Path) -> dict[str, float]:

@@ -39,17 +39,18 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 from scipy.stats import binomtest
 
-from ikns.calibration import calibrate, track_chain
-from ikns.compare import (
+from ikns.analysis.compare import (
     Crosstalk,
     NullSpaceComparison,
     compare_motion,
     crosstalk,
     motion_crosstalk,
 )
-from ikns.compare.leak import hand_turns, slopes
-from ikns.motion import SIDES
-from ikns.nullspace_map import MapWarning, NullSpaceMap
+from ikns.analysis.compare.leak import hand_turns, slopes
+from ikns.body.chains import SIDES
+from ikns.body.skeleton import Skeleton
+from ikns.calibration import calibrate, track_chain
+from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
 from ikns.simulation.arm import Arm
 from ikns.simulation.movement import Plan, explore, join, reach, reach_samples
@@ -63,7 +64,6 @@ from ikns.simulation.places import (
 )
 from ikns.simulation.protocol import _RESTING, _STATIC_SD, _pose
 from ikns.simulation.wander import tremor, wander
-from ikns.skeleton import Skeleton
 from ikns.view.render import png
 from ikns.view.style import GREY, INK, RED, house_style, new_figure
 

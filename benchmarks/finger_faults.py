@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from ikns.finger import DynamixelFinger
-from ikns.finger.servo import FAULTS, Servo, Wire
+from ikns.finger.emulator import FAULTS, Servo, Wire
 
 BAUD = 1_000_000
 GIVE_UP = 5.0  # s

@@ -20,10 +20,10 @@ import pinocchio
 
 import ikns
 from ikns.calibration import calibrate
-from ikns.control import FrameSolver
-from ikns.marker_ik import MarkerIK
+from ikns.calibration.subject import Subject
+from ikns.live.control import FrameSolver
+from ikns.motion.marker_ik import MarkerIK
 from ikns.simulation import Protocol, simulate_protocol, virtual_subject
-from ikns.subject import Subject
 
 WINDOW = 100
 
@@ -31,7 +31,7 @@ WINDOW = 100
 def one_by_one(subject: Subject, *, compiled: bool) -> Callable[[np.ndarray], float]:
     """Inverse kinematics, then the hand, then the signal."""
     solver = MarkerIK(subject.skeleton, compiled=compiled)
-    joints = ikns.motion.chain_joints(subject.chain)
+    joints = ikns.body.chains.chain_joints(subject.chain)
     columns = [subject.skeleton.joint_names.index(name) for name in joints]
     pose = None
 

@@ -22,17 +22,18 @@ import numpy as np
 import scipy
 import sklearn
 
+from ikns.body.chains import SIDES, chain_joints
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate, elbow_reference
-from ikns.motion import SIDES, Motion, chain_joints
-from ikns.nullspace_map import NullSpaceMap, null_space_samples
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import NullSpaceMap, null_space_samples
+from ikns.numerics.subspace import mean_null_direction
 from ikns.simulation import (
     Protocol,
     Unsteadiness,
     simulate_protocol,
     virtual_subject,
 )
-from ikns.skeleton import Skeleton
-from ikns.subspace import mean_null_direction
 
 #: What is printed: name, unit, how to read the target, the target.
 LINES = {

@@ -16,8 +16,8 @@ import time
 import casadi
 import numpy as np
 
+from ikns.body.skeleton import Skeleton
 from ikns.simulation import simulate_protocol, virtual_subject
-from ikns.skeleton import Skeleton
 from ikns.symbolic import fit_lengths
 
 FRAMES = 60

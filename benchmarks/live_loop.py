@@ -37,7 +37,7 @@ from live.outcome import LONGEST_STALL, Outcome, Summary, summarize
 
 import ikns
 from ikns.errors import InvalidInput
-from ikns.runtime import check_realtime
+from ikns.live.runtime import check_realtime
 
 PLACES = {"stream": stream_faults, "servo": servo_faults, "program": process_faults}
 FAULTS = {
@@ -248,7 +248,7 @@ def main() -> None:
     # One core a process; and what children import once need not be imported again.
     os.environ["OMP_NUM_THREADS"] = "1"
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["ikns.runtime", "ikns.calibration"])
+    context.set_forkserver_preload(["ikns.live.runtime", "ikns.calibration"])
     seconds, fast = 60 * options.minutes, 6 * options.minutes
     frames, injections, kills = options.frames, options.injections, options.kills
     if options.quick:

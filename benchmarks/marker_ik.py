@@ -33,7 +33,7 @@ from peers.problem import (
 )
 from threadpoolctl import threadpool_limits
 
-from ikns.marker_ik.pose import PRIOR, PRIOR_FROM_SCRATCH
+from ikns.motion.marker_ik.pose import PRIOR, PRIOR_FROM_SCRATCH
 
 OPENSIM = "OpenSim InverseKinematicsSolver"
 LIVE, BATCH = "ikns, one frame a call", "ikns, a recording a call"

@@ -30,7 +30,7 @@ from scipy.interpolate import (
 )
 from threadpoolctl import threadpool_limits
 
-from ikns.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from voronoi_oracle import laplace_weights, sibson_weights

@@ -23,9 +23,9 @@ from scipy.linalg import null_space as scipy_null_space
 from scipy.linalg import subspace_angles
 from threadpoolctl import threadpool_limits
 
-from ikns.motion import CHAINS
-from ikns.skeleton import Skeleton
-from ikns.subspace import null_spaces, principal_angles
+from ikns.body.chains import CHAINS
+from ikns.body.skeleton import Skeleton
+from ikns.numerics.subspace import null_spaces, principal_angles
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from null_space_oracle import MIXED, exact_projector, mixed_pair, svd_angles

@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from scipy.stats import binomtest
 
-from ikns.experiments.statistics import (
+from ikns.statistics import (
     Pairs,
     Spread,
     cohens_dz,
@@ -34,7 +34,7 @@ from ikns.experiments.statistics import (
     subject_means_t,
     within_subject_anova,
 )
-from ikns.experiments.statistics.printed_spread import subject_spread_limit
+from ikns.statistics.printed_spread import subject_spread_limit
 
 SUBJECTS, TRAJECTORIES, REPEATS = 10, ("T1", "T2", "T3"), 3
 SKILL, TRIAL = 0.8, 0.9  # standard deviations of RMSE, as the paper's are about 1

@@ -35,7 +35,7 @@ from reaches.modes import DEFAULT, MODES, POSITION, SWIVEL, controls, tracks
 from reaches.real import RealArm, real_arms
 from reaches.simulated import CHAIN, RATE, Person, Session, simulate
 
-from ikns.control import RateControl
+from ikns.live.control import RateControl
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 REACHED, MARGIN = 5.0, 0.01

@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 import pinocchio
 
-from ikns.files import read
-from ikns.marker_ik import MarkerIK
-from ikns.scaling import scale
-from ikns.skeleton import Skeleton
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import scale
+from ikns.motion.marker_ik import MarkerIK
+from ikns.recording.files import read
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 

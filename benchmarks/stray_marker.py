@@ -19,11 +19,11 @@ import numpy as np
 
 from ikns import MarkerIK, Skeleton, read, scale
 from ikns.calibration import calibrate, in_sight, sight_needs
-from ikns.control import ControlFrame, FrameSolver
-from ikns.control.settings import Settings
-from ikns.recording import Recording
+from ikns.calibration.subject import Subject
+from ikns.live.control import ControlFrame, FrameSolver
+from ikns.live.control.settings import Settings
+from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
-from ikns.subject import Subject
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 DISTANCES = (0.03, 0.05, 0.08, 0.10, 0.12, 0.15, 0.20, 0.25, 0.30, 0.40, 0.50)

@@ -21,9 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ikns.recording import Recording
-from ikns.stream import LslOutlet, Source, open_source
-from ikns.stream.replay import Replay, wait_until
+from ikns.live.stream import LslOutlet, Source, open_source
+from ikns.live.stream.replay import Replay, wait_until
+from ikns.recording.recording import Recording
 
 MARKERS = 39
 NAME = f"ikns-benchmark-{os.getpid()}"

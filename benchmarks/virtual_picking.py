@@ -35,9 +35,9 @@ from functools import partial
 
 import numpy as np
 
-from ikns.control.settings import Settings
 from ikns.experiments.picking import OBJECT_IDS, load_objects, pick_schedule
 from ikns.experiments.picking.virtual import VIRTUAL_CONDITIONS, virtual_pick_step
+from ikns.live.control.settings import Settings
 from ikns.simulation.operator import draw_participant
 
 #: Time of the successes, mean and standard deviation, s; successes of 100, as printed.

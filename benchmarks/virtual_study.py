@@ -30,7 +30,7 @@ import tomli_w
 
 from ikns.experiments.study import init_study, read_study, run_study
 from ikns.experiments.visits import list_visits, read_visit
-from ikns.warm_up import warm_up
+from ikns.live.warm_up import warm_up
 
 #: A study that is quick to simulate: coarse frames, one profile, one object.
 SMALL: dict[str, Any] = {

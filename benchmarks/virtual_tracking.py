@@ -27,7 +27,6 @@ from functools import partial
 
 import numpy as np
 
-from ikns.control.settings import Settings
 from ikns.experiments.tracking import (
     CHARACTERS,
     draw_profile,
@@ -36,6 +35,7 @@ from ikns.experiments.tracking import (
     virtual_step,
     virtual_trial,
 )
+from ikns.live.control.settings import Settings
 from ikns.simulation.operator import Delay, Operator, draw_participant, typical
 
 #: Means and standard deviations over ten people, as the paper prints them.

@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 
-from ikns.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
 CUBE = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
 #: The paper's layout: the vertices of a box, the middles of its lower and upper face.

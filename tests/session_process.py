@@ -4,8 +4,8 @@ import sys
 import time
 from pathlib import Path
 
-from ikns.session import open_run
-from ikns.session.channels import model_channels
+from ikns.live.session import open_run
+from ikns.live.session.channels import model_channels
 
 
 def main(session: Path) -> None:

@@ -4,10 +4,10 @@ from functools import cache
 from pathlib import Path
 
 from ikns.calibration import calibrate
-from ikns.files import write_c3d
-from ikns.recording import Recording
+from ikns.calibration.subject import Subject
+from ikns.recording.files import write_c3d
+from ikns.recording.recording import Recording
 from ikns.simulation import Protocol, simulate_protocol, virtual_subject
-from ikns.subject import Subject
 
 
 @cache

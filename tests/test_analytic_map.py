@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from ikns.body.chains import CHAINS
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.motion import CHAINS, Motion
-from ikns.nullspace_map import (
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import (
     MapWarning,
     NullSpaceMap,
     analytic_map,
     null_space_samples,
 )
-from ikns.subspace import null_space, principal_angles
+from ikns.numerics.subspace import null_space, principal_angles
 
 UPPER_ARM, FOREARM, HAND = 0.28, 0.26, 0.08  # m, about those of an adult
 SHOULDER = np.array([0.0, 0.0, 0.17])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikns.anthropometry import (
+from ikns.body.anthropometry import (
     LIMB_SEGMENTS,
     SEXES,
     expected_lengths,
@@ -197,7 +197,7 @@ def test_sex_may_be_a_word_or_a_letter(word):
 def test_importing_the_tables_brings_nothing_heavy():
     heavy = ("pandas", "scipy", "sklearn", "numba", "matplotlib", "pinocchio")
     code = (
-        "import sys, ikns.anthropometry;"
+        "import sys, ikns.body.anthropometry;"
         f"print([m for m in {heavy} if m in sys.modules])"
     )
     out = subprocess.run(

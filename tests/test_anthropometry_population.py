@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ikns.anthropometry import (
+from ikns.body.anthropometry import (
     LIMB_SEGMENTS,
     SEXES,
     expected_lengths,

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from ikns.anthropometry import SEXES, TABLES, row, table
+from ikns.body.anthropometry import SEXES, TABLES, row, table
 
 SAMPLED = ("biacromial_breadth", "acromion_radiale", "radiale_stylion", "hand_length")
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ikns.anthropometry import segments
-from ikns.body import SEGMENTS, resize_urdf, segment_lengths, urdf_folder
+from ikns.body.anthropometry import segments
+from ikns.body.model_file import SEGMENTS, resize_urdf, segment_lengths, urdf_folder
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.skeleton import Skeleton
 
 URDF = (urdf_folder() / "upper_body.urdf").read_text()
 

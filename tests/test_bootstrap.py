@@ -11,14 +11,14 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 from scipy.stats import t as student
 
-from ikns.bootstrap import (
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.numerics.bootstrap import (
     block_counts,
     block_length,
     block_rows,
     length_interval,
     student_interval,
 )
-from ikns.errors import InvalidInput, NotEnoughData
 
 
 def ar1(rng, n, phi, m=1):

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import small_person
 
+from ikns.body.chains import chain_joints, chain_sides
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate, elbow_reference, in_sight, track_chain
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
-from ikns.files import read
-from ikns.motion import chain_joints, chain_sides
-from ikns.nullspace_map import still
-from ikns.recording import Recording
-from ikns.skeleton import Skeleton
+from ikns.nullspace.map import still
+from ikns.recording.files import read
+from ikns.recording.recording import Recording
 
 
 def test_c_rises_with_the_elbow_at_every_point() -> None:

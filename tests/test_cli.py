@@ -75,7 +75,7 @@ def test_every_public_name_exists() -> None:
 
 
 def test_a_function_is_found_though_its_module_has_the_same_name() -> None:
-    code = "from ikns.compare import Comparison\nimport ikns\nikns.compare.__call__"
+    code = "from ikns.live.warm_up import warm_up\nimport ikns\nikns.warm_up.__call__"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

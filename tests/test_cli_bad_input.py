@@ -11,7 +11,7 @@ import small_person
 from command_line import calibrate, check_refused
 
 from ikns.cli import main
-from ikns.recording import Recording
+from ikns.recording.recording import Recording
 
 
 def rename(recording: Recording, change: Callable[[str], str]) -> Recording:

@@ -16,8 +16,8 @@ from command_line import check_refused, contents, one_sentence
 from small_person import protocol as person
 
 from ikns.cli import main
-from ikns.files import read, write_c3d
-from ikns.recording import Recording
+from ikns.recording.files import read, write_c3d
+from ikns.recording.recording import Recording
 from ikns.simulation import Protocol, Unsteadiness, simulate_protocol, virtual_subject
 
 RATE = 50

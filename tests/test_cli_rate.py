@@ -10,7 +10,7 @@ from command_line import check_refused, read_csv
 import ikns
 from ikns.calibration import track_chain
 from ikns.cli import main
-from ikns.control import RateControl
+from ikns.live.control import RateControl
 
 
 def line(files: Path, out: Path, *more: str) -> list[str]:

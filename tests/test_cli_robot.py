@@ -9,9 +9,9 @@ import pytest
 from command_line import check_refused
 from example_robot_data import robots_loader
 
+from ikns.body.skeleton import Robot
 from ikns.cli import main
 from ikns.simulation import explore_null_space, reach_pose
-from ikns.skeleton import Robot
 
 FRAME = "panda_hand_tcp"
 

@@ -16,7 +16,7 @@ import pytest
 from command_line import check_refused, contents
 
 from ikns.cli import main
-from ikns.files import read, write_c3d
+from ikns.recording.files import read, write_c3d
 
 PROGRAM = "import sys; from ikns.cli import main; sys.exit(main(sys.argv[1:]))"
 

@@ -12,11 +12,11 @@ import pytest
 from command_line import check_refused, contents
 from visit_page import Page, play
 
+from ikns.calibration.subject import Subject
 from ikns.cli import main
-from ikns.experiments.summary import summarize
+from ikns.experiments.study.summary import summarize
 from ikns.experiments.visits import read_visit, tracking_record
-from ikns.session import read_run
-from ikns.subject import Subject
+from ikns.live.session import read_run
 from ikns.view.study_report.map_section import map_drawn
 
 SHORT = ["--profiles", "T1", "--repeats", "1", "--training", "0", "--seconds", "12"]

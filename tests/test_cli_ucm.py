@@ -9,12 +9,12 @@ import pytest
 import small_person
 from command_line import check_refused
 
+from ikns.analysis.ucm import movement, normalize_time, variance_split
+from ikns.body.chains import chain_joints
 from ikns.cli import main
-from ikns.derivative import slope
-from ikns.motion import chain_joints
-from ikns.recording import Recording
+from ikns.numerics.derivative import slope
+from ikns.recording.recording import Recording
 from ikns.simulation.wander import minimum_jerk
-from ikns.ucm import movement, normalize_time, variance_split
 
 RATE = 50.0
 #: Reach of the test, rad, in chain order of the right arm.

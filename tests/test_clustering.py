@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 from sklearn.datasets import make_blobs
 from sklearn.metrics import adjusted_rand_score
 
-from ikns.clustering import (
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.nullspace.clustering import (
     BoundingBoxKMeans,
     box_surface_points,
     minimum_bounding_box,
     nearest_center,
 )
-from ikns.errors import InvalidInput, NotEnoughData
 
 EPS = np.finfo(float).eps
 CORNERS = np.array(list(itertools.product([-1.0, 1.0], repeat=3)))

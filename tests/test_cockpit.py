@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ikns.experiments.cockpit import Cockpit
 from ikns.experiments.conduct import (
     Conductor,
     HeldInput,
@@ -29,7 +30,6 @@ from ikns.experiments.picking import pick_schedule
 from ikns.experiments.tracking import measure, schedule
 from ikns.experiments.visits import read_visit, tracking_record
 from ikns.finger import Safety, SimulatedFinger
-from ikns.view.cockpit import Cockpit
 from ikns.view.scene.browser import HOW_TO_GET_ONE, browser_options, find_browser
 
 PAGES = ("gamepad", "keyboard", "mouse")

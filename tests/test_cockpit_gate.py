@@ -16,10 +16,10 @@ from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from ikns.errors import FileError, InvalidInput
+from ikns.experiments.cockpit import Cockpit, Gate
+from ikns.experiments.cockpit.handlers import FILES
 from ikns.experiments.conduct import Conductor, HeldInput, TrackingDesk, VisitBook
 from ikns.experiments.tracking import schedule
-from ikns.view.cockpit import Cockpit, Gate
-from ikns.view.cockpit.handlers import FILES
 
 ABOUT = {"experiment": "tracking", "participant": "01", "simulated": False}
 PAGES = sorted(FILES)

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
-from ikns.compare import compare
+from ikns.analysis.compare import compare
+from ikns.body.chains import SIDES, chain_joints
 from ikns.errors import InvalidInput
-from ikns.motion import SIDES, Motion, chain_joints
-from ikns.nullspace_map import NullSpaceMap
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import NullSpaceMap
 
 CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=float) * 0.3
 JOINTS = chain_joints("right_arm")

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikns.compare import COORDINATES, shoulder_coordinates
+from ikns.analysis.compare import COORDINATES, shoulder_coordinates
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.isb import isb_angles
-from ikns.skeleton import Skeleton
+from ikns.motion.isb import isb_angles
 
 SHOULDER = ("shoulder_abduction", "shoulder_flexion", "shoulder_rotation")
 SKELETON = Skeleton.load()

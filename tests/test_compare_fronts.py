@@ -11,13 +11,13 @@ import pytest
 import small_person
 from example_robot_data import robots_loader
 
-from ikns.compare import compare_motion, compare_robot, motion_crosstalk
+from ikns.analysis.compare import compare_motion, compare_robot, motion_crosstalk
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.motion import chain_joints
-from ikns.nullspace_map import NullSpaceMap, null_space_samples
+from ikns.nullspace.map import NullSpaceMap, null_space_samples
+from ikns.numerics.subspace import null_space
 from ikns.simulation import explore_null_space
-from ikns.skeleton import Robot
-from ikns.subspace import null_space
 
 BODY = small_person.protocol().subject.skeleton
 TRUTH = small_person.protocol().points.truth

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ikns.compare import crosstalk, find_reaches
+from ikns.analysis.compare import crosstalk, find_reaches
 from ikns.errors import InvalidInput, NotEnoughData
 
 RATE = 100

@@ -7,16 +7,16 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import ortho_group
 
-from ikns.compare import (
+from ikns.analysis.compare import (
     Kinematics,
     chance_angles,
     chance_inside,
     compare_samples,
     learned_directions,
 )
-from ikns.compare.chance import random_subspaces
+from ikns.analysis.compare.chance import random_subspaces
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.subspace import principal_angles
+from ikns.numerics.subspace import principal_angles
 
 N, JOINTS = 300, 7
 TIME = np.arange(2 * N) / 100

@@ -24,7 +24,7 @@ from ikns.experiments.conduct import (
     VirtualInput,
     VisitBook,
 )
-from ikns.experiments.conduct.book import _FIXED
+from ikns.experiments.conduct.visit_log import _FIXED
 from ikns.experiments.picking import pick_schedule
 from ikns.experiments.tracking import measure, schedule
 from ikns.experiments.visits import counting, read_visit, tracking_record

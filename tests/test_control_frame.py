@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
+from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import in_sight, sight_needs
-from ikns.control import FrameSolver
 from ikns.errors import InvalidInput
-from ikns.marker_ik import MarkerIK
-from ikns.motion import SIDES, chain_joints, chain_sides
-from ikns.nullspace_map import NullSpaceMap
-from ikns.recording import Recording
-from ikns.skeleton import Skeleton
+from ikns.live.control import FrameSolver
+from ikns.motion.marker_ik import MarkerIK
+from ikns.nullspace.map import NullSpaceMap
+from ikns.recording.recording import Recording
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ikns.control.machine import SafetyMachine
-from ikns.control.settings import Settings
-from ikns.control.smoothing import OneEuro
 from ikns.errors import InvalidInput
+from ikns.live.control.safety import SafetyMachine
+from ikns.live.control.settings import Settings
+from ikns.live.control.smoothing import OneEuro
 
 # --- the state machine ---------------------------------------------------------------
 

@@ -8,16 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from ikns.control import RateControl, carried, null_rate
-from ikns.control.local_map import LocalMap
-from ikns.control.null_rate import garrote
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.motion import chain_joints
-from ikns.nullspace_map import NullSpaceMap
+from ikns.live.control import RateControl, carried, null_rate
+from ikns.live.control.local_map import LocalMap
+from ikns.live.control.null_rate import garrote
+from ikns.nullspace.map import NullSpaceMap
+from ikns.numerics.subspace import null_space
 from ikns.simulation.arm import Arm, self_motion
 from ikns.simulation.trial import true_motion
-from ikns.skeleton import Skeleton
-from ikns.subspace import null_space
 
 CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0
 HERE = np.array([0.1, 0.2, -0.3])

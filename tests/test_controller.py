@@ -9,11 +9,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from ikns.calibration import sight_needs
-from ikns.control import FrameSolver
-from ikns.control.controller import Controller
-from ikns.control.settings import Settings
+from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
-from ikns.subject import Subject
+from ikns.live.control import FrameSolver
+from ikns.live.control.controller import Controller
+from ikns.live.control.settings import Settings
 
 
 @pytest.fixture(scope="module")

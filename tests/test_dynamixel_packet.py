@@ -4,7 +4,7 @@ from dynamixel_sdk import Protocol1PacketHandler, Protocol2PacketHandler
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikns.finger.servo.packet import (
+from ikns.finger.emulator.packet import (
     Packet,
     Parser,
     checksum,

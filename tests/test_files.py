@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ikns.errors import FileError
-from ikns.files import read
+from ikns.recording.files import read
 
 TASKS = [f"{task}{side}1" for task in "ACDF" for side in "LR"] + ["_static"]
 
@@ -175,7 +175,7 @@ def test_a_name_that_no_file_can_have_is_refused():
 def test_reading_loads_no_compiled_reader(data):
     path = data / "stoop" / "neu_t169_f250f350.c3d"
     script = (
-        f"import sys; from ikns.files import read; read({str(path)!r}); "
+        f"import sys; from ikns.recording.files import read; read({str(path)!r}); "
         "print(sorted({'ezc3d', 'scipy', 'pinocchio', 'numba'} & set(sys.modules)))"
     )
     run = subprocess.run(

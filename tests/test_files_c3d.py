@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ikns.errors import FileError, InvalidInput
-from ikns.files import read, write_c3d
-from ikns.recording import Recording
+from ikns.recording.files import read, write_c3d
+from ikns.recording.recording import Recording
 
 #: Half a step of single precision.
 SINGLE = 2.0**-24

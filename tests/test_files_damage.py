@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ikns.errors import IknsError
-from ikns.files import read, write_c3d
-from ikns.recording import Recording
+from ikns.recording.files import read, write_c3d
+from ikns.recording.recording import Recording
 
 LABELS = ["S:RSHO", "S:RELB", "S:RWRA", "S:RFIN"]
 
@@ -150,7 +150,7 @@ def test_huge_counts_ask_for_no_memory(sound, folder):
         from pathlib import Path
         resource.setrlimit(resource.RLIMIT_AS, (3 << 29, 3 << 29))
         from ikns.errors import FileError
-        from ikns.files import read
+        from ikns.recording.files import read
         for name in "header frames dimensions255 dimensions0".split():
             try:
                 read(Path({str(folder)!r}) / (name + ".c3d"))

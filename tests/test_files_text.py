@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ikns.errors import FileError
-from ikns.files import read
+from ikns.recording.files import read
 
 NAMES = ["ADL001:RSHO1", "RELB", "RFIN"]
 POINTS = 1000 * np.random.default_rng(3).normal(size=(4, 3, 3)).round(3)

@@ -17,7 +17,7 @@ import pytest
 
 from ikns.finger import DynamixelFinger, FingerError, Safety, check_finger, open_finger
 from ikns.finger.check import LAWS
-from ikns.finger.servo import Servo, Wire
+from ikns.finger.emulator import Servo, Wire
 
 #: Longer than anything here takes, seconds.
 PATIENCE = 10.0

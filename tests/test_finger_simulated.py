@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput
 from ikns.finger import (
     DynamixelFinger,
@@ -16,7 +17,8 @@ from ikns.finger import (
     check_finger,
     open_finger,
 )
-from ikns.finger.chain import (
+from ikns.finger.check import LAWS
+from ikns.finger.geometry import (
     FULL_FLEXION,
     MODULES,
     WIDEST,
@@ -24,8 +26,6 @@ from ikns.finger.chain import (
     joint_angles,
     opening,
 )
-from ikns.finger.check import LAWS
-from ikns.skeleton import Robot
 
 URDF = Path(__file__).parents[1] / "urdf" / "finger.urdf"
 

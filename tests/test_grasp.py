@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikns.body import urdf_folder
+from ikns.body.model_file import urdf_folder
 from ikns.errors import InvalidInput
 from ikns.experiments.picking import load_objects
 from ikns.simulation.grasp import Grasp, Solid, constant, finger_parts, grip_height

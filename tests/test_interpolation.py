@@ -25,7 +25,7 @@ from interpolation_layouts import (
 from voronoi_oracle import sibson_weights
 
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
 WEIGHT = 1e-12
 

@@ -7,9 +7,9 @@ import pytest
 from interpolation_layouts import JITTERS, LAYOUTS, built
 from scipy.spatial import ConvexHull, Delaunay
 
-from ikns.interpolation import NaturalNeighborInterpolator
-from ikns.interpolation.delaunay import delaunay
-from ikns.interpolation.hull import nearest_on_hull
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.interpolation.delaunay import delaunay
+from ikns.nullspace.interpolation.hull import nearest_on_hull
 
 
 def test_far_outside_the_projection_is_the_nearest_point_of_the_hull():

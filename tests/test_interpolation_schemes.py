@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import subspace_angles
 
-from ikns.nullspace_map import NullSpaceMap
+from ikns.nullspace.map import NullSpaceMap
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from interpolation.grassmann import exponential, logarithm, mean_subspace

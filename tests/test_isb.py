@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ikns.isb import isb_angles
-from ikns.skeleton import Skeleton
+from ikns.body.skeleton import Skeleton
+from ikns.motion.isb import isb_angles
 
 
 @pytest.fixture(scope="module")

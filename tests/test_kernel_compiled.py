@@ -16,8 +16,9 @@ KERNELS = Path(module.__file__).parent
 @pytest.fixture
 def copy(tmp_path, monkeypatch):
     """A copy of the kernels' sources that the cache looks at."""
-    for path in KERNELS.glob("*.py"):
-        shutil.copy(path, tmp_path)
+    shutil.copytree(
+        KERNELS, tmp_path, ignore=lambda *_: {"__pycache__"}, dirs_exist_ok=True
+    )
     monkeypatch.setattr(module, "_HERE", tmp_path)
     monkeypatch.setattr(module.config, "CACHE_DIR", "")
     module._cache_folder.cache_clear()
@@ -33,20 +34,23 @@ def folder_of(name: str) -> Path:
 
 
 def test_a_change_in_what_is_called_gives_a_new_folder(copy):
-    before = {name: folder_of(name) for name in ("marker_ik", "step", "hull")}
-    source = copy / "step.py"
+    before = {
+        name: folder_of(name)
+        for name in ("body.marker_ik", "body.step", "voronoi.hull")
+    }
+    source = copy / "body" / "step.py"
     source.write_text(source.read_text() + "\n# changed\n")
     after = {name: folder_of(name) for name in before}
-    assert after["step"] != before["step"]
-    assert after["marker_ik"] != before["marker_ik"]  # it imports step
-    assert after["hull"] == before["hull"]
+    assert after["body.step"] != before["body.step"]
+    assert after["body.marker_ik"] != before["body.marker_ik"]  # it imports step
+    assert after["voronoi.hull"] == before["voronoi.hull"]
 
 
 def test_code_is_kept_elsewhere_where_the_package_is_read_only(copy, monkeypatch):
     home = copy / "home"
     (copy / "__pycache__").write_text("in the way, as a read-only folder would be")
     monkeypatch.setenv("XDG_CACHE_HOME", str(home))
-    assert folder_of("step").is_relative_to(home / "ikns")
+    assert folder_of("body.step").is_relative_to(home / "ikns")
 
 
 def test_without_any_place_code_is_compiled_and_not_kept(copy, monkeypatch):
@@ -54,13 +58,13 @@ def test_without_any_place_code_is_compiled_and_not_kept(copy, monkeypatch):
     (copy / "home").write_text("in the way")
     monkeypatch.setenv("XDG_CACHE_HOME", str(copy / "home"))
     module._cache_folder.cache_clear()
-    assert module._cache_folder("step") is None
-    assert not module.on_disk("step")
+    assert module._cache_folder("body.step") is None
+    assert not module.on_disk("body.step")
 
 
 def test_numba_is_asked_to_keep_code_where_the_user_wants_it(copy, monkeypatch):
     monkeypatch.setattr(module.config, "CACHE_DIR", str(copy / "wanted"))
-    assert folder_of("step").is_relative_to(copy / "wanted")
+    assert folder_of("body.step").is_relative_to(copy / "wanted")
 
 
 def calls(node: ast.AST) -> set[str]:
@@ -71,7 +75,7 @@ def calls(node: ast.AST) -> set[str]:
     }
 
 
-@pytest.mark.parametrize("path", sorted(KERNELS.glob("*.py")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", sorted(KERNELS.rglob("*.py")), ids=lambda p: p.stem)
 def test_python_never_calls_a_kernel_that_has_no_way_in(path):
     # It would end the process without a word.
     private, plain = set(), []

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from interpolation_layouts import JITTERS, LAYOUTS, jittered, turned
 
-from ikns._kernels.delaunay import triangulate
-from ikns._kernels.exact import on_lattice
-from ikns._kernels.insertion_order import insertion_order
-from ikns.interpolation.delaunay import delaunay, lift_order
+from ikns._kernels.voronoi.delaunay import triangulate
+from ikns._kernels.voronoi.exact import on_lattice
+from ikns._kernels.voronoi.insertion_order import insertion_order
+from ikns.nullspace.interpolation.delaunay import delaunay, lift_order
 
 
 def as_set(simplices):

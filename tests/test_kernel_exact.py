@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from interpolation_layouts import LAYOUTS, turned
 from predicate_oracle import above_sphere, between, determinant, exactly, sign, volume
 
-from ikns._kernels import exact
-from ikns._kernels.predicates import in_sphere, orientation
+from ikns._kernels.voronoi import exact
+from ikns._kernels.voronoi.predicates import in_sphere, orientation
 
 
 @st.composite

@@ -10,19 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ikns._kernels.normal_equations import MOMENTS, linearize
-from ikns._kernels.rigid import rigid_pose
-from ikns._kernels.step import displacement, integrate
-from ikns._kernels.tree import joint_axes, place_joints
-from ikns._kernels.tree_cholesky import factor, solve
-from ikns.files import read
-from ikns.marker_ik import LIMIT, PRIOR, MarkerIK
-from ikns.marker_ik.kernel import tree_paths
-from ikns.marker_ik.pose import Frames
-from ikns.rigid import rigid_transform
-from ikns.scaling import scale
-from ikns.skeleton import Skeleton
-from ikns.skeleton.tree import joint_tree
+from ikns._kernels.body.normal_equations import MOMENTS, linearize
+from ikns._kernels.body.rigid import rigid_pose
+from ikns._kernels.body.step import displacement, integrate
+from ikns._kernels.body.tree import joint_axes, place_joints
+from ikns._kernels.body.tree_cholesky import factor, solve
+from ikns.body.skeleton import Skeleton
+from ikns.body.skeleton.tree import joint_tree
+from ikns.calibration.scaling import scale
+from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
+from ikns.motion.marker_ik.kernel import tree_paths
+from ikns.motion.marker_ik.pose import Frames
+from ikns.numerics.rigid import rigid_transform
+from ikns.recording.files import read
 
 # The compiled solver leaves less than 5 % of its tolerance of 1e-5 rad, the plain one,
 # asked for steps below 1e-10, at most a few hundred of those steps (it converges

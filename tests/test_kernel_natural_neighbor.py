@@ -24,7 +24,7 @@ from interpolation_layouts import (
     jittered,
 )
 
-from ikns._kernels.diagram import (
+from ikns._kernels.voronoi.diagram import (
     CORNER_ROWS,
     CORNERS,
     INSIDE_HULL,
@@ -37,11 +37,11 @@ from ikns._kernels.diagram import (
     VOLUME,
     new_work,
 )
-from ikns._kernels.natural_neighbor import natural_weights
+from ikns._kernels.voronoi.query import natural_weights
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.interpolation import NaturalNeighborInterpolator
-from ikns.interpolation.morton import morton_order
-from ikns.interpolation.packed import FEW
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.interpolation.morton import morton_order
+from ikns.nullspace.interpolation.packed import FEW
 
 TOLERANCE = {"sibson": 1e-14, "laplace": 1e-12}
 BAD = [[np.nan, 0.5, 0.5], [np.inf, 0, 0], [0.5, -np.inf, np.nan], [1e308, 0, 0]]

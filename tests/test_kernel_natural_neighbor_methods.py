@@ -17,7 +17,7 @@ from interpolation_layouts import (
 from voronoi_oracle import laplace_weights
 
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
 #: As of Sibson's weights: each length and angle is known to 4e-13.
 WEIGHT = 1e-12

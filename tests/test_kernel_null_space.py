@@ -15,9 +15,14 @@ from null_space_oracle import (
 )
 from scipy.stats import ortho_group
 
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.skeleton import Skeleton
-from ikns.subspace import null_projector, null_space, null_spaces, principal_angles
+from ikns.numerics.subspace import (
+    null_projector,
+    null_space,
+    null_spaces,
+    principal_angles,
+)
 
 EPS = np.finfo(float).eps
 seeds = st.integers(0, 2**32 - 1)

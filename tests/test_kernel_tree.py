@@ -4,9 +4,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from ikns._kernels.tree import joint_axes, place_joints
-from ikns.skeleton import Skeleton
-from ikns.skeleton.tree import joint_tree
+from ikns._kernels.body.tree import joint_axes, place_joints
+from ikns.body.skeleton import Skeleton
+from ikns.body.skeleton.tree import joint_tree
 
 # A pose is a product of at most 20 transforms of a few meters, each exact to rounding:
 # 20 * 3 * eps * 10 m = 1e-13.

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from interpolation_layouts import CUBE, JITTERS, LAYOUTS, jittered, turned
 
 from ikns.errors import NotEnoughData
-from ikns.interpolation.border import checked_points
-from ikns.interpolation.diagram import diagram
-from ikns.interpolation.faces import solid_angles
-from ikns.interpolation.voronoi import Voronoi, measured, voronoi
+from ikns.nullspace.interpolation.border import checked_points
+from ikns.nullspace.interpolation.diagram import diagram
+from ikns.nullspace.interpolation.faces import solid_angles
+from ikns.nullspace.interpolation.voronoi import Voronoi, measured, voronoi
 
 GRID = np.array(list(np.ndindex(4, 4, 4))) / 3.0
 RNG = np.random.default_rng(0)
@@ -157,7 +157,7 @@ def test_the_first_site_that_is_not_alone_is_named(seed, near):
 def test_without_tetrahedra_the_exact_path_is_taken(monkeypatch):
     empty = np.empty((0, 4), dtype=np.int64)
     monkeypatch.setattr(
-        "ikns.interpolation.diagram.triangulate", lambda *_: (empty, empty)
+        "ikns.nullspace.interpolation.diagram.triangulate", lambda *_: (empty, empty)
     )
     a, b = diagram(CUBE), voronoi(CUBE)
     assert all((getattr(a, f.name) == getattr(b, f.name)).all() for f in fields(a))

@@ -1,45 +1,49 @@
-"""The house keeps its order: every import points down."""
+"""The house keeps its order: imports point down, and no file waits for itself."""
 
 import ast
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-# Bottom row first. A module may import from the rows below its own, and within its row
-# from those before it, so imports never run in a circle.
-ROWS = (
-    "errors _kernels",
-    "anthropometry body recording motion marker_set files rigid derivative subspace "
-    "clustering interpolation bootstrap output_folder",
-    "skeleton isb finger stream session",
-    "marker_ik scaling nullspace_map symbolic",
-    "subject calibration ucm control compare warm_up",
-    "runtime simulation",
+# Lowest floor first. A room imports from lower floors and from itself; rooms on one
+# floor do not know each other.
+FLOORS = (
+    "errors",
+    "_kernels output_folder",
+    "numerics",
+    "recording finger statistics",
+    "body",
+    "motion",
+    "nullspace",
+    "calibration analysis",
+    "live symbolic",
+    "simulation",
     "experiments",
     "view",
     "cli",
 )
-ORDER = " ".join(ROWS).split()
+FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms.split()}
 ONLY_IN = {
-    "pinocchio": {"skeleton", "view"},
-    "sklearn": {"clustering", "nullspace_map"},
+    "pinocchio": {"body", "view"},
+    "sklearn": {"nullspace"},
     "matplotlib": {"view"},
     "meshcat": {"view"},
     "numba": {"_kernels"},
     "casadi": {"symbolic"},
     "dynamixel_sdk": {"finger"},
-    "pandas": {"experiments"},
+    "pandas": {"statistics"},
     "mujoco": {"simulation"},
     "pyarrow": {"experiments"},
     "joblib": {"experiments"},
     "dask": {"experiments"},
     "distributed": {"experiments"},
-    "tornado": {"view"},
-    "pylsl": {"stream"},
-    "qtm_rt": {"stream"},
+    "tornado": {"experiments", "view"},
+    "pylsl": {"live"},
+    "qtm_rt": {"live"},
     "serial": {"finger"},
-    "statsmodels": {"experiments"},
-    "vicon_dssdk": {"stream"},
+    "statsmodels": {"statistics"},
+    "vicon_dssdk": {"live"},
     "typer": {"cli"},
     "rich": {"cli"},
 }
@@ -47,29 +51,80 @@ PACKAGE = Path(__file__).parents[1] / "ikns"
 FILES = sorted(p for p in PACKAGE.rglob("*.py") if p != PACKAGE / "__init__.py")
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
-def test_imports_point_down(path: Path) -> None:
-    own = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+def module_of(path: Path) -> str:
+    """Dotted name within the package."""
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_of(path): path for path in FILES}
+
+
+def imports(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and dotted name of all that a file imports, TYPE_CHECKING included."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"relative import in line {node.lineno}"
-            assert node.module != "ikns", f"name the module in line {node.lineno}"
-            names = [str(node.module)]
+            assert node.module not in {None, "ikns"}, f"line {node.lineno}: which one?"
+            for alias in node.names:
+                inside = f"{node.module}.{alias.name}"
+                known = inside.removeprefix("ikns.") in MODULES
+                yield node.lineno, inside if known else str(node.module)
         elif isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        else:
-            continue
-        for library, *inside in (name.split(".") for name in names):
-            assert own in ONLY_IN.get(library, {own}), f"{own} imports {library}"
-            if library == "ikns" and not inside:  # all public names: from above only
-                assert own == "cli", f"{own} imports the whole package"
-            elif library == "ikns" and inside[0] != own:
-                assert ORDER.index(inside[0]) < ORDER.index(own), (
-                    f"{own} imports {inside[0]}"
-                )
+            yield from ((node.lineno, alias.name) for alias in node.names)
 
 
-def test_every_room_is_in_the_plan() -> None:
-    assert {p.relative_to(PACKAGE).parts[0].removesuffix(".py") for p in FILES} <= set(
-        ORDER
-    )
+@pytest.mark.parametrize("path", FILES, ids=module_of)
+def test_imports_point_down(path: Path) -> None:
+    own = module_of(path).split(".")[0]
+    for line, name in imports(path):
+        library, _, inside = name.partition(".")
+        assert own in ONLY_IN.get(library, {own}), f"line {line}: {own} takes {name}"
+        room = inside.split(".")[0]
+        if library == "ikns" and not room:  # all public names: from above only
+            assert own == "cli", f"line {line}: {own} imports the whole package"
+        elif library == "ikns" and room != own:
+            assert FLOOR[room] < FLOOR[own], f"line {line}: {own} imports {name}"
+
+
+def test_every_room_has_a_floor() -> None:
+    rooms = {module_of(path).split(".")[0] for path in FILES}
+    assert rooms == set(FLOOR)
+
+
+def circle(arrows: dict[str, set[str]]) -> list[str]:
+    """A way from a file back to itself, or nothing."""
+    done: set[str] = set()
+
+    def follow(name: str, way: list[str]) -> list[str]:
+        if name in way:
+            return [*way[way.index(name) :], name]
+        if name in done:
+            return []
+        for other in sorted(arrows.get(name, ())):
+            if found := follow(other, [*way, name]):
+                return found
+        done.add(name)
+        return []
+
+    return next((found for name in arrows if (found := follow(name, []))), [])
+
+
+def test_a_circle_is_found() -> None:
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
+    assert circle({"a": {"b", "c"}, "b": {"c"}}) == []
+
+
+def test_no_file_waits_for_itself() -> None:
+    # A package's `__init__` counts as a file: it waits for all that it gathers, so none
+    # of these may import from it.
+    arrows = {
+        module: {
+            name.removeprefix("ikns.")
+            for _, name in imports(path)
+            if name.startswith("ikns.")
+        }
+        - {module}
+        for module, path in MODULES.items()
+    }
+    assert circle(arrows) == []

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from ikns.errors import FileError, InvalidInput
-from ikns.experiments.live_calibration import (
+from ikns.live.calibration import (
     Guide,
     LiveProtocol,
     RecordingsFolder,
@@ -21,12 +21,12 @@ from ikns.experiments.live_calibration import (
     in_words,
     paper_steps,
 )
-from ikns.experiments.live_calibration.clock import DeviceClock
-from ikns.experiments.live_calibration.guide import HandTracker
-from ikns.experiments.live_calibration.take import take_recording
-from ikns.recording import Recording
+from ikns.live.calibration.assemble import take_recording
+from ikns.live.calibration.clock import DeviceClock
+from ikns.live.calibration.guide import HandTracker
+from ikns.live.stream import Frame
+from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
-from ikns.stream import Frame
 
 STATIC, FREE, ONE, TWO = paper_steps(
     points=2, static_seconds=0.2, free_seconds=0.3, point_seconds=0.1, countdown=0.1

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import small_person
 
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.experiments.live_calibration import Judge, Step, Verdict
-from ikns.nullspace_map import still
-from ikns.recording import Recording
+from ikns.live.calibration import Judge, Step, Verdict
+from ikns.nullspace.map import still
+from ikns.recording.recording import Recording
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
-from ikns.skeleton import Skeleton
 
 
 def piece(run, k: int) -> Recording:

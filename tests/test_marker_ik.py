@@ -5,14 +5,14 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import scale
 from ikns.errors import InvalidInput, MarkerMismatch
-from ikns.files import read
-from ikns.marker_ik import LIMIT, PRIOR, MarkerIK
-from ikns.marker_set import MarkerSet
-from ikns.recording import Recording
-from ikns.rigid import rigid_transform
-from ikns.scaling import scale
-from ikns.skeleton import Skeleton
+from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
+from ikns.numerics.rigid import rigid_transform
+from ikns.recording.files import read
+from ikns.recording.recording import Recording
 
 # Middle and reach of each joint in daily arm movements, deg, per side.
 EVERYDAY = {

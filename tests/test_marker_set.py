@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, MarkerMismatch
-from ikns.files import read
-from ikns.marker_set import MarkerSet
-from ikns.skeleton import Skeleton
+from ikns.recording.files import read
 
 
 @pytest.mark.parametrize(

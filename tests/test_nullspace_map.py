@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import ortho_group
 
-from ikns.nullspace_map import NullSpaceMap
+from ikns.nullspace.map import NullSpaceMap
 
 CORNERS = np.array(list(itertools.product([-1.0, 1.0], repeat=3)))
 LAYOUT = np.vstack([CORNERS, [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]])

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
+from ikns.body.chains import CHAINS
 from ikns.errors import IknsError, InvalidInput, NotEnoughData
-from ikns.motion import CHAINS, Motion
-from ikns.nullspace_map import MapWarning, NullSpaceMap, null_space_samples, still
-from ikns.nullspace_map.alignment import spanning_tree
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import MapWarning, NullSpaceMap, null_space_samples, still
+from ikns.nullspace.map.alignment import spanning_tree
 
 PLACES = np.array(list(np.ndindex(2, 2, 2)), dtype=float) * 0.3
 rng = np.random.default_rng(0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.control.settings import Settings
 from ikns.errors import InvalidInput
 from ikns.experiments.tracking import (
     draw_profile,
@@ -15,6 +14,7 @@ from ikns.experiments.tracking import (
     virtual_step,
     virtual_trial,
 )
+from ikns.live.control.settings import Settings
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
 from ikns.simulation.operator import (
     Copyist,

@@ -16,7 +16,7 @@ from ikns.experiments.picking import (
     load_objects,
     pick_schedule,
 )
-from ikns.experiments.statistics.printed import PAPER
+from ikns.statistics.printed import PAPER
 
 EDGES = {"box": 3, "cylinder": 2, "sphere": 1}
 

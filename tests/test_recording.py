@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ikns.errors import IknsError, InvalidInput, MarkerMismatch
-from ikns.recording import Recording
+from ikns.recording.recording import Recording
 
 TIME = np.array([0.0, 0.01, 0.02, 0.03])
 MARKERS = np.arange(4 * 2 * 3, dtype=float).reshape(4, 2, 3)

@@ -3,8 +3,8 @@ import pinocchio as pin
 import pytest
 from example_robot_data import robots_loader
 
+from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import FileError, InvalidInput
-from ikns.skeleton import Robot, Skeleton
 
 #: A revolute arm, one with continuous joints, one on a torso that slides.
 ARMS = {

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from example_robot_data import robots_loader
 
+from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput
-from ikns.nullspace_map import NullSpaceMap
+from ikns.nullspace.map import NullSpaceMap
+from ikns.numerics.subspace import mean_null_direction, principal_angles
 from ikns.simulation import explore_null_space, reach_pose
-from ikns.skeleton import Robot
-from ikns.subspace import mean_null_direction, principal_angles
 
 
 @pytest.fixture(scope="module")

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.control.settings import Settings
+from ikns.calibration.subject import FILES, Subject
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.finger import SimulatedFinger
-from ikns.recording import Recording
-from ikns.runtime import replay_run, run
-from ikns.session import check_session, create_session, open_run, read_run
-from ikns.session.channels import STATES
-from ikns.stream import Source
-from ikns.stream.replay import Replay
-from ikns.subject import FILES, Subject
+from ikns.live.control.settings import Settings
+from ikns.live.runtime import replay_run, run
+from ikns.live.session import check_session, create_session, open_run, read_run
+from ikns.live.session.channels import STATES
+from ikns.live.stream import Source
+from ikns.live.stream.replay import Replay
+from ikns.recording.recording import Recording
 
 
 @pytest.fixture(scope="module")

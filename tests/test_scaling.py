@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ikns.body import SEGMENTS
+from ikns.body.marker_set import MarkerSet
+from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import SEGMENT_SD, SIDE_SD, STATURE_SD, scale
 from ikns.errors import MarkerMismatch, NotEnoughData
-from ikns.files import read
-from ikns.marker_ik import MarkerIK
-from ikns.marker_set import MarkerSet
-from ikns.recording import Recording
-from ikns.scaling import SEGMENT_SD, SIDE_SD, STATURE_SD, scale
-from ikns.skeleton import Skeleton
+from ikns.motion.marker_ik import MarkerIK
+from ikns.recording.files import read
+from ikns.recording.recording import Recording
 
 PALPATION_SD = 2e-3
 

@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, InvalidInput
-from ikns.motion import chain_joints
-from ikns.nullspace_map import NullSpaceMap
-from ikns.skeleton import Skeleton
+from ikns.nullspace.map import NullSpaceMap
 from ikns.view.scene import Scene, map_scene
 from ikns.view.scene.body import (
     arm_links,

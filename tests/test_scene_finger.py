@@ -10,8 +10,8 @@ import small_person
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikns.body import segment_lengths, urdf_folder
-from ikns.finger.chain import joint_angles, opening
+from ikns.body.model_file import segment_lengths, urdf_folder
+from ikns.finger.geometry import joint_angles, opening
 from ikns.view.scene import LiveView, map_scene, with_finger
 from ikns.view.scene.drawing import drawn_nodes
 from ikns.view.scene.finger import finger_path, flexion_commands

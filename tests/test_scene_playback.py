@@ -19,12 +19,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import track_chain
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.files import read
-from ikns.motion import Motion
-from ikns.recording import Recording
-from ikns.skeleton import Skeleton
+from ikns.motion.motion import Motion
+from ikns.recording.files import read
+from ikns.recording.recording import Recording
 from ikns.view.scene import Scene, map_scene, recording_scene, scene_html, scene_picture
 from ikns.view.scene.body import drawn_links
 from ikns.view.scene.browser import find_browser

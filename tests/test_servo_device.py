@@ -5,9 +5,9 @@ import math
 import pytest
 
 from ikns.errors import InvalidInput
+from ikns.finger.emulator import Servo
+from ikns.finger.emulator.packet import Packet, Parser, encode
 from ikns.finger.models import MODELS
-from ikns.finger.servo import Servo
-from ikns.finger.servo.packet import Packet, Parser, encode
 
 
 class Desk:

@@ -12,8 +12,8 @@ import pytest
 from command_line import check_refused
 
 from ikns.errors import InvalidInput
+from ikns.finger.emulator import FAULTS, Servo, Wire, parse_fault
 from ikns.finger.models import MODELS
-from ikns.finger.servo import FAULTS, Servo, Wire, parse_fault
 
 GOAL, PRESENT = (116, 4), (132, 4)
 

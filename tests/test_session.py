@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from scipy.io import loadmat
 
 from ikns.errors import FileError, InvalidInput
-from ikns.files import read
-from ikns.session import (
+from ikns.live.session import (
     check_session,
     create_session,
     export_run,
@@ -27,7 +26,8 @@ from ikns.session import (
     read_run,
     runs,
 )
-from ikns.session.dataset import run_files
+from ikns.live.session.dataset import run_files
+from ikns.recording.files import read
 
 LABELS = ["RSHO", "RELB"]
 JOINTS = ["right_elbow_flexion", "right_wrist_flexion"]
@@ -278,7 +278,7 @@ def test_a_deleted_folder_is_told_within_a_second(tmp_path):
 
 def test_a_row_costs_no_wait(tmp_path, monkeypatch):
     # A disk that takes half a second for every write.
-    import ikns.session.writer as writer
+    import ikns.live.session.writer as writer
 
     real = writer.os.write
     monkeypatch.setattr(

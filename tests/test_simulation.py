@@ -16,10 +16,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from ikns import simulation
+from ikns.body.chains import SIDES
 from ikns.errors import FileError, InvalidInput
-from ikns.files import read
-from ikns.motion import SIDES
-from ikns.rigid import rigid_transform
+from ikns.numerics.rigid import rigid_transform
+from ikns.numerics.subspace import null_space
+from ikns.recording.files import read
 from ikns.simulation import (
     Protocol,
     Unsteadiness,
@@ -38,7 +39,6 @@ from ikns.simulation.places import (
     explored_places,
 )
 from ikns.simulation.wander import minimum_jerk, tremor, wander
-from ikns.subspace import null_space
 
 STEADY = Unsteadiness(drift=0.0, tilt=0.0, tremor=0.0, tremor_tilt=0.0)
 CLEAN = {"marker_noise": 0.0, "occluded": 0.0}

@@ -2,11 +2,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from ikns.body import SEGMENTS
+from ikns.body.chains import CHAINS, SIDES, chain_joints, chain_sides
+from ikns.body.marker_set import MarkerSet
+from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, InvalidInput, MarkerMismatch
-from ikns.marker_set import MarkerSet
-from ikns.motion import CHAINS, SIDES, chain_joints, chain_sides
-from ikns.skeleton import Skeleton
 
 # Central differences with step h: truncation h^2/6 |f'''| ~ 1e-12 / 6 * 1 m and
 # rounding eps / h * 2 m = 4e-10, so 1e-8 leaves a factor of twenty.

@@ -3,8 +3,8 @@
 import pytest
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from ikns.clustering import BoundingBoxKMeans
-from ikns.nullspace_map import NullSpaceMap
+from ikns.nullspace.clustering import BoundingBoxKMeans
+from ikns.nullspace.map import NullSpaceMap
 
 
 @pytest.fixture(autouse=True)
@@ -14,7 +14,7 @@ def array_api(monkeypatch):
 
 
 # The checks fit a few dozen random samples, about which a map rightly warns.
-@pytest.mark.filterwarnings("ignore::ikns.nullspace_map.MapWarning")
+@pytest.mark.filterwarnings("ignore::ikns.nullspace.map.MapWarning")
 @parametrize_with_checks([BoundingBoxKMeans(), NullSpaceMap()])
 def test_estimators_keep_the_conventions_of_scikit_learn(estimator, check):
     check(estimator)

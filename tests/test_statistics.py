@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.experiments.statistics import (
+from ikns.statistics import (
     cohens_dz,
     effect_sizes,
     equivalence,
@@ -27,7 +27,7 @@ from ikns.experiments.statistics import (
     success_test,
     within_subject_anova,
 )
-from ikns.experiments.statistics.pairs import Pairs
+from ikns.statistics.pairs import Pairs
 
 # Darwin's corn: differences in height of 15 pairs, the example of scipy's `wilcoxon`.
 CORN = np.array([6, 8, 14, 16, 23, 24, 28, 29, 41, -48, 49, 56, 60, -67, 75.0])

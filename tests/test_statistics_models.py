@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from ikns import statistics
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.experiments import statistics
-from ikns.experiments.statistics import (
+from ikns.statistics import (
     analyze_picking,
     analyze_tracking,
     learning_curves,

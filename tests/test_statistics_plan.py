@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from statsmodels.regression.mixed_linear_model import MixedLM
 
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.experiments.statistics import Design, Spread, paper_reexamined
-from ikns.experiments.statistics.assumed_spread import paper_spread, pilot_spread
-from ikns.experiments.statistics.plan import plan_participants
-from ikns.experiments.statistics.printed_spread import spread_range
+from ikns.statistics import Design, Spread, paper_reexamined
+from ikns.statistics.assumed_spread import paper_spread, pilot_spread
+from ikns.statistics.plan import plan_participants
+from ikns.statistics.printed_spread import spread_range
 
 
 def pilot(spread, n, levels, repeats, *, seed=0, common=0.0):

@@ -8,12 +8,7 @@ import pytest
 from scipy import integrate, stats
 
 from ikns.errors import InvalidInput
-from ikns.experiments.statistics import (
-    Design,
-    Spread,
-    sample_size,
-    simulated_power,
-)
+from ikns.statistics import Design, Spread, sample_size, simulated_power
 
 
 def t_power(difference: float, deviation: float, n: int) -> float:

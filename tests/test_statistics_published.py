@@ -8,9 +8,9 @@ import pytest
 from scipy import optimize, special, stats
 from statsmodels.stats.weightstats import ttost_paired
 
-from ikns.experiments.statistics import Finding, paper_reexamined
-from ikns.experiments.statistics.printed import PAPER
-from ikns.experiments.statistics.printed_spread import (
+from ikns.statistics import Finding, paper_reexamined
+from ikns.statistics.printed import PAPER
+from ikns.statistics.printed_spread import (
     difference_range,
     spread_range,
     standard_error,

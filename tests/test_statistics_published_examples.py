@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from ikns.experiments.statistics import (
+from ikns.statistics import (
     Design,
     Spread,
     cohens_dz,

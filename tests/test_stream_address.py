@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ikns.body.marker_set import MarkerSet
 from ikns.errors import IknsError, InvalidInput, MarkerMismatch
-from ikns.files import write_c3d
-from ikns.marker_set import MarkerSet
-from ikns.recording import Recording
-from ikns.stream import open_source
+from ikns.live.stream import open_source
+from ikns.recording.files import write_c3d
+from ikns.recording.recording import Recording
 
 
 @pytest.fixture
@@ -103,7 +103,7 @@ def test_without_its_client_library_the_message_says_what_to_install(
     ):
         open_source("qualisys:host")
     monkeypatch.setitem(sys.modules, "pylsl", None)
-    monkeypatch.setattr("ikns.stream.lsl_library._library", None)
+    monkeypatch.setattr("ikns.live.stream.lsl_library._library", None)
     with pytest.raises(IknsError, match=r"needs pylsl; pip install 'ikns\[lsl\]'"):
         open_source("lsl:name")
 
@@ -122,7 +122,7 @@ def test_a_negative_late_bound_is_no_excuse(folder: Path) -> None:
 
 
 def test_bad_rates_are_refused_before_anything_is_sent() -> None:
-    from ikns.stream import LslOutlet
+    from ikns.live.stream import LslOutlet
 
     for rate in (0.0, -1.0, np.nan):
         with pytest.raises(InvalidInput, match="rate above 0"):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from command_line import check_refused
 
-from ikns.files import read, write_c3d
-from ikns.recording import Recording
-from ikns.stream import open_source
+from ikns.live.stream import open_source
+from ikns.recording.files import read, write_c3d
+from ikns.recording.recording import Recording
 
 
 @pytest.fixture
@@ -77,8 +77,8 @@ def test_a_stream_that_dies_without_a_word_is_noticed_and_found_again(
     walk: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A stopped process, as a cut wire, leaves the connection open and answers nothing.
-    monkeypatch.setattr("ikns.stream.lsl_feed._SILENCE", 0.3)
-    monkeypatch.setattr("ikns.stream.lsl_feed._SIGN_OF_LIFE", 0.5)
+    monkeypatch.setattr("ikns.live.stream.lsl_feed._SILENCE", 0.3)
+    monkeypatch.setattr("ikns.live.stream.lsl_feed._SIGN_OF_LIFE", 0.5)
     with start(str(walk), "--name", name, "--loop") as server:
         with open_source(f"lsl:{name}?scope=machine&timeout=60") as source:
             next(source)

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ikns.errors import InvalidInput
-from ikns.stream import Continuity, Frame
-from ikns.stream.lsl_numbers import Numbers
+from ikns.live.stream import Continuity, Frame
+from ikns.live.stream.lsl_numbers import Numbers
 
 PERIOD = 0.01
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ikns.errors import InvalidInput
-from ikns.stream import Continuity, Faults, Frame, inject
+from ikns.live.stream import Continuity, Faults, Frame, inject
 
 RATE = 100.0
 CHANCE = st.floats(0, 0.2)

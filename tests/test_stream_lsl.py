@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from ikns.errors import StreamError
-from ikns.recording import Recording
-from ikns.stream import (
+from ikns.live.stream import (
     Broadcast,
     Faults,
     Frame,
@@ -26,9 +25,10 @@ from ikns.stream import (
     broadcast,
     open_source,
 )
-from ikns.stream.lsl_feed import ANY_MOCAP
-from ikns.stream.lsl_layout import read_layout
-from ikns.stream.lsl_library import lsl, lsl_settings
+from ikns.live.stream.lsl_feed import ANY_MOCAP
+from ikns.live.stream.lsl_layout import read_layout
+from ikns.live.stream.lsl_library import lsl, lsl_settings
+from ikns.recording.recording import Recording
 
 
 def recording(n: int, rate: float = 200.0) -> Recording:
@@ -296,7 +296,7 @@ def test_uneven_stamps_are_told_and_no_frame_is_called_lost(name: str) -> None:
 def test_a_stream_that_pauses_but_answers_is_kept(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ikns.stream.lsl_feed._SILENCE", 0.1)
+    monkeypatch.setattr("ikns.live.stream.lsl_feed._SILENCE", 0.1)
     there = recording(5)
     with LslOutlet(there.labels, there.rate, name=name) as outlet:
         with opened(name) as source:
@@ -340,8 +340,8 @@ def test_nor_after_lsl_was_started_for_the_network(name: str) -> None:
     # liblsl reads its settings once, so this takes a process of its own.
     code = f"""
 import test_stream_lsl as own
-from ikns.stream import LslOutlet, open_source
-from ikns.stream.lsl_library import lsl
+from ikns.live.stream import LslOutlet, open_source
+from ikns.live.stream.lsl_library import lsl
 lsl("a test", this_machine=False)
 with LslOutlet(["A"], 100.0, name="{name}") as outlet:
     assert outlet.open_ports == []

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikns.files import read, write_c3d
-from ikns.recording import Recording
-from ikns.stream import Source, open_source, replay
-from ikns.stream.replay import Replay
+from ikns.live.stream import Source, open_source, replay
+from ikns.live.stream.replay import Replay
+from ikns.recording.files import read, write_c3d
+from ikns.recording.recording import Recording
 
 
 class Clock:

@@ -10,7 +10,7 @@ import pytest
 import vicon_sdk
 
 from ikns.errors import StreamError
-from ikns.stream import open_source
+from ikns.live.stream import open_source
 
 
 @pytest.fixture

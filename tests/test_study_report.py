@@ -9,8 +9,8 @@ import pytest
 import small_visits as small
 
 from ikns.experiments.study import init_study
-from ikns.experiments.summary import summarize
-from ikns.experiments.summary.numbers import numbers, trials_csv
+from ikns.experiments.study.summary import summarize
+from ikns.experiments.study.summary.numbers import numbers, trials_csv
 from ikns.view.study_report import study_page
 
 VOID = {"meta", "img"}

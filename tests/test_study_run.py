@@ -13,13 +13,13 @@ import pytest
 import tomli_w
 from distributed import LocalCluster
 
+from ikns.calibration.subject import Subject
 from ikns.errors import FileError, InvalidInput, StreamError
 from ikns.experiments.picking.virtual import virtual_pick_step
 from ikns.experiments.study import read_study, run_study, workers
 from ikns.experiments.study.people import study_participant
 from ikns.experiments.tracking import draw_profile, measure, virtual_step
 from ikns.experiments.visits import list_visits, read_visit, tracking_record
-from ikns.subject import Subject
 
 #: Quick people: a coarse clock, one profile, short stays.
 STUDY = {

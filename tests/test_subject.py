@@ -11,8 +11,8 @@ import small_person
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from ikns.calibration.subject import FILES, Subject
 from ikns.errors import FileError, IknsError, InvalidInput
-from ikns.subject import FILES, Subject
 
 
 @pytest.fixture(scope="module")

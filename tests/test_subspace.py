@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import ortho_group
 
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.subspace import (
+from ikns.numerics.subspace import (
     mean_null_direction,
     null_projector,
     null_space,

@@ -17,16 +17,10 @@ from hypothesis.extra import numpy as arrays
 from scipy import stats
 
 from ikns.errors import FileError, InvalidInput
-from ikns.experiments.statistics import (
-    analyze_picking,
-    analyze_tracking,
-    equivalence,
-    pair_trials,
-)
 from ikns.experiments.study import init_study
-from ikns.experiments.summary import RunningError, cells, digest_visit, summarize
-from ikns.experiments.summary.answers import picking_answer, tracking_answer
-from ikns.experiments.summary.numbers import error_csv, numbers, trials_csv
+from ikns.experiments.study.summary import RunningError, cells, digest_visit, summarize
+from ikns.experiments.study.summary.answers import picking_answer, tracking_answer
+from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_csv
 from ikns.experiments.tracking import (
     draw_profile,
     measure,
@@ -37,6 +31,7 @@ from ikns.experiments.tracking import (
 from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import tracking_row
 from ikns.simulation.operator import CONDITIONS, Copyist, Delay, sample_abilities
+from ikns.statistics import analyze_picking, analyze_tracking, equivalence, pair_trials
 
 BOTH = [(c, t) for c in ("ikns", "gamepad") for t in small.TRAJECTORIES]
 

@@ -8,11 +8,11 @@ from example_robot_data import robots_loader
 from scipy.optimize import brentq, minimize
 from scipy.spatial.transform import Rotation
 
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput
-from ikns.motion import chain_joints
-from ikns.nullspace_map import NullSpaceMap
+from ikns.nullspace.map import NullSpaceMap
 from ikns.simulation.arm import Arm, self_motion
-from ikns.skeleton import Robot, Skeleton
 from ikns.symbolic import (
     HeldHand,
     available_control,

@@ -4,11 +4,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ikns.body import SEGMENTS
+from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import MARKER_SD, POSE_SD, size_covariance
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
-from ikns.recording import Recording
-from ikns.scaling import MARKER_SD, POSE_SD, size_covariance
-from ikns.skeleton import Skeleton
+from ikns.recording.recording import Recording
 from ikns.symbolic import fit_lengths, markers_in_world
 from ikns.symbolic.length_program import Frames, LengthProgram
 

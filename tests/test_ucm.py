@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ikns.analysis.ucm import chain_task, delta_vz, numerical_task, variance_split
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.skeleton import Skeleton
-from ikns.ucm import chain_task, delta_vz, numerical_task, variance_split
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-12}
 
@@ -191,7 +191,7 @@ def test_a_skeleton_an_array_and_a_function_give_the_same_split() -> None:
         angles[..., columns] = postures
         return skeleton.hands_in_thorax(angles)[0][..., 0, :]
 
-    from ikns.motion import chain_joints
+    from ikns.body.chains import chain_joints
 
     task_joints = chain_joints("right_arm")
     mean = q.mean(axis=0)

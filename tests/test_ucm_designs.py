@@ -7,20 +7,21 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.calibration import track_chain
-from ikns.errors import InvalidInput, NotEnoughData
-from ikns.files import read
-from ikns.motion import Motion, chain_joints
-from ikns.nullspace_map import still
-from ikns.scaling import scale
-from ikns.skeleton import Skeleton
-from ikns.ucm import (
+from ikns.analysis.ucm import (
     across_trials,
     aligned_angles,
     movement,
     variance_split,
     within_trial,
 )
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Skeleton
+from ikns.calibration import track_chain
+from ikns.calibration.scaling import scale
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import still
+from ikns.recording.files import read
 
 
 def truth() -> tuple[Skeleton, Motion]:

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from ikns.errors import InvalidInput, NotEnoughData
-from ikns.ucm import (
+from ikns.analysis.ucm import (
     VarianceSplit,
     confidence_interval,
     mean_interval,
     surrogate_test,
     variance_split,
 )
+from ikns.errors import InvalidInput, NotEnoughData
 
 SUM = np.ones((1, 3))
 

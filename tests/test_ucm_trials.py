@@ -8,9 +8,9 @@ import small_person
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ikns.analysis.ucm import aligned_angles, movement, normalize_time
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.motion import Motion
-from ikns.ucm import aligned_angles, movement, normalize_time
+from ikns.motion.motion import Motion
 
 TIME = np.arange(200) / 100
 

@@ -14,8 +14,8 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from ikns.body.chains import chain_joints
 from ikns.errors import InvalidInput
-from ikns.motion import chain_joints
 from ikns.view.body import body_surfaces
 from ikns.view.directions import directions_figure, principal_angle_figure
 from ikns.view.render import data_uri, png, svg

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_compare_samples import planted
 
-from ikns.compare import compare_samples, crosstalk
+from ikns.analysis.compare import compare_samples, crosstalk
 from ikns.errors import InvalidInput
 from ikns.view.comparison import comparison_figure
 from ikns.view.render import png, svg

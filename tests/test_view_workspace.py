@@ -6,7 +6,7 @@ Coordinates are only permuted on their way to the artists: 1e-12 relative is rou
 import numpy as np
 from matplotlib.figure import Figure
 
-from ikns.skeleton import Skeleton
+from ikns.body.skeleton import Skeleton
 from ikns.view.body import arm_points, body_surfaces
 from ikns.view.render import png
 from ikns.view.style import point_color

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.control.settings import Settings
 from ikns.errors import InvalidInput
 from ikns.experiments.picking import PickStep, load_objects
 from ikns.experiments.picking.virtual import virtual_pick, virtual_pick_step
+from ikns.live.control.settings import Settings
 from ikns.simulation import Unsteadiness
 from ikns.simulation.grasp import (
     CarriedArm,

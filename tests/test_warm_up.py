@@ -1,4 +1,4 @@
-from ikns.warm_up import compiled_before, warm_up
+from ikns.live.warm_up import compiled_before, warm_up
 
 
 def test_everything_is_compiled_or_loaded_with_progress():

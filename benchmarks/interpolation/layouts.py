@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.stats import qmc
 
-from ikns.clustering import BoundingBox, box_surface_points
+from ikns.nullspace.clustering import BoundingBox, box_surface_points
 
 __all__ = ["GRIDS", "LAYOUTS", "SIZES", "minutes"]
 

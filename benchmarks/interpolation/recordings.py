@@ -11,18 +11,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate, elbow_reference
 from ikns.calibration.sight import track_chain
 from ikns.errors import NotEnoughData
-from ikns.motion import Motion
-from ikns.nullspace_map import NullSpaceMap, null_space_samples, still
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import NullSpaceMap, null_space_samples, still
 from ikns.simulation import Trial, Unsteadiness, simulate_protocol
 from ikns.simulation.exercise import visit
 from ikns.simulation.movement import carry_out
 from ikns.simulation.places import Place
 from ikns.simulation.trial import film, place_in_room
 from ikns.simulation.wander import wander
-from ikns.skeleton import Skeleton
 from interpolation.layouts import box_surface
 from interpolation.truth import CHAIN, Person, Visit, line_angle
 

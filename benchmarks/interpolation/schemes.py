@@ -17,7 +17,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-from ikns.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from interpolation.grassmann import mean_subspace
 
 __all__ = ["CONVEX", "LINEAR", "PAPER", "SCHEMES", "THROUGH", "Known", "Local"]

@@ -16,8 +16,9 @@ import numpy as np
 
 from ikns.calibration import elbow_reference
 from ikns.errors import InvalidInput
-from ikns.interpolation import NaturalNeighborInterpolator
-from ikns.nullspace_map.alignment import align
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.map.alignment import align
+from ikns.numerics.subspace import mean_null_direction, principal_components
 from ikns.simulation import Unsteadiness, VirtualSubject, virtual_subject
 from ikns.simulation.arm import Arm
 from ikns.simulation.movement import Plan, carry_out, explore, reach, reach_samples
@@ -29,7 +30,6 @@ from ikns.simulation.places import (
     explored_places,
 )
 from ikns.simulation.wander import tremor, wander
-from ikns.subspace import mean_null_direction, principal_components
 from interpolation.schemes import Known
 
 __all__ = [

@@ -9,13 +9,19 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from ikns.control.settings import Settings
+from ikns.calibration.subject import FILES, Subject
 from ikns.errors import FileError
 from ikns.finger import Finger, FingerState, Limits
-from ikns.recording import Recording
-from ikns.runtime import replay_run
-from ikns.session import RunWriter, check_session, create_session, open_run, read_run
-from ikns.subject import FILES, Subject
+from ikns.live.control.settings import Settings
+from ikns.live.runtime import replay_run
+from ikns.live.session import (
+    RunWriter,
+    check_session,
+    create_session,
+    open_run,
+    read_run,
+)
+from ikns.recording.recording import Recording
 
 __all__ = [
     "Canary",

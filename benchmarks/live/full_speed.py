@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ikns.finger import SimulatedFinger
-from ikns.runtime import run
-from ikns.stream import Event, Frame, Source
-from ikns.stream.replay import Replay
+from ikns.live.runtime import run
+from ikns.live.stream import Event, Frame, Source
+from ikns.live.stream.replay import Replay
 from live import person
 from live.chain import session_for
 

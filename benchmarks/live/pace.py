@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from ikns.finger import FingerState, SimulatedFinger
-from ikns.recording import Recording
-from ikns.runtime import run
-from ikns.stream import Frame, LslOutlet, Source, open_source
-from ikns.stream.replay import Replay, wait_until
+from ikns.live.runtime import run
+from ikns.live.stream import Frame, LslOutlet, Source, open_source
+from ikns.live.stream.replay import Replay, wait_until
+from ikns.recording.recording import Recording
 from live import person
 from live.chain import session_for
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from ikns.calibration import calibrate
-from ikns.recording import Recording
+from ikns.calibration.subject import Subject
+from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
-from ikns.subject import Subject
 
 __all__ = ["load", "make", "piece", "retimed"]
 

@@ -18,11 +18,11 @@ import numpy as np
 
 from ikns.errors import IknsError
 from ikns.finger import DynamixelFinger, SimulatedFinger
-from ikns.finger.servo import Servo, Wire
-from ikns.runtime import Status, run
-from ikns.session import mend_session, read_run
-from ikns.stream import Source
-from ikns.stream.replay import Replay
+from ikns.finger.emulator import Servo, Wire
+from ikns.live.runtime import Status, run
+from ikns.live.session import mend_session, read_run
+from ikns.live.stream import Source
+from ikns.live.stream.replay import Replay
 from live import person
 from live.chain import Canary, Clock, Watched, session_for, session_holds, violations
 from live.outcome import Outcome
@@ -176,7 +176,7 @@ def kill(
         session = Path(scratch) / "session" if session is None else session
         servo = Servo("xl430")
         with Canary() as canary, Wire(servo) as wire:
-            context.set_forkserver_preload(["ikns.runtime", "ikns.calibration"])
+            context.set_forkserver_preload(["ikns.live.runtime", "ikns.calibration"])
             ours, theirs = context.Pipe()
             child = context.Process(
                 target=_drive, args=(folder, session, wire.port, theirs)

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ikns.finger import SAFE_STATES, DynamixelFinger, FingerError, Safety
-from ikns.finger.servo import Servo, Wire
-from ikns.runtime import run
-from ikns.stream import Frame, Source
-from ikns.stream.replay import Replay
+from ikns.finger.emulator import Servo, Wire
+from ikns.live.runtime import run
+from ikns.live.stream import Frame, Source
+from ikns.live.stream.replay import Replay
 from live import person
 from live.chain import Canary, Watched, session_for, session_holds, violations
 from live.outcome import Outcome
@@ -36,7 +36,7 @@ class ServoFault:
     Parameters
     ----------
     kind : str
-        Of :data:`ikns.finger.servo.FAULTS`.
+        Of :data:`ikns.finger.emulator.FAULTS`.
     seconds : float
         How long it lasts.
     ends : str

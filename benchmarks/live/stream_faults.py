@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from ikns.finger import SAFE_STATES, Safety, SimulatedFinger
-from ikns.runtime import run
-from ikns.stream import Frame, Source
-from ikns.stream.replay import Replay
+from ikns.live.runtime import run
+from ikns.live.stream import Frame, Source
+from ikns.live.stream.replay import Replay
 from live import person
 from live.chain import Clock, Watched, session_for, session_holds, violations
 from live.outcome import Outcome

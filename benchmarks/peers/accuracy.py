@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.marker_ik import LIMIT
-from ikns.skeleton import Skeleton
+from ikns.body.skeleton import Skeleton
+from ikns.motion.marker_ik import LIMIT
 from peers.problem import ACCURACY, Problem, coordinates
 
 __all__ = ["Answer", "OwnCost", "judge", "to_own_minimum"]
@@ -31,7 +31,8 @@ class OwnCost:
     trunk : bool
         Whether the trunk is pulled too.
     limits : bool
-        Whether joint limits are soft walls of stiffness :data:`ikns.marker_ik.LIMIT`.
+        Whether joint limits are soft walls of stiffness
+        :data:`ikns.motion.marker_ik.LIMIT`.
     """
 
     pull: float = 0.0

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ikns.marker_ik import PRIOR
+from ikns.motion.marker_ik import PRIOR
 from peers.problem import ACCURACY, Problem
 from peers.timing import FrameByFrame
 

@@ -8,8 +8,8 @@ import numpy as np
 
 import ikns
 from ikns import MarkerIK
-from ikns._kernels.marker_problem import pack
-from ikns.marker_ik.pose import PRIOR_FROM_SCRATCH
+from ikns._kernels.body.marker_problem import pack
+from ikns.motion.marker_ik.pose import PRIOR_FROM_SCRATCH
 from peers.problem import Problem
 from peers.timing import FrameByFrame
 

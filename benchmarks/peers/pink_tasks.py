@@ -9,7 +9,7 @@ import numpy as np
 import pink
 import pinocchio as pin
 
-from ikns.marker_ik import PRIOR
+from ikns.motion.marker_ik import PRIOR
 from peers.problem import ACCURACY, Problem
 from peers.timing import FrameByFrame
 

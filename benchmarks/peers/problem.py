@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ikns.marker_ik import MarkerIK
-from ikns.recording import Recording
+from ikns.body.skeleton import Skeleton
+from ikns.motion.marker_ik import MarkerIK
+from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
-from ikns.skeleton import Skeleton
 
 __all__ = [
     "ACCURACY",

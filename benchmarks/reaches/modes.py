@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ikns.control import RateControl, carried
-from ikns.motion import Motion, chain_joints
-from ikns.nullspace_map import NullSpaceMap
-from ikns.skeleton import Skeleton
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Skeleton
+from ikns.live.control import RateControl, carried
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import NullSpaceMap
 
 POSITION, SWIVEL = "position mode (paper)", "elbow swivel of the fitted body"
 DEFAULT = "rate, Jacobian, carry, travel"

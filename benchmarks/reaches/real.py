@@ -10,17 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
+from ikns.body.chains import SIDES
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import elbow_reference
-from ikns.clustering import BoundingBoxKMeans
+from ikns.calibration.scaling import scale
 from ikns.errors import InvalidInput
-from ikns.files import read
-from ikns.marker_ik import MarkerIK
-from ikns.motion import SIDES, Motion
-from ikns.nullspace_map import NullSpaceMap
-from ikns.scaling import scale
+from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.motion import Motion
+from ikns.nullspace.clustering import BoundingBoxKMeans
+from ikns.nullspace.map import NullSpaceMap
+from ikns.numerics.subspace import principal_components
+from ikns.recording.files import read
 from ikns.simulation.arm import Arm, self_motion
-from ikns.skeleton import Skeleton
-from ikns.subspace import principal_components
 
 _HALF = np.radians(35.0)
 #: A place where the elbow has less room is left out, rad.

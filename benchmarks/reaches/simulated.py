@@ -9,9 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate, track_chain
+from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
-from ikns.motion import Motion
+from ikns.motion.motion import Motion
 from ikns.simulation import (
     Protocol,
     Unsteadiness,
@@ -29,8 +31,6 @@ from ikns.simulation.movement import (
 from ikns.simulation.places import GIRDLE_FOLLOW, Place, comfortable_posture
 from ikns.simulation.trial import Trial, film, place_in_room
 from ikns.simulation.wander import minimum_jerk
-from ikns.skeleton import Skeleton
-from ikns.subject import Subject
 
 RATE = 50.0
 CHAIN = "right_arm"

@@ -5,23 +5,24 @@ from pathlib import Path
 
 import numpy as np
 
-from ikns.calibration import track_chain
-from ikns.errors import NotEnoughData
-from ikns.files import read
-from ikns.marker_ik import MarkerIK
-from ikns.motion import SIDES, Motion, chain_joints
-from ikns.nullspace_map import still
-from ikns.recording import Recording
-from ikns.scaling import scale
-from ikns.skeleton import Skeleton
-from ikns.subspace import null_projector
-from ikns.ucm import (
+from ikns.analysis.ucm import (
     across_trials,
     confidence_interval,
     movement,
     surrogate_test,
     within_trial,
 )
+from ikns.body.chains import SIDES, chain_joints
+from ikns.body.skeleton import Skeleton
+from ikns.calibration import track_chain
+from ikns.calibration.scaling import scale
+from ikns.errors import NotEnoughData
+from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import still
+from ikns.numerics.subspace import null_projector
+from ikns.recording.files import read
+from ikns.recording.recording import Recording
 
 TASKS = {"F": "reach forward", "A": "reach across", "D": "drink", "C": "comb hair"}
 DEG2 = np.degrees(1.0) ** 2

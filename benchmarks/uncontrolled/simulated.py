@@ -4,17 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ikns.calibration import track_chain
-from ikns.motion import Motion, chain_joints
-from ikns.scaling import scale
-from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
-from ikns.simulation.arm import Arm
-from ikns.simulation.artifacts import SoftTissue
-from ikns.simulation.movement import carry_out, reach
-from ikns.simulation.places import Place, explored_places
-from ikns.simulation.trial import film, place_in_room, true_motion
-from ikns.skeleton import Skeleton
-from ikns.ucm import (
+from ikns.analysis.ucm import (
     VarianceSplit,
     across_trials,
     aligned_angles,
@@ -23,6 +13,17 @@ from ikns.ucm import (
     surrogate_test,
     variance_split,
 )
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Skeleton
+from ikns.calibration import track_chain
+from ikns.calibration.scaling import scale
+from ikns.motion.motion import Motion
+from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
+from ikns.simulation.arm import Arm
+from ikns.simulation.artifacts import SoftTissue
+from ikns.simulation.movement import carry_out, reach
+from ikns.simulation.places import Place, explored_places
+from ikns.simulation.trial import film, place_in_room, true_motion
 
 #: Spread of the elbow and of the hand over trials, rad and m per axis.
 SWIVEL_SD, HAND_SD, WIDE_HAND_SD = np.radians(8.0), 5e-3, 20e-3

@@ -22,7 +22,7 @@ __all__ = ["compiled", "on_disk"]
 
 config: Any = numba.config
 _HERE = Path(__file__).parent
-_IMPORT = re.compile(r"^from ikns\._kernels\.(\w+) import", re.MULTILINE)
+_IMPORT = re.compile(r"^from ikns\._kernels\.([\w.]+) import", re.MULTILINE)
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -31,7 +31,7 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     A function whose name begins with an underscore is called by kernels only and gets
     no way in from Python, which takes a fifth of the time to compile.
     """
-    folder = _cache_folder(function.__module__.rsplit(".", 1)[-1])
+    folder = _cache_folder(function.__module__.removeprefix("ikns._kernels."))
     asked = config.CACHE_DIR
     config.CACHE_DIR = str(folder or "")
     try:
@@ -49,7 +49,7 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def on_disk(module: str) -> bool:
-    """Whether machine code of a kernel file is kept from an earlier time."""
+    """Whether machine code of a kernel file, "body.step" say, is kept on disk."""
     folder = _cache_folder(module)
     return folder is not None and any(folder.rglob("*.nbc"))
 
@@ -61,7 +61,8 @@ def _cache_folder(module: str) -> Path | None:
     open_ends = [module]
     while open_ends:
         name = open_ends.pop()
-        texts[name] = (_HERE / f"{name}.py").read_text(encoding="utf-8")
+        path = _HERE.joinpath(*name.split(".")).with_suffix(".py")
+        texts[name] = path.read_text(encoding="utf-8")
         open_ends += set(_IMPORT.findall(texts[name])) - set(texts)
     sources = "".join(texts[name] for name in sorted(texts)) + numba.__version__
     name = f"{module}-{hashlib.sha256(sources.encode()).hexdigest()[:16]}"

@@ -6,13 +6,12 @@ chain, `report` what is written down.
 
 from ikns.calibration.elbow import elbow_reference
 from ikns.calibration.procedure import calibrate
-from ikns.calibration.sight import (
+from ikns.calibration.sight import marker_fault, track_chain
+from ikns.motion.marker_ik.visibility import (
     in_sight,
-    marker_fault,
     say_apart,
     segment_pairs,
     sight_needs,
-    track_chain,
 )
 
 __all__ = [

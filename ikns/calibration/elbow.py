@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.motion import chain_joints, chain_sides
-from ikns.skeleton import Skeleton
+from ikns.body.chains import chain_joints, chain_sides
+from ikns.body.skeleton import Skeleton
 
 __all__ = ["elbow_reference"]
 

@@ -9,6 +9,9 @@ from typing import Literal
 
 import numpy as np
 
+from ikns.body.chains import chain_joints
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference
 from ikns.calibration.report import (
     exploration_report,
@@ -16,15 +19,12 @@ from ikns.calibration.report import (
     points_report,
     static_report,
 )
+from ikns.calibration.scaling import ScalingReport, scale
 from ikns.calibration.sight import marker_fault, track_chain
+from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData, naming
-from ikns.marker_set import MarkerSet
-from ikns.motion import chain_joints
-from ikns.nullspace_map import MapWarning, NullSpaceMap, still
-from ikns.recording import Recording
-from ikns.scaling import ScalingReport, scale
-from ikns.skeleton import Skeleton
-from ikns.subject import Subject
+from ikns.nullspace.map import MapWarning, NullSpaceMap, still
+from ikns.recording.recording import Recording
 
 __all__ = ["calibrate"]
 
@@ -63,8 +63,8 @@ def calibrate(
     marker_set : str or Path
         What the person wears.
     chain : str
-        Joints of the task, see :data:`ikns.motion.CHAINS`. All others are extrinsic:
-        how much they moved is reported.
+        Joints of the task, see :data:`ikns.body.chains.CHAINS`. All others are
+        extrinsic: how much they moved is reported.
     n_points, n_dof, variance, radius, outside
         Of :class:`NullSpaceMap`; radius in m.
     max_hand_speed : float

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.motion import Motion, chain_joints
-from ikns.nullspace_map import NullSpaceMap
-from ikns.recording import Recording
-from ikns.scaling import ScalingReport
-from ikns.skeleton import Skeleton
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import ScalingReport
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import NullSpaceMap
+from ikns.recording.recording import Recording
 
 __all__ = [
     "exploration_report",

@@ -109,7 +109,7 @@ def calibrate(
     From recordings (--static, --exploration) or live: 5 s standing still, a minute of
     free exploration, then the hand held at ten points while the elbow moves.
     """
-    from ikns.subject import FILES
+    from ikns.calibration.subject import FILES
 
     if side == "both" and clavicle:
         raise InvalidInput("--clavicle goes with --side right or left, not with both.")

@@ -26,7 +26,7 @@ from ikns.cli.simulated import is_simulated
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
-    from ikns.compare import NullSpaceComparison
+    from ikns.analysis.compare import NullSpaceComparison
 
 __all__ = ["compare", "comparison_rows", "comparison_table"]
 
@@ -74,8 +74,8 @@ def compare(
     the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
     line along Z leads the hand; how far the null space bends; and crosstalk.
     """
+    from ikns.analysis.compare import COORDINATES, motion_crosstalk
     from ikns.calibration import track_chain
-    from ikns.compare import COORDINATES, motion_crosstalk
 
     refuse_picture(figure, force=force)
     calibrated = ikns.Subject.load(subject)
@@ -157,7 +157,7 @@ def compare(
 
 def _other(chain: str) -> tuple[str, ...]:
     """Return the same arm with the clavicle, or without where the chain has it."""
-    from ikns.motion import CHAINS
+    from ikns.body.chains import CHAINS
 
     other = (
         chain.removesuffix(_CLAVICLE)
@@ -178,7 +178,7 @@ def _findings(
     options: dict[str, Any],
 ) -> tuple[list[Named], list[str]]:
     """Compare in every combination; tell of other chains that cannot be compared."""
-    from ikns.compare import compare_motion
+    from ikns.analysis.compare import compare_motion
 
     found: list[Named] = []
     untold: list[str] = []
@@ -233,8 +233,8 @@ def comparison_rows(
     """
     import numpy as np
 
-    from ikns.clustering import nearest_center
-    from ikns.nullspace_map import MapWarning
+    from ikns.nullspace.clustering import nearest_center
+    from ikns.nullspace.map import MapWarning
 
     learned, chain = subject.null_space_map, subject.chain
     with naming(source), warnings.catch_warnings(record=True) as caught:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ikns.cli.output import table
 
 if TYPE_CHECKING:
-    from ikns.compare import Crosstalk, NullSpaceComparison
+    from ikns.analysis.compare import Crosstalk, NullSpaceComparison
 
 __all__ = [
     "HELD",

@@ -84,7 +84,7 @@ def write_control(
     """
     import numpy as np
 
-    from ikns.control import RateControl
+    from ikns.live.control import RateControl
 
     learned, chain = subject.null_space_map, subject.chain
     place = motion.place(chain)

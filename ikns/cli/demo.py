@@ -44,8 +44,8 @@ def demo(
     sees.
     """
     from ikns.calibration import track_chain
-    from ikns.cli.demo_report import still_samples, write_demo_report
-    from ikns.subject import FILES
+    from ikns.calibration.subject import FILES
+    from ikns.view.demo_report import still_samples, write_demo_report
     from ikns.view.scene import recording_scene, scene_html
 
     files = (

@@ -16,7 +16,7 @@ import ikns
 from ikns.errors import InvalidInput, NotEnoughData
 
 if TYPE_CHECKING:
-    from ikns.experiments.live_calibration import Change, Key, Status, Step, Verdict
+    from ikns.live.calibration import Change, Key, Status, Step, Verdict
 
 __all__ = ["LiveOptions", "record_live"]
 
@@ -73,7 +73,7 @@ def record_live(
     takes : list of dict
         Every take with its verdict.
     """
-    from ikns.experiments.live_calibration import (
+    from ikns.live.calibration import (
         Judge,
         LiveProtocol,
         RecordingsFolder,
@@ -83,7 +83,7 @@ def record_live(
         paper_steps,
         recall,
     )
-    from ikns.stream import open_source
+    from ikns.live.stream import open_source
 
     steps = paper_steps(
         points=options.points,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import ikns
 
 if TYPE_CHECKING:
-    from ikns.session import RunWriter
+    from ikns.live.session import RunWriter
 
 __all__ = ["live_session", "say", "software", "stopped_by_signals"]
 
@@ -41,8 +41,8 @@ def live_session(
     resume: bool,
 ) -> Iterator[RunWriter]:
     """Open the next run of a session; with `resume`, of one that is there already."""
-    from ikns.session import create_session, mend_session, open_run
-    from ikns.subject import FILES
+    from ikns.calibration.subject import FILES
+    from ikns.live.session import create_session, mend_session, open_run
 
     if resume:
         for sentence in mend_session(folder):

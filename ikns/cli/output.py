@@ -138,7 +138,7 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
                 tasks[step] = display.add_task(step)
             display.update(tasks[step], completed=done, total=total)
 
-        from ikns.warm_up import compiled_before, warm_up
+        from ikns.live.warm_up import compiled_before, warm_up
 
         if not compiled_before():
             warm_up(report)

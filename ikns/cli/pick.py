@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ikns.cli.options import AsJson
+from ikns.cli.visit import chosen, conduct, names, whose
 from ikns.cli.visit_drivers import Arm, Screens
 from ikns.cli.visit_options import (
     Browser,
@@ -25,7 +26,6 @@ from ikns.cli.visit_options import (
     View,
     VisitFolder,
 )
-from ikns.cli.visit_run import chosen, conduct, names, whose
 from ikns.errors import InvalidInput
 
 __all__ = ["pick"]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from ikns.errors import InvalidInput, NotEnoughData, naming
 
 if TYPE_CHECKING:
-    from ikns.experiments.statistics.assumed_spread import AssumedSpread
     from ikns.experiments.study import Study
+    from ikns.statistics.assumed_spread import AssumedSpread
 
 __all__ = ["Assumed", "Planned", "assume", "planned"]
 
@@ -135,8 +135,8 @@ def assume(
     report: Any,
 ) -> Assumed:
     """Find the spread: given, of a pilot, or of the paper."""
-    from ikns.experiments.statistics.assumed_spread import AssumedSpread, paper_spread
-    from ikns.experiments.statistics.power import Design, Spread
+    from ikns.statistics.assumed_spread import AssumedSpread, paper_spread
+    from ikns.statistics.power import Design, Spread
 
     if any(part is not None for part in given):
         if pilot is not None:
@@ -153,8 +153,8 @@ def _of_pilot(pilot: Path, design: Planned, report: Any) -> Assumed:
     """Measure the trials of a pilot again, from its visits."""
     import numpy as np
 
-    from ikns.experiments.statistics.assumed_spread import pilot_spread
-    from ikns.experiments.summary import summarize
+    from ikns.experiments.study.summary import summarize
+    from ikns.statistics.assumed_spread import pilot_spread
 
     summary = summarize(pilot, progress=report)
     groups = [g for g in summary.groups if getattr(g, design.experiment) is not None]

@@ -25,8 +25,8 @@ def replay(
     as_json: AsJson = False,
 ) -> None:
     """Compute c and the commands of a session again, and compare them bit for bit."""
-    from ikns.runtime import replay_run
-    from ikns.session import check_session, export_run, read_run
+    from ikns.live.runtime import replay_run
+    from ikns.live.session import check_session, export_run, read_run
 
     recorded = read_run(session, run)
     found = check_session(session)

@@ -66,8 +66,8 @@ def robot(
     """
     import numpy as np
 
-    from ikns.compare import compare_robot
-    from ikns.nullspace_map.checks import MapWarning
+    from ikns.analysis.compare import compare_robot
+    from ikns.nullspace.map.checks import MapWarning
 
     refuse_picture(figure, force=force)
     arm = ikns.Robot.load(urdf, frame)

@@ -21,7 +21,7 @@ from ikns.cli.simulated import is_simulated
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.runtime import Report, Status
+    from ikns.live.runtime import Report, Status
 
 __all__ = ["run"]
 
@@ -78,11 +78,11 @@ def run(
 
     Research software, not a medical device.
     """
-    from ikns.control.settings import Settings
     from ikns.finger import Safety, open_finger
-    from ikns.runtime import check_realtime
-    from ikns.runtime import run as drive
-    from ikns.stream import open_source
+    from ikns.live.control.settings import Settings
+    from ikns.live.runtime import check_realtime
+    from ikns.live.runtime import run as drive
+    from ikns.live.stream import open_source
 
     if duration is not None and not 0 < duration < math.inf:
         raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")

@@ -62,7 +62,7 @@ def servo(
     """
     import math
 
-    from ikns.finger.servo import FAULTS, Servo, Wire, parse_fault
+    from ikns.finger.emulator import FAULTS, Servo, Wire, parse_fault
 
     if duration is not None and not 0 <= duration < math.inf:
         raise InvalidInput(f"the duration must be a number of seconds, not {duration}.")

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import ikns
 from ikns.cli.options import AsJson, RecordingFile
 from ikns.cli.output import show, table
+
+if TYPE_CHECKING:
+    from ikns.live.stream import LslOutlet
 
 __all__ = ["stream"]
 
@@ -45,7 +48,7 @@ def stream(
 ) -> None:
     """Serve a recording as a live LSL MoCap stream, on this machine only."""
     from ikns.errors import InvalidInput, StreamError
-    from ikns.stream import Faults, LslOutlet, broadcast
+    from ikns.live.stream import Faults, LslOutlet, broadcast
 
     faults = Faults.parse(fault)
     if not 0 < speed < float("inf"):
@@ -95,7 +98,7 @@ def stream(
     )
 
 
-def _heard(outlet: ikns.stream.LslOutlet, wait: float) -> bool:
+def _heard(outlet: LslOutlet, wait: float) -> bool:
     """Wait in steps, so that Ctrl-C is heard."""
     import time
 

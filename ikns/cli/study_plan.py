@@ -17,9 +17,9 @@ from ikns.cli.plan_inputs import Assumed, Planned, assume, planned
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.experiments.statistics.assumed_spread import AssumedSpread
-    from ikns.experiments.statistics.plan import Plan
-    from ikns.experiments.statistics.power import Power
+    from ikns.statistics.assumed_spread import AssumedSpread
+    from ikns.statistics.plan import Plan
+    from ikns.statistics.power import Power
 
 __all__ = ["plan"]
 
@@ -100,7 +100,7 @@ def plan(
     one will be, one mean per participant. The spread is the paper's, a pilot's, or
     given; it is named with its source, for everything depends on it.
     """
-    from ikns.experiments.statistics.plan import plan_participants
+    from ikns.statistics.plan import plan_participants
 
     refuse_picture(figure, force=force)
     design = planned(

@@ -38,8 +38,8 @@ def report(
     Everything is computed again from the recorded attempts. People and simulated
     participants are never mixed; the page says which is which.
     """
-    from ikns.experiments.summary import summarize
-    from ikns.experiments.summary.numbers import numbers
+    from ikns.experiments.study.summary import summarize
+    from ikns.experiments.study.summary.numbers import numbers
     from ikns.view.study_report import report_files, write_study_report
 
     place = study / "report" if out is None else out

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from ikns.cli.options import AsJson
+from ikns.cli.visit import chosen, conduct, names, whose
 from ikns.cli.visit_drivers import Arm, Screens
 from ikns.cli.visit_options import (
     Browser,
@@ -26,7 +27,6 @@ from ikns.cli.visit_options import (
     View,
     VisitFolder,
 )
-from ikns.cli.visit_run import chosen, conduct, names, whose
 from ikns.errors import InvalidInput
 
 __all__ = ["track"]

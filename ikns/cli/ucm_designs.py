@@ -11,7 +11,7 @@ from ikns.cli.output import table
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
-    from ikns.ucm import Interval, SurrogateTest, VarianceSplit
+    from ikns.analysis.ucm import Interval, SurrogateTest, VarianceSplit
 
 __all__ = ["Found", "over_points", "over_time"]
 
@@ -53,7 +53,12 @@ def over_time(
     """Split the variance over repetitions, at each normalized time."""
     import numpy as np
 
-    from ikns.ucm import across_trials, confidence_interval, movement, surrogate_test
+    from ikns.analysis.ucm import (
+        across_trials,
+        confidence_interval,
+        movement,
+        surrogate_test,
+    )
 
     chain = subject.chain
     durations = []
@@ -116,9 +121,9 @@ def over_points(
     """Split the variance over the still samples at each PCA point."""
     import numpy as np
 
-    from ikns.clustering import nearest_center
-    from ikns.nullspace_map import still
-    from ikns.ucm import confidence_interval, surrogate_test, within_trial
+    from ikns.analysis.ucm import confidence_interval, surrogate_test, within_trial
+    from ikns.nullspace.clustering import nearest_center
+    from ikns.nullspace.map import still
 
     (motion,), (source,) = motions, sources
     chain, learned = subject.chain, subject.null_space_map

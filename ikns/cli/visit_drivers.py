@@ -17,9 +17,9 @@ from ikns.errors import InvalidInput
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Driver
     from ikns.finger import Finger
-    from ikns.runtime import Status
-    from ikns.session import RunWriter
-    from ikns.stream import Source
+    from ikns.live.runtime import Status
+    from ikns.live.session import RunWriter
+    from ikns.live.stream import Source
 
 __all__ = [
     "PAGE",
@@ -100,7 +100,7 @@ def arm_subject(arm: Arm) -> ikns.Subject:
     InvalidInput
         Without a subject or a source, or when the system does not allow real time.
     """
-    from ikns.runtime import check_realtime
+    from ikns.live.runtime import check_realtime
 
     for name, value in (("--subject", arm.subject), ("--source", arm.source)):
         if value is None:
@@ -125,7 +125,7 @@ def arm_is_simulated(subject: ikns.Subject, arm: Arm) -> bool:
 
 def open_arm_source(arm: Arm, subject: ikns.Subject) -> AbstractContextManager[Source]:
     """Connect to where markers come from; all that the subject has must be there."""
-    from ikns.stream import open_source
+    from ikns.live.stream import open_source
 
     assert arm.source is not None
     return open_source(arm.source, needs=subject.skeleton.marker_set)
@@ -139,8 +139,8 @@ def arm_driver(
     shown: Sequence[Callable[[Status], None]],
 ) -> AbstractContextManager[Driver]:
     """Make the live loop drive, with a session of its own; every status is shown."""
-    from ikns.control.settings import Settings
     from ikns.experiments.conduct.live import live_driver
+    from ikns.live.control.settings import Settings
 
     settings = Settings(hold_speed=arm.hold_speed)
 

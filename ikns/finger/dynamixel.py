@@ -13,9 +13,9 @@ from ikns.finger.bus import Bus
 from ikns.finger.drive import Drive
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard, Safety
-from ikns.finger.leaving import forget, relax_at_exit
 from ikns.finger.models import model_named
 from ikns.finger.plan import Plan
+from ikns.finger.relax_at_exit import forget, relax_at_exit
 from ikns.finger.state import FingerState
 
 __all__ = ["DynamixelFinger"]
@@ -57,7 +57,7 @@ class DynamixelFinger:
 
     Examples
     --------
-    >>> from ikns.finger.servo import Servo, Wire  # a simulated servo
+    >>> from ikns.finger.emulator import Servo, Wire  # a simulated servo
     >>> import time
     >>> with Wire(Servo("xl430")) as wire, DynamixelFinger(wire.port) as finger:
     ...     for _ in range(100):

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from typing import Self
 
 from ikns.errors import InvalidInput
-from ikns.finger.chain import flexion_at, joint_angles, opening
 from ikns.finger.errors import FingerError
+from ikns.finger.geometry import flexion_at, joint_angles, opening
 from ikns.finger.guard import Guard, Safety
-from ikns.finger.leaving import forget, relax_at_exit
+from ikns.finger.relax_at_exit import forget, relax_at_exit
 from ikns.finger.state import FingerState
 
 __all__ = ["FOLLOW", "SPEED", "SPIN", "YIELD", "SimulatedFinger"]
@@ -30,7 +30,7 @@ _RESTING = 0.01
 class SimulatedFinger:
     """A simulated tendon-driven finger, deterministic for a given clock.
 
-    Six modules bend alike (:mod:`ikns.finger.chain`); the motor is of second order,
+    Six modules bend alike (:mod:`ikns.finger.geometry`); the motor is of second order,
     with limited speed and effort; an object stops the closing finger, and the current
     rises. Temperature and voltage are not simulated. Time passes for it whenever it is
     called.

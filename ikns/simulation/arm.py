@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg.lapack import dposv
 
+from ikns.body.chains import SIDES, chain_joints
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.motion import SIDES, chain_joints
-from ikns.skeleton import Skeleton
-from ikns.subspace import null_space
+from ikns.numerics.subspace import null_space
 
 __all__ = ["Arm", "SelfMotion", "self_motion"]
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.body.chains import SIDES, chain_joints
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.motion import SIDES, chain_joints
 from ikns.simulation.wander import wander
-from ikns.skeleton import Skeleton
 
 __all__ = ["SoftTissue", "occlusions"]
 

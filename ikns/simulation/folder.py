@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ikns.body.chains import SIDES
 from ikns.errors import FileError
-from ikns.files import write_c3d
-from ikns.motion import SIDES
+from ikns.recording.files import write_c3d
 from ikns.simulation.protocol import Protocol
 from ikns.simulation.trial import Trial
 

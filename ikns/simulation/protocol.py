@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.motion import SIDES
+from ikns.body.chains import SIDES
+from ikns.body.skeleton import Skeleton
 from ikns.simulation.arm import Arm
 from ikns.simulation.artifacts import SoftTissue
 from ikns.simulation.exercise import roam, visit
@@ -21,7 +22,6 @@ from ikns.simulation.places import GIRDLE_FOLLOW, box_points, explored_places
 from ikns.simulation.subject import VirtualSubject
 from ikns.simulation.trial import Trial, film, place_in_room
 from ikns.simulation.wander import wander
-from ikns.skeleton import Skeleton
 
 __all__ = ["Protocol", "simulate_protocol"]
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput
 from ikns.simulation.wander import wander
-from ikns.skeleton import Robot
 
 __all__ = ["explore_null_space", "reach_pose"]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ikns.anthropometry import Adult, sample_adults, segments
-from ikns.body import SEGMENTS
-from ikns.skeleton import Skeleton
+from ikns.body.anthropometry import Adult, sample_adults, segments
+from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton import Skeleton
 
 __all__ = ["VirtualSubject", "virtual_subject"]
 

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ikns.motion import SIDES, Motion
-from ikns.recording import Recording
+from ikns.body.chains import SIDES
+from ikns.body.skeleton import Skeleton
+from ikns.motion.motion import Motion
+from ikns.recording.recording import Recording
 from ikns.simulation.arm import Arm
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.wander import wander
-from ikns.skeleton import Skeleton
 
 __all__ = ["Trial", "film", "place_in_room", "true_motion"]
 

@@ -9,10 +9,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns._kernels.tree import Tree
+from ikns._kernels.body.tree import Tree
+from ikns.body.chains import chain_joints, chain_sides
+from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput
-from ikns.motion import chain_joints, chain_sides
-from ikns.skeleton import Robot, Skeleton
 from ikns.symbolic.kinematics import (
     End,
     Pose,
@@ -118,7 +118,7 @@ def chain_of(
     ----------
     body : Skeleton or Robot
     chain : str, optional
-        Of a skeleton, see :data:`ikns.motion.CHAINS`.
+        Of a skeleton, see :data:`ikns.body.chains.CHAINS`.
     hands_move : bool
         Whether a skeleton's hands turn, so that they too can touch the body.
     pairs : sequence of (Capsule, Capsule), optional

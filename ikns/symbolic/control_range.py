@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from ikns.errors import InvalidInput
-from ikns.nullspace_map import NullSpaceMap
+from ikns.nullspace.map import NullSpaceMap
 from ikns.symbolic.held_hand import HeldHand
 from ikns.symbolic.posture import start_of
 from ikns.symbolic.results import AvailableRange

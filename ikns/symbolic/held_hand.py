@@ -22,13 +22,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput
-from ikns.skeleton import Robot, Skeleton
 from ikns.symbolic.chain import Pair, chain_of, held
+from ikns.symbolic.path_following import STRIDE, Function, Walk, come_back, walk
 from ikns.symbolic.posture import Start, binding, start_of
 from ikns.symbolic.programs import NODES, Climber, Sweeper
 from ikns.symbolic.results import AvailableRange, Sweep
-from ikns.symbolic.walk import STRIDE, Function, Walk, come_back, walk
 
 __all__ = ["HeldHand", "available_range", "longest_sweep"]
 
@@ -49,7 +49,7 @@ class HeldHand:
     ----------
     body : Skeleton or Robot
     chain : str, optional
-        Of a skeleton, see :data:`ikns.motion.CHAINS`.
+        Of a skeleton, see :data:`ikns.body.chains.CHAINS`.
     task : {"pose", "position"}
         What the hand keeps.
     pairs : sequence of (Capsule, Capsule), optional

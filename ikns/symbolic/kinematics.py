@@ -1,7 +1,7 @@
 """Forward kinematics and Jacobians as CasADi expressions, from the joint tree.
 
-The same joints as the compiled kernels follow (:mod:`ikns._kernels.tree`), so what an
-optimizer differentiates is the body that everything else moves.
+The same joints as the compiled kernels follow (:mod:`ikns._kernels.body.tree`), so what
+an optimizer differentiates is the body that everything else moves.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns._kernels.tree import FREE_FLYER, PRISMATIC, Tree
-from ikns.body import SEGMENTS
+from ikns._kernels.body.tree import FREE_FLYER, PRISMATIC, Tree
+from ikns.body.chains import chain_joints, chain_sides
+from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton import Skeleton
+from ikns.body.skeleton.markers import part_along
 from ikns.errors import InvalidInput
-from ikns.motion import chain_joints, chain_sides
-from ikns.skeleton import Skeleton
-from ikns.skeleton.markers import part_along
 
 __all__ = [
     "chain_jacobian",
@@ -49,7 +49,8 @@ def joint_frames(
     Parameters
     ----------
     tree : Tree
-        From :attr:`ikns.skeleton.Skeleton.tree` or :attr:`ikns.skeleton.Robot.tree`.
+        From :attr:`ikns.body.skeleton.Skeleton.tree` or
+        :attr:`ikns.body.skeleton.Robot.tree`.
     q : (nq,) expression
         Configuration; see :func:`root_at_origin`.
     growth : mapping, optional
@@ -132,7 +133,7 @@ def chain_jacobian(
     ----------
     skeleton : Skeleton
     chain, task : str
-        As :meth:`ikns.skeleton.Skeleton.chain_jacobian` takes them, whose rows and
+        As :meth:`ikns.body.skeleton.Skeleton.chain_jacobian` takes them, whose rows and
         columns these are.
     """
     if task not in ("pose", "position"):
@@ -159,10 +160,11 @@ def markers_in_world(skeleton: Skeleton) -> ca.Function:
     """Return the function from a configuration, sizes and offsets to markers.
 
     From q (25,), the logarithms of size factors (9,) in the order of
-    :data:`ikns.body.SEGMENTS` and offsets (M, 3) m in the links' frames to positions
-    (M, 3) m in the world. With zeros it is
-    :meth:`ikns.skeleton.Skeleton.markers_in_world`, with others that of the skeleton
-    :meth:`~ikns.skeleton.Skeleton.resized` by the factors and then offset.
+    :data:`ikns.body.model_file.SEGMENTS` and offsets (M, 3) m in the links' frames to
+    positions (M, 3) m in the world. With zeros it is
+    :meth:`ikns.body.skeleton.Skeleton.markers_in_world`, with others that of the
+    skeleton :meth:`~ikns.body.skeleton.Skeleton.resized` by the factors and then
+    offset.
     """
     q = ca.SX.sym("q", 7 + len(skeleton.joint_names))
     sizes = ca.SX.sym("log_sizes", len(SEGMENTS))

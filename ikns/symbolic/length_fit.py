@@ -4,7 +4,7 @@ A static trial says where markers are, and lengths follow as far as they were pu
 right places. Frames in which joints turn say where the joints are, wherever the markers
 sit. Minimized, over log sizes s, marker offsets o and the posture of every frame, is
 
-    the cost of :func:`ikns.scaling.scale`                      static trial, priors
+    the cost of :func:`ikns.calibration.scaling.scale`          static trial, priors
     + sum over F frames and markers |p_m(q_k, s, o) - seen|^2 / marker_sd^2 * N / F
 
 Skin moves with the posture, so errors recur from frame to frame: N says how many frames
@@ -25,19 +25,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.body import SEGMENTS, relative_sizes
-from ikns.errors import InvalidInput, NotEnoughData
-from ikns.marker_ik import MarkerIK
-from ikns.marker_set import MarkerSet
-from ikns.recording import Recording
-from ikns.scaling import (
+from ikns.body.marker_set import MarkerSet
+from ikns.body.model_file import SEGMENTS, relative_sizes
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import (
     MARKER_SD,
     POSE_SD,
     ScalingReport,
     scale,
     static_posture,
 )
-from ikns.skeleton import Skeleton
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.motion.marker_ik import MarkerIK
+from ikns.recording.recording import Recording
 from ikns.symbolic.length_program import Frames, LengthProgram, Solution
 
 __all__ = ["LengthFit", "fit_lengths"]
@@ -63,7 +63,7 @@ class LengthFit:
         Joint-to-joint length of each segment and its standard deviation under the
         assumptions of the fit, m.
     static_lengths, static_length_sd : dict
-        The same from :func:`ikns.scaling.scale`.
+        The same from :func:`ikns.calibration.scaling.scale`.
     marker_sd : float
         Error of a marker of weight 1 in the moving frames, m per axis: given, or as
         measured.
@@ -107,7 +107,7 @@ def fit_lengths(
     Parameters
     ----------
     generic, static, marker_set, min_duration
-        As :func:`ikns.scaling.scale` takes them.
+        As :func:`ikns.calibration.scaling.scale` takes them.
     recordings : sequence of Recording
         The exploration. Taken are frames far apart in joint angles, among those that
         show most markers.

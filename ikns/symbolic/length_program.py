@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from ikns.body import SEGMENTS
-from ikns.scaling import size_covariance
-from ikns.skeleton import Skeleton
+from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import size_covariance
 from ikns.symbolic.kinematics import sized_markers
 
 __all__ = ["Frames", "LengthProgram", "Solution"]

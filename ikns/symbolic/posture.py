@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns._kernels.tree import PRISMATIC
+from ikns._kernels.body.tree import PRISMATIC
 from ikns.errors import InvalidInput
 from ikns.symbolic.chain import Chain, Held
 

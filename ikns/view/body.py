@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
+from ikns.body.chains import SIDES
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.motion import SIDES
-from ikns.skeleton import Skeleton
 
 __all__ = ["arm_points", "body_surfaces"]
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ikns.compare import Crosstalk, NullSpaceComparison
+from ikns.analysis.compare import Crosstalk, NullSpaceComparison
 from ikns.errors import InvalidInput
 from ikns.view.style import (
     BLUE,

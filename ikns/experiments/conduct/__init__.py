@@ -6,13 +6,13 @@ signal comes from, `live` and `ring` those with a finger; `carry` ties them to t
 clock. There is no screen here.
 """
 
-from ikns.experiments.conduct.book import VisitBook
-from ikns.experiments.conduct.carry import carry_out
 from ikns.experiments.conduct.conductor import Conductor
-from ikns.experiments.conduct.desk import COMMANDS, Command, Desk
+from ikns.experiments.conduct.experiment import COMMANDS, Command, Desk
 from ikns.experiments.conduct.inputs import Driver, HeldInput, Sample, VirtualInput
 from ikns.experiments.conduct.picking import PickingDesk
 from ikns.experiments.conduct.tracking import TrackingDesk
+from ikns.experiments.conduct.visit_log import VisitBook
+from ikns.experiments.conduct.visit_loop import carry_out
 
 __all__ = [
     "COMMANDS",

@@ -14,9 +14,9 @@ from threading import Event
 from typing import Any
 
 from ikns.errors import InvalidInput
-from ikns.experiments.conduct.book import VisitBook
-from ikns.experiments.conduct.desk import COMMANDS, Command, Desk
+from ikns.experiments.conduct.experiment import COMMANDS, Command, Desk
 from ikns.experiments.conduct.screen import listed, planned, prompt, step_facts
+from ikns.experiments.conduct.visit_log import VisitBook
 
 __all__ = ["Conductor"]
 

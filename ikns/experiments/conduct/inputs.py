@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from ikns.experiments.tracking.profiles import Profile
+from ikns.live.stream.delays import Delays
 from ikns.simulation.operator import Delay, Operator
-from ikns.stream.delays import Delays
 
 __all__ = ["Driver", "HeldInput", "Sample", "Samples", "VirtualInput"]
 

@@ -9,15 +9,15 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Any
 
-from ikns.control.controller import Decision
-from ikns.control.settings import Settings
+from ikns.calibration.subject import Subject
 from ikns.errors import IknsError
 from ikns.experiments.conduct.inputs import Sample, Samples
 from ikns.finger import Finger
-from ikns.runtime import Report, Status, run
-from ikns.session import RunWriter
-from ikns.stream import Source
-from ikns.subject import Subject
+from ikns.live.control.controller import Decision
+from ikns.live.control.settings import Settings
+from ikns.live.runtime import Report, Status, run
+from ikns.live.session import RunWriter
+from ikns.live.stream import Source
 
 __all__ = ["LiveDriver", "live_driver"]
 
@@ -202,7 +202,7 @@ def live_driver(
     on_status : callable, optional
         Called from the loop some 30 times a second, so it must not wait.
     realtime : bool
-        See :func:`ikns.runtime.run`.
+        See :func:`ikns.live.runtime.run`.
     """
     with ExitStack() as stack:
         source = stack.enter_context(open_source())

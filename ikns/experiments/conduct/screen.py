@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ikns.experiments.conduct.desk import Desk
+from ikns.experiments.conduct.experiment import Desk
 
 __all__ = ["listed", "planned", "prompt", "step_facts"]
 

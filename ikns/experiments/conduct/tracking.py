@@ -10,7 +10,7 @@ import numpy as np
 
 from ikns.errors import NotEnoughData
 from ikns.experiments.tracking import Attempt, Profile, Step, Visit, measure
-from ikns.experiments.tracking.machine import ALIGN, View
+from ikns.experiments.tracking.trial import ALIGN, View
 from ikns.experiments.visits import tracking_row
 
 __all__ = ["TrackingDesk"]

@@ -1,8 +1,8 @@
 """Experiment 2: pick an object and place it, with the finger. No screen, no clock."""
 
-from ikns.experiments.picking.machine import PickMachine, PickRecord, PickView
 from ikns.experiments.picking.objects import OBJECT_IDS, PickObject, load_objects
 from ikns.experiments.picking.schedule import LIMIT, PickStep, pick_schedule
+from ikns.experiments.picking.trial import PickMachine, PickRecord, PickView
 from ikns.experiments.picking.visit import PickAttempt, PickVisit
 
 __all__ = [

@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.control.settings import Settings
+from ikns.body.chains import chain_joints
 from ikns.errors import InvalidInput
 from ikns.experiments.picking.objects import PickObject, load_objects
 from ikns.experiments.picking.schedule import PickStep
-from ikns.motion import chain_joints
+from ikns.live.control.settings import Settings
 from ikns.simulation.grasp import (
     CarriedArm,
     Elbow,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
-from ikns.experiments.picking.machine import PickMachine, PickRecord
 from ikns.experiments.picking.schedule import PickStep
+from ikns.experiments.picking.trial import PickMachine, PickRecord
 from ikns.experiments.progress import Progress
 
 __all__ = ["PickAttempt", "PickVisit"]

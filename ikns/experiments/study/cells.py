@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ikns.calibration.subject import Subject
 from ikns.errors import IknsError, InvalidInput
 from ikns.experiments.picking.schedule import PickStep
 from ikns.experiments.study.declaration import Study
@@ -25,7 +26,6 @@ from ikns.experiments.tracking.virtual import virtual_step
 from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import table_bytes, tracking_row
 from ikns.simulation.operator import Participant
-from ikns.subject import Subject
 
 __all__ = ["Cell", "Task", "simulate", "visit_name"]
 
@@ -166,7 +166,7 @@ def _attempts(
 def _tracking(
     person: Participant, design: TrackingDesign, seed: int, parameters: Parameters
 ) -> Iterator[dict[str, Any]]:
-    from ikns.control.settings import Settings
+    from ikns.live.control.settings import Settings
 
     settings = Settings() if parameters.smoothing else None
     trials = _trials(design.steps(person.number, seed=seed))

@@ -11,9 +11,9 @@ from ikns.errors import InvalidInput
 from ikns.experiments.picking.objects import OBJECT_IDS
 from ikns.experiments.picking.schedule import LIMIT, PickStep, pick_schedule
 from ikns.experiments.study.tables import choice, positive
-from ikns.experiments.tracking.machine import ALIGN
 from ikns.experiments.tracking.profiles import CHARACTERS, draw_profile
 from ikns.experiments.tracking.schedule import Step, schedule
+from ikns.experiments.tracking.trial import ALIGN
 
 __all__ = ["LAYOUTS", "Parameters", "PickingDesign", "TrackingDesign"]
 

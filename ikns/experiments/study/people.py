@@ -7,16 +7,16 @@ import dataclasses
 
 import numpy as np
 
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
+from ikns.calibration.subject import Subject
 from ikns.experiments.study.design import Parameters
-from ikns.interpolation import NaturalNeighborInterpolator
-from ikns.nullspace_map import NullSpaceMap
-from ikns.nullspace_map.between import NearestPoint
-from ikns.recording import Recording
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.map.interpolator import NearestPoint
+from ikns.recording.recording import Recording
 from ikns.simulation.operator import Participant, draw_participant
 from ikns.simulation.protocol import Protocol
-from ikns.skeleton import Skeleton
-from ikns.subject import Subject
 
 __all__ = ["recalibrated", "study_participant"]
 

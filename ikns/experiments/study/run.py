@@ -13,7 +13,7 @@ from ikns.experiments.study.declaration import FILE, read_study
 from ikns.experiments.study.results import alone, check_declared, keep_declared, tasks
 from ikns.experiments.study.workers import compute, processes
 from ikns.experiments.visits import write_visit
-from ikns.warm_up import compiled_before, warm_up
+from ikns.live.warm_up import compiled_before, warm_up
 
 __all__ = ["StudyRun", "run_study"]
 

@@ -1,6 +1,5 @@
 """Experiment 1: a pointer driven by c follows a curve. No screen, no clock."""
 
-from ikns.experiments.tracking.machine import TrackingRecord, TrialMachine, View
 from ikns.experiments.tracking.metrics import (
     Metrics,
     error_over_time,
@@ -11,6 +10,7 @@ from ikns.experiments.tracking.metrics import (
 )
 from ikns.experiments.tracking.profiles import CHARACTERS, Profile, draw_profile
 from ikns.experiments.tracking.schedule import Step, schedule, williams
+from ikns.experiments.tracking.trial import TrackingRecord, TrialMachine, View
 from ikns.experiments.tracking.virtual import virtual_step, virtual_trial
 from ikns.experiments.tracking.visit import Attempt, Visit
 

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.experiments.tracking.machine import TrackingRecord
 from ikns.experiments.tracking.profiles import Profile
+from ikns.experiments.tracking.trial import TrackingRecord
 
 __all__ = [
     "Metrics",

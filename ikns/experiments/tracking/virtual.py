@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ikns.errors import InvalidInput
-from ikns.experiments.tracking.machine import ALIGN, TrackingRecord, TrialMachine
 from ikns.experiments.tracking.profiles import Profile
 from ikns.experiments.tracking.schedule import Step
+from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrialMachine
 from ikns.simulation.operator import CONDITIONS, Delay, Operator, Participant, track
 from ikns.simulation.operator.loop import Driven, Steering
 

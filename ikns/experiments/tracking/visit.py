@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
 from ikns.experiments.progress import Progress
-from ikns.experiments.tracking.machine import ALIGN, TrackingRecord, TrialMachine
 from ikns.experiments.tracking.profiles import draw_profile
 from ikns.experiments.tracking.schedule import Step
+from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrialMachine
 
 __all__ = ["Attempt", "Visit"]
 

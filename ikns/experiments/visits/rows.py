@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ikns.errors import InvalidInput
-from ikns.experiments.tracking.machine import TrackingRecord
 from ikns.experiments.tracking.profiles import draw_profile
 from ikns.experiments.tracking.schedule import Step
+from ikns.experiments.tracking.trial import TrackingRecord
 from ikns.experiments.tracking.visit import Attempt
 
 __all__ = [

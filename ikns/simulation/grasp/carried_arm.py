@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ikns._kernels.tree import place_joints
-from ikns.control.controller import Controller
-from ikns.control.frame import FrameSolver
-from ikns.control.settings import Settings
+from ikns._kernels.body.tree import place_joints
 from ikns.errors import InvalidInput
+from ikns.live.control.controller import Controller
+from ikns.live.control.frame import FrameSolver
+from ikns.live.control.settings import Settings
 from ikns.simulation.artifacts import occlusions
 from ikns.simulation.grasp.route import Route
 from ikns.simulation.movement import Unsteadiness

@@ -9,7 +9,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Literal
 
-from ikns.body import urdf_folder
+from ikns.body.model_file import urdf_folder
 from ikns.errors import InvalidInput
 
 __all__ = ["Module", "Solid", "constant", "finger_parts", "hand_size"]

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any
 
 from ikns.errors import InvalidInput
-from ikns.finger.chain import WIDEST
+from ikns.finger.geometry import WIDEST
 from ikns.finger.simulated import YIELD
 from ikns.simulation.grasp.parts import Solid, constant, finger_parts, hand_size
 

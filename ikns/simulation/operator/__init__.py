@@ -13,7 +13,7 @@ from ikns.simulation.operator.cohort import (
     draw_participant,
     tracking_place,
 )
-from ikns.simulation.operator.copyist import Copyist
+from ikns.simulation.operator.delayed_copy import Copyist
 from ikns.simulation.operator.loop import Delay, Tracked, track
 from ikns.simulation.operator.model import Operator, closed_loop, open_loop
 

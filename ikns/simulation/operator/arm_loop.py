@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from ikns._kernels.tree import place_joints
-from ikns.control.controller import Controller
-from ikns.control.frame import ControlFrame, FrameSolver
-from ikns.control.settings import Settings
+from ikns._kernels.body.tree import place_joints
+from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
+from ikns.live.control.controller import Controller
+from ikns.live.control.frame import ControlFrame, FrameSolver
+from ikns.live.control.settings import Settings
 from ikns.simulation.arm import Arm
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.movement import Unsteadiness
@@ -24,7 +25,6 @@ from ikns.simulation.operator.loop import Delay
 from ikns.simulation.places import Place
 from ikns.simulation.trial import place_in_room
 from ikns.simulation.wander import tremor, wander
-from ikns.subject import Subject
 
 __all__ = ["ArmLoop"]
 

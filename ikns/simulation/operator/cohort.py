@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
+from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.simulation.arm import Arm, girdle, self_motion
 from ikns.simulation.operator.ability import CONDITIONS, Ability, sample_abilities
@@ -16,8 +18,6 @@ from ikns.simulation.operator.arm_loop import ArmLoop
 from ikns.simulation.places import GIRDLE_FOLLOW, Place, comfortable_posture
 from ikns.simulation.protocol import Protocol, simulate_protocol
 from ikns.simulation.subject import virtual_subject
-from ikns.skeleton import Skeleton
-from ikns.subject import Subject
 
 __all__ = ["Participant", "draw_participant", "tracking_place"]
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.motion import chain_sides
-from ikns.skeleton import Skeleton
+from ikns.body.chains import chain_sides
+from ikns.body.skeleton import Skeleton
 from ikns.view.scene.commands import (
     ROOT,
     Command,

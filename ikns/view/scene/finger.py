@@ -14,9 +14,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.body import segment_lengths, urdf_folder
-from ikns.finger.chain import WIDEST, joint_angles
-from ikns.skeleton import Skeleton
+from ikns.body.model_file import segment_lengths, urdf_folder
+from ikns.body.skeleton import Skeleton
+from ikns.finger.geometry import WIDEST, joint_angles
 from ikns.view.scene.commands import (
     ROOT,
     Command,

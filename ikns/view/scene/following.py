@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from ikns.motion import chain_sides
-from ikns.subject import Subject
+from ikns.body.chains import chain_sides
+from ikns.calibration.subject import Subject
 from ikns.view.scene.finger import with_finger
 from ikns.view.scene.live import LiveView
 from ikns.view.scene.map_scene import map_scene
 
 if TYPE_CHECKING:
-    from ikns.runtime import Status
+    from ikns.live.runtime import Status
 
 __all__ = ["body_view"]
 

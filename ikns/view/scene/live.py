@@ -16,8 +16,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, InvalidInput
-from ikns.skeleton import Skeleton
 from ikns.view.scene.body import drawn_links, pose_commands
 from ikns.view.scene.commands import ROOT
 from ikns.view.scene.finger import flexion_commands
@@ -55,7 +55,7 @@ class LiveView:
 
     Examples
     --------
-    >>> from ikns.nullspace_map import NullSpaceMap
+    >>> from ikns.nullspace.map import NullSpaceMap
     >>> from ikns.view.scene.map_scene import map_scene
     >>> body = Skeleton.load()
     >>> corners = 0.3 + 0.1 * np.array(list(np.ndindex(2, 2, 2)), dtype=float)

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
+from ikns.body.chains import chain_sides
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.motion import chain_sides
-from ikns.nullspace_map import NullSpaceMap
-from ikns.skeleton import Skeleton
+from ikns.nullspace.map import NullSpaceMap
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, property_command, root_commands
 from ikns.view.scene.places import point_commands, volume_commands

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ikns.skeleton import Skeleton
+from ikns.body.skeleton import Skeleton
 from ikns.view.scene.body import drawn_links
 from ikns.view.scene.commands import ROOT, Command
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from ikns.motion import SIDES, chain_joints, chain_sides
-from ikns.nullspace_map import NullSpaceMap
-from ikns.skeleton import Skeleton
-from ikns.subspace import null_projector
+from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.skeleton import Skeleton
+from ikns.nullspace.map import NullSpaceMap
+from ikns.numerics.subspace import null_projector
 
 __all__ = ["posture_at_point", "postures_along", "self_motion", "visited_posture"]
 

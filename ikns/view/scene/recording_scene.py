@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.body.chains import SIDES, chain_sides
+from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.motion import SIDES, Motion, chain_sides
-from ikns.nullspace_map import NullSpaceMap
-from ikns.recording import Recording
-from ikns.skeleton import Skeleton
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import NullSpaceMap
+from ikns.recording.recording import Recording
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, object_command, root_commands
 from ikns.view.scene.map_scene import (

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.motion import SIDES, chain_sides
-from ikns.nullspace_map import NullSpaceMap
-from ikns.skeleton import Skeleton
+from ikns.body.chains import SIDES, chain_sides
+from ikns.body.skeleton import Skeleton
+from ikns.nullspace.map import NullSpaceMap
 from ikns.view.scene.commands import Command
 
 __all__ = ["FIELD_OF_VIEW", "Layer", "Scene", "camera_and_target"]

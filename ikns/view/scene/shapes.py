@@ -47,7 +47,7 @@ def visual_shapes(urdf: str) -> list[Shape]:
 
     Examples
     --------
-    >>> from ikns.skeleton import Skeleton
+    >>> from ikns.body.skeleton import Skeleton
     >>> shapes = visual_shapes(Skeleton.load().urdf)
     >>> [shape.geometry["type"] for shape in shapes if shape.link == "right_upper_arm"]
     ['CylinderGeometry', 'SphereGeometry']

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.motion import SIDES, chain_joints, chain_sides
-from ikns.nullspace_map import NullSpaceMap
-from ikns.skeleton import Skeleton
+from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.skeleton import Skeleton
+from ikns.nullspace.map import NullSpaceMap
 from ikns.view.scene.body import arm_links, ghost_commands
 from ikns.view.scene.commands import ROOT, Command
 from ikns.view.scene.places import trail_commands

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ikns.experiments.statistics import Effect, Equivalence
+from ikns.statistics import Effect, Equivalence
 from ikns.view.study_report.drawing import study_figure
 from ikns.view.style import BLUE, GREEN, GREY, INK, PALE, house_style
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.calibration.subject import Subject
 from ikns.errors import IknsError
-from ikns.experiments.summary import Group
-from ikns.session import read_run
-from ikns.subject import Subject
+from ikns.experiments.study.summary import Group
+from ikns.live.session import read_run
 from ikns.view.body import arm_points
 from ikns.view.parts import Section
+from ikns.view.study_report.texts import NO_MAP
 from ikns.view.study_report.tracking_sections import Drawn
-from ikns.view.study_report.words import NO_MAP
 from ikns.view.workspace import workspace_figure
 
 __all__ = ["map_drawn", "map_section"]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 
-from ikns.experiments.statistics import paper_reexamined
-from ikns.experiments.summary import (
+from ikns.experiments.study.summary import (
     Group,
     PickingSummary,
     StudySummary,
     TrackingSummary,
     Varied,
 )
-from ikns.experiments.summary.answers import people
-from ikns.experiments.summary.methods import methods, setting_text
+from ikns.experiments.study.summary.answers import people
+from ikns.experiments.study.summary.methods import methods, setting_text
+from ikns.statistics import paper_reexamined
 from ikns.view.parts import Cell, Section, Table
 
 __all__ = [

@@ -7,10 +7,14 @@ from html import escape
 from importlib.resources import files
 from typing import NamedTuple
 
-from ikns.experiments.summary import Group, StudySummary
-from ikns.experiments.summary.answers import people, picking_answer, tracking_answer
+from ikns.experiments.study.summary import Group, StudySummary
+from ikns.experiments.study.summary.answers import (
+    people,
+    picking_answer,
+    tracking_answer,
+)
 from ikns.view.parts import Cell, Page, Section, Step, facts_html, inline, steps_html
-from ikns.view.study_report.words import BANNER, CANNOT
+from ikns.view.study_report.texts import BANNER, CANNOT
 
 __all__ = ["Part", "study_html"]
 

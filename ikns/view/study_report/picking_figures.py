@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from ikns.experiments.summary import PickingSummary
+from ikns.experiments.study.summary import PickingSummary
 from ikns.view.study_report.drawing import (
     looks,
     outside_legend,

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 
 from ikns.experiments.picking import load_objects
-from ikns.experiments.summary import ObjectCell, PickComparison, PickingSummary
-from ikns.experiments.summary.answers import people, worded
+from ikns.experiments.study.summary import ObjectCell, PickComparison, PickingSummary
+from ikns.experiments.study.summary.answers import people, worded
 from ikns.view.parts import Cell, Picture, Section, Table
 from ikns.view.study_report.effect_figure import effect_figure
 from ikns.view.study_report.picking_figures import picking_figure

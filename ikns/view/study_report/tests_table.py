@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ikns.experiments.statistics import Effect
+from ikns.statistics import Effect
 from ikns.view.parts import Cell, Table
 
 __all__ = ["effects_table", "tests_table"]
@@ -18,7 +18,7 @@ def tests_table(paper: Sequence[Any], beside: Sequence[tuple[str, Any]]) -> Tabl
     Parameters
     ----------
     paper : sequence of result or None
-        Of :mod:`ikns.experiments.statistics`, with a ``sentence()``.
+        Of :mod:`ikns.statistics`, with a ``sentence()``.
     beside : sequence of (name, result or None)
     """
     rows: list[list[Cell]] = [

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from ikns.experiments.statistics.printed import PAPER
-from ikns.experiments.statistics.wording import p_text
-from ikns.experiments.summary import Comparison, TrackingSummary
-from ikns.experiments.summary.answers import people, worded
-from ikns.experiments.summary.tracking import UNITS
+from ikns.experiments.study.summary import Comparison, TrackingSummary
+from ikns.experiments.study.summary.answers import people, worded
+from ikns.experiments.study.summary.tracking import UNITS
+from ikns.statistics.printed import PAPER
+from ikns.statistics.wording import p_text
 from ikns.view.parts import Cell, Picture, Section, Table
 from ikns.view.study_report.effect_figure import effect_figure
 from ikns.view.study_report.learning_figure import learning_figure

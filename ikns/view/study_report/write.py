@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ikns.experiments.summary import Group, StudySummary
-from ikns.experiments.summary.numbers import error_csv, numbers, trials_csv
+from ikns.experiments.study.summary import Group, StudySummary
+from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_csv
 from ikns.view.parts import Section, Step
 from ikns.view.render import pdf, svg
 from ikns.view.study_report.map_section import map_drawn, map_section

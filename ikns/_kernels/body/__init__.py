@@ -1,0 +1,1 @@
+"""Compiled kernels of the body: kinematics, marker inverse kinematics, frames."""

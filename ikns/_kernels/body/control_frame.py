@@ -1,0 +1,253 @@
+"""One frame of control in one call: markers to joint angles to hand to signal.
+
+    c_k = sum_i w_i (Z_ik . q - m_ik) / sum_i w_i (M_ik - m_ik)
+
+with the natural-neighbor weights w of the place of the hand (of the midpoint of both,
+for a chain of two arms), the directions Z and ranges m to M of the points
+(T. Lisini Baldi et al., arXiv 2012.03600, section II).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ikns._kernels.body.marker_errors import marker_errors
+from ikns._kernels.body.marker_ik import solve_frame
+from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
+from ikns._kernels.body.paths import Paths, place_frames
+from ikns._kernels.body.tree import Floats, Indices
+from ikns._kernels.compiled import compiled
+from ikns._kernels.voronoi.diagram import NOT_FINITE, OUTSIDE_HULL
+from ikns._kernels.voronoi.query import natural_weights
+
+__all__ = ["ControlMap", "control_frame"]
+
+
+class ControlMap(NamedTuple):
+    """P points for d signals of n joints, seen by M markers on L links.
+
+    Parameters
+    ----------
+    points : (P, 3) array
+        m; where there are no natural neighbors the nearest of these has all the weight.
+    numbers, indices : arrays
+        A packed interpolator; `indices` is empty where there is none.
+    directions : (P, d, n) array
+    lower, upper : (P, d) array
+        rad.
+    columns : (n,) integer array
+        The chain's joints among the angles.
+    hands : (1,) or (2,) integer array
+        The chain's hands, of right and left.
+    link : (M,) integer array
+        Link that a marker shows, or -1.
+    need : (L,) integer array
+        Markers of a link that must be seen.
+    pair : (N, 2) integer array
+        Markers of the same link, two and two.
+    apart : (N,) array
+        How far apart they are on the link, m.
+    """
+
+    points: Floats
+    numbers: Floats
+    indices: Indices
+    directions: Floats
+    lower: Floats
+    upper: Floats
+    columns: Indices
+    hands: Indices
+    link: Indices
+    need: Indices
+    pair: Indices
+    apart: Floats
+
+
+@compiled
+def control_frame(
+    whole: Indices,
+    real: Floats,
+    paths: Paths,
+    control_map: ControlMap,
+    markers: Floats,
+    from_scratch: bool,
+    q: Floats,
+    work: Floats,
+    cavity_work: Floats,
+    rotation: Floats,
+    position: Floats,
+    weights: Floats,
+    place: Floats,
+    c: Floats,
+) -> tuple[float, float, float, int, bool, bool, int]:
+    """Solve a frame.
+
+    Parameters
+    ----------
+    whole, real : arrays
+        As in :func:`ikns._kernels.body.marker_ik.solve_frames`.
+    paths : Paths
+        To both hands.
+    control_map : ControlMap
+    markers : (M, 3) array
+        In the world, m; NaN where not seen.
+    from_scratch : bool
+        Whether `q` is no place to start from.
+    q : (nq,) array
+        The pose before; overwritten by the solution.
+    work, cavity_work, rotation (1, 2, 3, 3), weights (P,) : arrays
+        Scratch.
+    position : (1, 2, 3) array
+        Right and left hand in the thorax frame, m, written.
+    place : (3,) array
+        Where the task happens, written, m.
+    c : (d,) array
+        The signals, written, not clipped; NaN while the chain is not in sight.
+
+    Returns
+    -------
+    residual : float
+        As from marker inverse kinematics.
+    worst : float
+        Largest distance of a marker of the chain's links, m; NaN without any.
+    intermarker : float
+        Largest difference of a distance between two markers of a link from what it is
+        on that link, m; 0 where no two are seen.
+    iterations : int
+    converged : bool
+        As from marker inverse kinematics.
+    known : bool
+        Whether the chain is in sight.
+    status : int
+        Where the hand is, as :func:`ikns._kernels.voronoi.query.natural_weights`
+        says it.
+    """
+    problem = unpack(whole, real)
+    s = cut(problem, work)
+    residual, iterations, converged = solve_frame(
+        problem, s, markers, q, from_scratch, q
+    )
+    worst = _worst_residual(problem, s, control_map.link, q)
+    intermarker = _intermarker_error(markers, control_map.pair, control_map.apart)
+    known = _in_sight(markers, control_map.link, control_map.need)
+    n_angles = len(q) - 7
+    place_frames(paths, q[7:].reshape(1, n_angles), rotation, position)
+    hands = control_map.hands
+    for k in range(3):
+        place[k] = 0.0
+        for h in range(len(hands)):
+            place[k] += position[0, hands[h], k]
+        place[k] /= len(hands)
+    for k in range(len(c)):
+        c[k] = np.nan
+    if not known:
+        return residual, worst, intermarker, iterations, converged, known, NOT_FINITE
+    if len(control_map.indices):
+        status = natural_weights(
+            control_map.numbers, control_map.indices, place, cavity_work, weights
+        )
+    else:
+        status = _nearest_weights(control_map.points, place, weights)
+    _signals(
+        weights,
+        control_map.directions,
+        control_map.lower,
+        control_map.upper,
+        control_map.columns,
+        q[7:],
+        c,
+    )
+    return residual, worst, intermarker, iterations, converged, known, status
+
+
+@compiled
+def _worst_residual(
+    problem: MarkerProblem, s: Scratch, link: Indices, q: Floats
+) -> float:
+    """Compare the markers taken last with a pose, which they need not have led to."""
+    marker_errors(
+        problem.tree,
+        problem.marker_joint,
+        problem.marker_position,
+        s.weight,
+        s.target,
+        q,
+        s.origin,
+        s.rotation,
+        s.translation,
+        s.x,
+        s.error,
+    )
+    largest = -1.0
+    for m in range(len(link)):
+        if link[m] >= 0 and s.weight[m] > 0:
+            square = 0.0
+            for k in range(3):
+                square += s.error[m, k] ** 2
+            largest = max(largest, square)
+    return np.sqrt(largest) if largest >= 0 else np.nan
+
+
+@compiled
+def _intermarker_error(markers: Floats, pair: Indices, apart: Floats) -> float:
+    largest = 0.0
+    for i in range(len(pair)):
+        square = total = 0.0
+        for k in range(3):
+            first, second = markers[pair[i, 0], k], markers[pair[i, 1], k]
+            total += abs(first) + abs(second)
+            square += (first - second) ** 2
+        if np.isfinite(total):
+            largest = max(largest, abs(np.sqrt(square) - apart[i]))
+    return largest
+
+
+@compiled
+def _in_sight(markers: Floats, link: Indices, need: Indices) -> bool:
+    for i in range(len(need)):
+        seen = 0
+        for m in range(len(link)):
+            total = markers[m, 0] + markers[m, 1] + markers[m, 2]
+            if link[m] == i and np.isfinite(total):
+                seen += 1
+        if seen < need[i]:
+            return False
+    return True
+
+
+@compiled
+def _nearest_weights(points: Floats, place: Floats, weights: Floats) -> int:
+    nearest, least = 0, np.inf
+    for i in range(len(points)):
+        square = 0.0
+        for k in range(3):
+            square += (points[i, k] - place[k]) ** 2
+        weights[i] = 0.0
+        if square < least:
+            nearest, least = i, square
+    weights[nearest] = 1.0
+    return OUTSIDE_HULL
+
+
+@compiled
+def _signals(
+    weights: Floats,
+    directions: Floats,
+    lower: Floats,
+    upper: Floats,
+    columns: Indices,
+    angles: Floats,
+    c: Floats,
+) -> None:
+    for k in range(len(c)):
+        above = width = 0.0
+        for i in range(len(weights)):
+            local = -lower[i, k]
+            for j in range(len(columns)):
+                local += directions[i, k, j] * angles[columns[j]]
+            above += weights[i] * local
+            width += weights[i] * (upper[i, k] - lower[i, k])
+        if width > 0:
+            c[k] = above / width

@@ -1,0 +1,129 @@
+"""The cost of marker inverse kinematics, term by term, and the slope of each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ikns._kernels.body.step import displacement
+from ikns._kernels.body.tree import Floats, Indices, Tree, place_joints
+from ikns._kernels.compiled import compiled
+
+__all__ = ["add_penalties", "marker_errors", "penalties", "take_markers"]
+
+
+@compiled
+def take_markers(
+    given: Floats, seen: Floats, weight: Floats, target: Floats
+) -> tuple[int, bool]:
+    """Take over the markers that are seen, which are finite.
+
+    Returns how many, and whether one is infinite.
+    """
+    n_seen, infinite = 0, False
+    for m in range(len(seen)):
+        total = 0.0
+        for k in range(3):
+            target[m, k] = seen[m, k]
+            total += seen[m, k] - seen[m, k]
+            infinite = infinite or np.isinf(seen[m, k])
+        # Zero where all three are finite, NaN otherwise.
+        weight[m] = given[m] if total == 0 else 0.0
+        if weight[m] > 0:
+            n_seen += 1
+    return n_seen, infinite
+
+
+@compiled
+def marker_errors(
+    tree: Tree,
+    joint: Indices,
+    position: Floats,
+    weight: Floats,
+    target: Floats,
+    q: Floats,
+    origin: Floats,
+    rotation: Floats,
+    translation: Floats,
+    x: Floats,
+    error: Floats,
+) -> tuple[float, float]:
+    """Place joints and markers, seen from the first joint, and compare.
+
+    Returns the sum of squared errors, weighted and not.
+    """
+    place_joints(tree, q, rotation, translation)
+    for k in range(3):
+        origin[k] = translation[0, k]
+    for j in range(len(translation)):
+        for k in range(3):
+            translation[j, k] -= origin[k]
+    weighted = plain = 0.0
+    for m in range(len(weight)):
+        if weight[m] > 0:
+            j, square = joint[m], 0.0
+            for k in range(3):
+                x[m, k] = (
+                    translation[j, k]
+                    + rotation[j, k, 0] * position[m, 0]
+                    + rotation[j, k, 1] * position[m, 1]
+                    + rotation[j, k, 2] * position[m, 2]
+                )
+                error[m, k] = x[m, k] - (target[m, k] - origin[k])
+                square += error[m, k] ** 2
+            plain += square
+            weighted += weight[m] * square
+    return weighted, plain
+
+
+@compiled
+def penalties(
+    tree: Tree,
+    angle: Indices,
+    lower: Floats,
+    upper: Floats,
+    start: Floats,
+    pull: float,
+    limit: float,
+    q: Floats,
+    moved: Floats,
+    beyond: Floats,
+) -> float:
+    """Cost of being off the start and beyond limits; how far, both (n,)."""
+    displacement(tree, start, q, moved)
+    cost = 0.0
+    for i in range(len(moved)):
+        over = 0.0
+        if angle[i] >= 0:
+            over = max(q[angle[i]] - upper[i], 0.0) + min(q[angle[i]] - lower[i], 0.0)
+        beyond[i] = over
+        cost += (pull * moved[i]) ** 2 + (limit * over) ** 2
+    return cost
+
+
+@compiled
+def add_penalties(
+    path: Indices,
+    depth: Indices,
+    free: Floats,
+    pull: float,
+    limit: float,
+    moved: Floats,
+    beyond: Floats,
+    gradient: Floats,
+    hessian: Floats,
+    curvature: Floats,
+) -> None:
+    """Add the penalties' part to gradient and Hessian, and leave held joints out."""
+    for d in range(len(depth)):
+        last = depth[d]
+        gradient[d] += pull**2 * moved[d] + limit**2 * beyond[d]
+        gradient[d] *= free[d]
+        hessian[d, last] += pull**2
+        if beyond[d] != 0:
+            hessian[d, last] += limit**2
+        for a in range(last + 1):
+            both = free[d] * free[path[d, a]]
+            hessian[d, a] *= both
+            curvature[d, a] *= both
+        if free[d] == 0:
+            hessian[d, last] = 1.0

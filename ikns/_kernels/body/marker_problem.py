@@ -1,0 +1,258 @@
+"""What marker inverse kinematics needs to know, and the memory that it works in.
+
+Handing an array from Python to a kernel takes a quarter of a microsecond, so a problem
+travels as one array of integers and one of reals and is cut up inside.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ikns._kernels.body.normal_equations import MOMENTS
+from ikns._kernels.body.tree import Floats, Indices, Tree
+from ikns._kernels.compiled import compiled
+
+__all__ = ["MarkerProblem", "Scratch", "cut", "pack", "scratch_size", "unpack"]
+
+
+class MarkerProblem(NamedTuple):
+    """What stays the same from frame to frame: n rates, M markers, S starts.
+
+    Parameters
+    ----------
+    tree : Tree
+    marker_joint : (M,) integer array
+        Joint of the tree that carries the marker.
+    marker_position : (M, 3) array
+        Place in that joint's frame, m.
+    marker_weight : (M,) array
+        Zero for markers that do not count.
+    path : (n, D) integer array
+    depth : (n,) integer array
+        What carries each degree of freedom, from the root to itself, and how many
+        there are; see :mod:`ikns._kernels.body.tree_cholesky`.
+    free : (n,) array
+        1 for degrees of freedom to solve for, 0 for those that are held.
+    angle : (n,) integer array
+        Where in q the angle is that `lower` and `upper` limit, or -1.
+    lower, upper : (n,) array
+        Joint limits, rad or m.
+    starts : (S, nq) array
+        Configurations to start from when nothing is known.
+    marker_branch, q_branch : (M,), (nq,) integer arrays
+        Limb that a marker is on and a number of q belongs to, from 0 to
+        ``n_branches - 1``, or -1; each limb's best start counts.
+    n_branches : int
+    max_iterations : int
+    pull, pull_from_scratch, limit : float
+        Weights of the terms of the cost, m/rad.
+    tolerance : float
+        A frame has converged when the next step moves no joint more, rad and m.
+    lost : float
+        Residual above which a frame is also tried from scratch, m.
+    """
+
+    tree: Tree
+    marker_joint: Indices
+    marker_position: Floats
+    marker_weight: Floats
+    path: Indices
+    depth: Indices
+    free: Floats
+    angle: Indices
+    lower: Floats
+    upper: Floats
+    starts: Floats
+    marker_branch: Indices
+    q_branch: Indices
+    n_branches: int
+    max_iterations: int
+    pull: float
+    pull_from_scratch: float
+    limit: float
+    tolerance: float
+    lost: float
+
+
+class Scratch(NamedTuple):
+    """Memory to work in."""
+
+    origin: Floats
+    rotation: Floats
+    translation: Floats
+    axes: Floats
+    weight: Floats
+    target: Floats
+    x: Floats
+    error: Floats
+    moments: Floats
+    forces: Floats
+    gradient: Floats
+    hessian: Floats
+    curvature: Floats
+    factored: Floats
+    step: Floats
+    moved: Floats
+    beyond: Floats
+    start: Floats
+    q: Floats
+    trial: Floats
+    solved: Floats
+    residuals: Floats
+    N: Floats
+    V: Floats
+
+
+def pack(problem: MarkerProblem) -> tuple[Indices, Floats]:
+    """Lay a problem out as integers and reals, in the order of `unpack`."""
+    p, tree = problem, problem.tree
+    J, n, M = len(tree.kind), len(p.free), len(p.marker_joint)
+    S, nq = p.starts.shape
+    header = [J, n, M, S, nq, p.path.shape[1], p.n_branches, p.max_iterations]
+    whole = [
+        np.array(header),
+        tree.kind,
+        tree.parent,
+        tree.first_q,
+        tree.first_v,
+        tree.dof_parent,
+        p.path,
+        p.depth,
+        p.angle,
+        p.marker_joint,
+        p.marker_branch,
+        p.q_branch,
+    ]
+    settings = [p.pull, p.pull_from_scratch, p.limit, p.tolerance, p.lost]
+    real = [
+        np.array(settings),
+        tree.rotation,
+        tree.translation,
+        p.marker_position,
+        p.marker_weight,
+        p.free,
+        p.lower,
+        p.upper,
+        p.starts,
+    ]
+    return (
+        np.concatenate([np.ravel(part) for part in whole]).astype(np.int64),
+        np.concatenate([np.ravel(part) for part in real]).astype(np.float64),
+    )
+
+
+@compiled
+def unpack(whole: Indices, real: Floats) -> MarkerProblem:
+    """Cut a packed problem up."""
+    J, n, M, S, nq, D = whole[0], whole[1], whole[2], whole[3], whole[4], whole[5]
+    i = 8
+    tree_at, i = i, i + 4 * J + n
+    path_at, i = i, i + n * D
+    depth_at, i = i, i + n
+    angle_at, i = i, i + n
+    marker_at, i = i, i + 2 * M
+    branch_at = i
+    r = 5
+    rotation_at, r = r, r + 9 * J
+    translation_at, r = r, r + 3 * J
+    position_at, r = r, r + 3 * M
+    weight_at, r = r, r + M
+    dof_at, r = r, r + 3 * n
+    starts_at = r
+    tree = Tree(
+        whole[tree_at : tree_at + J],
+        whole[tree_at + J : tree_at + 2 * J],
+        whole[tree_at + 2 * J : tree_at + 3 * J],
+        whole[tree_at + 3 * J : tree_at + 4 * J],
+        real[rotation_at : rotation_at + 9 * J].reshape(J, 3, 3),
+        _table(real, translation_at, J, 3),
+        whole[tree_at + 4 * J : tree_at + 4 * J + n],
+    )
+    return MarkerProblem(
+        tree,
+        whole[marker_at : marker_at + M],
+        _table(real, position_at, M, 3),
+        real[weight_at : weight_at + M],
+        whole[path_at : path_at + n * D].reshape(n, D),
+        whole[depth_at : depth_at + n],
+        real[dof_at : dof_at + n],
+        whole[angle_at : angle_at + n],
+        real[dof_at + n : dof_at + 2 * n],
+        real[dof_at + 2 * n : dof_at + 3 * n],
+        _table(real, starts_at, S, nq),
+        whole[marker_at + M : marker_at + 2 * M],
+        whole[branch_at : branch_at + nq],
+        whole[6],
+        whole[7],
+        real[0],
+        real[1],
+        real[2],
+        real[3],
+        real[4],
+    )
+
+
+def scratch_size(problem: MarkerProblem) -> int:
+    """Reals that a frame needs to work in, in the order of `cut`."""
+    J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
+    S, nq = problem.starts.shape
+    D = problem.path.shape[1]
+    return (
+        35
+        + J * (12 + MOMENTS)
+        + n * (19 + 3 * D)
+        + 10 * M
+        + nq * (3 + S)
+        + S * (1 + problem.n_branches)
+    )
+
+
+@compiled
+def cut(problem: MarkerProblem, work: Floats) -> Scratch:
+    """Cut up memory of :func:`scratch_size` reals."""
+    J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
+    S, nq = problem.starts.shape
+    D = problem.path.shape[1]
+    a = 35
+    b = a + J * 12
+    c = b + J * MOMENTS
+    d = c + n * 6
+    e = d + n * 9
+    f = e + n * 4
+    g = f + n * 3 * D
+    h = g + M * 10
+    k = h + nq * 3
+    m = k + nq * S
+    return Scratch(
+        work[0:3],
+        work[a : a + 9 * J].reshape(J, 3, 3),
+        _table(work, a + 9 * J, J, 3),
+        _table(work, c, n, 6),
+        work[g : g + M],
+        _table(work, g + M, M, 3),
+        _table(work, g + 4 * M, M, 3),
+        _table(work, g + 7 * M, M, 3),
+        _table(work, b, J, MOMENTS),
+        _table(work, d, n, 9),
+        work[e : e + n],
+        _table(work, f, n, D),
+        _table(work, f + n * D, n, D),
+        _table(work, f + 2 * n * D, n, D),
+        work[e + n : e + 2 * n],
+        work[e + 2 * n : e + 3 * n],
+        work[e + 3 * n : e + 4 * n],
+        work[h : h + nq],
+        work[h + nq : h + 2 * nq],
+        work[h + 2 * nq : h + 3 * nq],
+        _table(work, k, S, nq),
+        _table(work, m, S, 1 + problem.n_branches),
+        _table(work, 3, 4, 4),
+        _table(work, 19, 4, 4),
+    )
+
+
+@compiled
+def _table(flat: Floats, at: int, rows: int, columns: int) -> Floats:
+    return flat[at : at + rows * columns].reshape(rows, columns)

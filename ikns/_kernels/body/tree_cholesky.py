@@ -1,0 +1,62 @@
+"""Cholesky factors that keep the zeros of a branched tree.
+
+In the normal equations of a tree of joints two degrees of freedom meet only where one
+carries the other. Factored as H = L' L from the leaves to the root, no other entry
+fills in (Featherstone 2005, Efficient Factorization of the Joint-Space Inertia Matrix
+for Branched Kinematic Trees, Int. J. Robotics Research 24: 487).
+
+A row holds what carries its degree of freedom in the order from the root: entry a of
+row k stands for column ``path[k, a]``, and ``path[k, depth[k]]`` is k itself. What
+carries ``path[k, a]`` is then the first part of the same row, so rows are added up
+entry by entry.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ikns._kernels.body.tree import Floats, Indices
+from ikns._kernels.compiled import compiled
+
+__all__ = ["factor", "solve"]
+
+
+@compiled
+def factor(H: Floats, path: Indices, depth: Indices) -> bool:
+    """Turn H into L in place; False when H is not positive definite.
+
+    Parameters
+    ----------
+    H : (n, D) array
+        Rows as described above.
+    path : (n, D) integer array
+    depth : (n,) integer array
+    """
+    for k in range(len(depth) - 1, -1, -1):
+        last = depth[k]
+        # A NaN is not greater than zero either.
+        if not H[k, last] > 0:
+            return False
+        pivot = np.sqrt(H[k, last])
+        H[k, last] = pivot
+        for a in range(last):
+            H[k, a] /= pivot
+        for a in range(last):
+            i, scale = path[k, a], H[k, a]
+            for b in range(a + 1):
+                H[i, b] -= scale * H[k, b]
+    return True
+
+
+@compiled
+def solve(L: Floats, path: Indices, depth: Indices, x: Floats) -> None:
+    """Solve L' L x = b in place, (n,)."""
+    for i in range(len(depth) - 1, -1, -1):
+        x[i] /= L[i, depth[i]]
+        for a in range(depth[i]):
+            x[path[i, a]] -= L[i, a] * x[i]
+    for i in range(len(depth)):
+        total = x[i]
+        for a in range(depth[i]):
+            total -= L[i, a] * x[path[i, a]]
+        x[i] = total / L[i, depth[i]]

@@ -1,0 +1,1 @@
+"""Compiled kernels of Voronoi diagrams and natural-neighbor weights."""

@@ -1,0 +1,83 @@
+"""Where a point is to the facets of a convex hull: exactly, also where almost on one.
+
+A plane is packed as its unit normal, what that rounds off, and a point in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns._kernels.compiled import compiled
+from ikns._kernels.voronoi.diagram import DEPTH, HULL, LINES, PLANE, place
+from ikns._kernels.voronoi.double_double import Triple, difference, twofold_dot
+
+__all__ = ["CANCELED", "depth_behind", "exact_depth", "hull_depths"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: Where a product of floats is below this part of its terms, it is formed again with
+#: twice the digits; above, rounding costs at most 1e-16 / 1e-3.
+CANCELED = 1e-3
+
+
+@compiled
+def depth_behind(numbers: Floats, plane: int, x: Triple) -> float:
+    """How far a point lies behind the plane packed at a place."""
+    at = place(plane)
+    return (
+        numbers[at] * (numbers[at + place(6)] - x[0])
+        + numbers[at + place(1)] * (numbers[at + place(7)] - x[1])
+        + numbers[at + place(2)] * (numbers[at + place(8)] - x[2])
+    )
+
+
+@compiled
+def exact_depth(numbers: Floats, plane: int, x: Triple, rest: Triple) -> float:
+    """How far a point, twofold, lies behind a plane, to 1e-30."""
+    n = numbers[plane : plane + 9]
+    p, p_rest = difference(n[6], x[0])
+    q, q_rest = difference(n[7], x[1])
+    r, r_rest = difference(n[8], x[2])
+    return twofold_dot(
+        (n[0], n[1], n[2]),
+        (n[3], n[4], n[5]),
+        (p, q, r),
+        (p_rest - rest[0], q_rest - rest[1], r_rest - rest[2]),
+    )
+
+
+@compiled
+def hull_depths(
+    numbers: Floats, indices: Indices, x: Triple, rest: Triple, work: Floats
+) -> tuple[float, float]:
+    """Write how far a point lies behind each facet of the hull.
+
+    Its planes end with one over the depth of the middle.
+
+    Returns
+    -------
+    depth : float
+        The least; positive inside.
+    part : float
+        The least part of the way from a facet to the middle of the sites, where that
+        may be less than CANCELED.
+    """
+    depths, facets = indices[DEPTH], indices[HULL]
+    planes = indices[PLANE] + 10 * (indices[LINES] - facets)
+    least, part = np.inf, np.inf
+    for h in range(facets):
+        depth = depth_behind(numbers, planes + 10 * h, x)
+        work[place(depths + h)] = depth
+        least = min(least, depth)
+    if least < CANCELED:
+        least = np.inf
+        for h in range(facets):
+            plane, depth = planes + 10 * h, work[place(depths + h)]
+            if abs(depth) < CANCELED:
+                depth = exact_depth(numbers, plane, x, rest)
+                work[place(depths + h)] = depth
+            least = min(least, depth)
+            part = min(part, depth * numbers[place(plane + 9)])
+    return least, part

@@ -1,0 +1,324 @@
+"""One query for natural neighbors: from where it is to weights of the sites or a value.
+
+The query is scaled and brought near, placed in or on the hull by the rule for queries
+outside it, moved away from the hull by a skin, and given its coordinates (`cavity`,
+`sibson`). A query whose coordinates cannot be trusted is `UNSURE`; the caller asks the
+slow reference, ikns.nullspace.interpolation.reference, which takes the same steps.
+
+Sibson's smooth interpolant joins his weights w_i and the tangent planes at the sites,
+with p_i = site - query (R. Sibson, A brief description of natural neighbour
+interpolation, 1981):
+
+    Z0 = sum_i w_i z_i
+    xi = sum_i w_i / |p_i| (z_i - gradient_i . p_i) / sum_i w_i / |p_i|
+    alpha = sum_i w_i |p_i| / sum_i w_i / |p_i|,    beta = sum_i w_i |p_i|^2
+    Z1 = (alpha Z0 + beta xi) / (alpha + beta)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns._kernels.compiled import compiled
+from ikns._kernels.voronoi.cavity import find_cavity, forget_cavity, try_all
+from ikns._kernels.voronoi.diagram import (
+    CENTER,
+    GRADIENT,
+    INSIDE_HULL,
+    LAPLACE,
+    METHOD,
+    MIDDLE,
+    NEAR,
+    NEAREST,
+    NOT_FINITE,
+    NOWHERE,
+    OUTSIDE,
+    OUTSIDE_HULL,
+    ROUNDING,
+    SCALE,
+    SITE,
+    SITES,
+    SMOOTH,
+    START,
+    TOWARD,
+    UNSURE,
+    VALUE,
+    VALUES,
+    VOLUME,
+    place,
+)
+from ikns._kernels.voronoi.double_double import Triple, difference
+from ikns._kernels.voronoi.hull import hull_depths
+from ikns._kernels.voronoi.hull_projection import nearest_on_hull
+from ikns._kernels.voronoi.sibson import add_polygons
+
+__all__ = ["NEGATIVE", "answer_many", "answer_one", "natural_weights"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: Queries nearer to the hull than this part of the way to the middle are moved in to
+#: there. The hull of a box whose corners are rounded is uneven by 1e-16, and this near
+#: to it weights would tell which way.
+_SKIN = 1e-11
+#: Queries farther out are brought this near: only their direction matters there.
+_FAR = 1e9
+#: Squared distance to a site below which nothing could be told apart.
+_AT_SITE = 1e-36
+#: A weight below this is wrong: rounding leaves -1e-15.
+NEGATIVE = -1e-9
+
+
+@compiled
+def _scaled(numbers: Floats, x: Triple) -> Triple:
+    scale = numbers[SCALE]
+    y = (x[0] * scale, x[1] * scale, x[2] * scale)
+    a = y[0] - numbers[CENTER]
+    b = y[1] - numbers[CENTER + 1]
+    c = y[2] - numbers[CENTER + 2]
+    reach = max(abs(a), abs(b), abs(c))
+    if reach > _FAR:
+        y = (
+            numbers[CENTER] + a / reach * _FAR,
+            numbers[CENTER + 1] + b / reach * _FAR,
+            numbers[CENTER + 2] + c / reach * _FAR,
+        )
+    return y
+
+
+@compiled
+def _nearest(numbers: Floats, indices: Indices, x: Triple) -> tuple[int, float]:
+    """Return the nearest site and the square of its distance."""
+    nearest, least = 0, np.inf
+    for i in range(indices[SITES]):
+        at = place(indices[SITE] + 3 * i)
+        p = numbers[at] - x[0]
+        q = numbers[at + place(1)] - x[1]
+        r = numbers[at + place(2)] - x[2]
+        square = p * p + q * q + r * r
+        if square < least:
+            nearest, least = i, square
+    return nearest, least
+
+
+@compiled
+def _one_site(indices: Indices, site: int, work: Floats) -> int:
+    """Give a site all the weight."""
+    work[place(indices[VOLUME] + site)] = 1.0
+    work[indices[NEAR] :].view(np.int64)[0] = site
+    return 1
+
+
+@compiled
+def _inside_weights(
+    numbers: Floats,
+    indices: Indices,
+    x: Triple,
+    rest: Triple,
+    start: int,
+    work: Floats,
+) -> tuple[bool, int]:
+    """Write the weights of a point inside; return whether they are, and how many."""
+    if start < 0:
+        corners, sites = try_all(numbers, indices, x, rest, work)
+    else:
+        corners, sites = find_cavity(numbers, indices, x, rest, start, work)
+    if corners == 0:
+        nearest, square = _nearest(numbers, indices, x)
+        if square <= _AT_SITE:
+            return True, _one_site(indices, nearest, work)
+        return False, 0
+    near = work[indices[NEAR] :].view(np.int64)
+    toward, volume, at_site = indices[TOWARD], indices[VOLUME], -1
+    for k in range(sites):
+        site = near[place(k)]
+        at, to = place(indices[SITE] + 3 * site), place(toward + 3 * site)
+        p = numbers[at] - x[0]
+        q = numbers[at + place(1)] - x[1]
+        r = numbers[at + place(2)] - x[2]
+        work[to], work[to + place(1)], work[to + place(2)] = p, q, r
+        if p * p + q * q + r * r <= _AT_SITE:
+            at_site = site
+    if at_site < 0:
+        add_polygons(numbers, indices, corners, work)
+    if start >= 0:
+        forget_cavity(indices, corners, sites, work)
+    if at_site >= 0:
+        return True, _one_site(indices, at_site, work)
+
+    total, positive, least = 0.0, 0.0, np.inf
+    for k in range(sites):
+        site = near[place(k)]
+        weight = work[place(volume + site)]
+        if indices[METHOD] == LAPLACE:
+            to = place(toward + 3 * site)
+            p, q, r = work[to], work[to + place(1)], work[to + place(2)]
+            weight /= p * p + q * q + r * r
+        total += weight
+        least = min(least, weight)
+        positive += max(weight, 0.0)
+        work[place(volume + site)] = max(weight, 0.0)
+    for k in range(sites):
+        work[place(volume + near[place(k)])] /= positive
+    return least >= NEGATIVE * total and total > 0, sites
+
+
+@compiled
+def _weights(
+    numbers: Floats, indices: Indices, x: Triple, start: int, work: Floats
+) -> tuple[int, int]:
+    """Write the weights of any query; return its status and how many there are."""
+    y = _scaled(numbers, x)
+    if not (np.isfinite(y[0]) and np.isfinite(y[1]) and np.isfinite(y[2])):
+        return NOT_FINITE, 0
+    rest = (0.0, 0.0, 0.0)
+    least, part = hull_depths(numbers, indices, y, rest, work)
+    status = INSIDE_HULL
+    if least < -numbers[ROUNDING]:
+        status = OUTSIDE_HULL
+        if indices[OUTSIDE] == NOWHERE:
+            return status, 0
+        if indices[OUTSIDE] == NEAREST:
+            nearest, _ = _nearest(numbers, indices, y)
+            return status, _one_site(indices, nearest, work)
+        y = nearest_on_hull(numbers, indices, y)
+        least, part = hull_depths(numbers, indices, y, rest, work)
+    if part < _SKIN:
+        nearest, square = _nearest(numbers, indices, y)
+        if square <= _AT_SITE:
+            return status, _one_site(indices, nearest, work)
+        step = (_SKIN - part) / (1 - part)
+        p, p_rest = difference(y[0], step * (y[0] - numbers[CENTER]))
+        q, q_rest = difference(y[1], step * (y[1] - numbers[CENTER + 1]))
+        r, r_rest = difference(y[2], step * (y[2] - numbers[CENTER + 2]))
+        y, rest = (p, q, r), (p_rest, q_rest, r_rest)
+        hull_depths(numbers, indices, y, rest, work)
+    sure, count = _inside_weights(numbers, indices, y, rest, start, work)
+    return (status if sure else UNSURE), count
+
+
+@compiled
+def _shares(indices: Indices, count: int, work: Floats) -> tuple[float, float]:
+    """Return a, b in Z1 = sum_i a w_i z_i + b w_i / |p_i| (z_i - gradient_i . p_i)."""
+    volume, toward = indices[VOLUME], indices[TOWARD]
+    near = work[indices[NEAR] :].view(np.int64)
+    nearness, distance, square = 0.0, 0.0, 0.0
+    for k in range(count):
+        site = near[place(k)]
+        to, weight = place(toward + 3 * site), work[place(volume + site)]
+        p, q, r = work[to], work[to + place(1)], work[to + place(2)]
+        length = np.sqrt(p * p + q * q + r * r)
+        nearness += weight / length
+        distance += weight * length
+        square += weight * length * length
+    alpha = distance / nearness
+    return alpha / (alpha + square), square / (alpha + square) / nearness
+
+
+@compiled
+def _give(
+    numbers: Floats,
+    indices: Indices,
+    status: int,
+    count: int,
+    work: Floats,
+    weigh: int,
+    out: Floats,
+) -> None:
+    """Move weights from scratch to an (N,) array, or add up the sites' values (M,)."""
+    volume, toward, m = indices[VOLUME], indices[TOWARD], indices[VALUES]
+    known = status >= 0 and count > 0
+    for v in range(len(out)):
+        out[v] = 0.0 if known else np.nan
+    smooth = indices[METHOD] == SMOOTH and count > 1 and weigh == 0
+    plain, tangent = 1.0, 0.0
+    if smooth:
+        plain, tangent = _shares(indices, count, work)
+    near = work[indices[NEAR] :].view(np.int64)
+    for k in range(count):
+        site = near[place(k)]
+        weight = work[place(volume + site)]
+        work[place(volume + site)] = 0.0
+        if not known or weight == 0:
+            continue
+        if weigh != 0:
+            out[site] = weight
+            continue
+        steep = 0.0
+        if smooth:
+            to = place(toward + 3 * site)
+            p, q, r = work[to], work[to + place(1)], work[to + place(2)]
+            steep = tangent * weight / np.sqrt(p * p + q * q + r * r)
+            gradients = indices[GRADIENT] + 3 * m * site
+            for v in range(m):
+                g = place(gradients + 3 * v)
+                out[v] -= steep * (
+                    numbers[g] * p
+                    + numbers[g + place(1)] * q
+                    + numbers[g + place(2)] * r
+                )
+        weight = plain * weight + steep
+        values = indices[VALUE] + m * site
+        for v in range(m):
+            out[v] += weight * numbers[place(values + v)]
+
+
+@compiled
+def answer_one(diagram: Floats, x: Floats, out: Floats) -> bool:
+    """Write the value (M,) at a query (3,), m; return whether it is sure."""
+    if len(x) != 3:
+        return False
+    indices, at = diagram.view(np.int64), (x[0], x[1], x[2])
+    status, count = _weights(diagram, indices, at, indices[MIDDLE], diagram)
+    _give(diagram, indices, status, count, diagram, 0, out)
+    return status != UNSURE
+
+
+@compiled
+def answer_many(
+    diagram: Floats,
+    x: Floats,
+    order: Indices,
+    weigh: int,
+    out: Floats,
+    status: Indices,
+) -> None:
+    """Write weights (Q, N) or values (Q, M) and the status (Q,) of queries (Q, 3).
+
+    Only of those in the order, which walk from where the one before was.
+    """
+    indices = diagram.view(np.int64)
+    indices[indices[START]] = indices[MIDDLE]
+    for q in order:
+        start, at = indices[indices[START]], (x[q, 0], x[q, 1], x[q, 2])
+        status[q], count = _weights(diagram, indices, at, start, diagram)
+        _give(diagram, indices, status[q], count, diagram, weigh, out[q])
+
+
+@compiled
+def natural_weights(
+    numbers: Floats, indices: Indices, x: Floats, work: Floats, weights: Floats
+) -> int:
+    """Weights of the sites at one query.
+
+    Parameters
+    ----------
+    numbers, indices : arrays
+        The packed diagram, as floats and as integers.
+    x : (3,) array
+        Query, m.
+    work : array
+        Scratch memory of this thread, from `new_work`.
+    weights : (N,) array
+        Where the weights go; NaN where there are none.
+
+    Returns
+    -------
+    int
+        INSIDE_HULL, OUTSIDE_HULL, NOT_FINITE or UNSURE.
+    """
+    at = (x[0], x[1], x[2])
+    status, count = _weights(numbers, indices, at, indices[MIDDLE], work)
+    _give(numbers, indices, status, count, work, 1, weights)
+    return status

@@ -1,0 +1,112 @@
+"""Natural-neighbor coordinates from polygons that a query cuts: Sibson's, Laplace's.
+
+Between neighbors i and j stands a polygon of the Voronoi diagram, at a right angle to
+the unit vector axis_ij. Let A_ij be twice its area on the query's side and p = site -
+query. The part that the query takes of cell i is closed by these polygons and by one in
+the bisector of p_i. So its volume V_i and that closing face's area F_i are (Gauss)
+
+    V_i = sum_j A_ij (axis_ij . p_j) / 12
+    F_i = -sum_j A_ij (axis_ij . p_i) / (2 |p_i|)
+
+Sibson's coordinates are V_i over their sum (R. Sibson, A vector identity for the
+Dirichlet tessellation, 1980), Laplace's are F_i / |p_i| over theirs (V. V. Belikov et
+al., The non-Sibsonian interpolation, 1997; K. Sugihara, Surface interpolation based on
+new local coordinates, 1999). Twice the area is
+
+    A = sum_{k < l} length_k length_l sin(angle from side k to side l)
+
+over the kept parts of the sides in their order, from where the cut enters the polygon.
+Positions do not appear, only lengths and angles, each accurate to its last digit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns._kernels.compiled import compiled
+from ikns._kernels.voronoi.diagram import (
+    ANGLE,
+    CORNER_ROWS,
+    EDGE,
+    FOUND,
+    KEPT,
+    LAPLACE,
+    METHOD,
+    POWER,
+    RING,
+    TOWARD,
+    VOLUME,
+    place,
+)
+
+__all__ = ["add_polygons"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@compiled
+def add_polygons(numbers: Floats, indices: Indices, corners: int, work: Floats) -> None:
+    """Add up V, or F times 12 |p|, of the sites around a cavity of so many corners.
+
+    The corners that the query takes of a polygon follow each other. So each polygon is
+    met once at the first of them, or at its first corner where all are taken. One long
+    loop, because calls that pass arrays cost as much as a polygon.
+    """
+    toward, volume, power = indices[TOWARD], indices[VOLUME], indices[POWER]
+    kept, lengths, rows = indices[KEPT], indices[RING], indices[CORNER_ROWS]
+    edges, angles = indices[EDGE], indices[ANGLE]
+    found = work[indices[FOUND] :].view(np.int64)
+    laplace = indices[METHOD] == LAPLACE
+    for c in range(corners):
+        row = rows + 30 * found[place(c)]
+        for corner_edge in range(12, 30, 3):
+            slot = place(row + corner_edge)
+            edge, start = place(edges + indices[slot]), indices[slot + place(1)]
+            sides = indices[edge + place(2)]
+            whole = work[place(power + indices[slot + place(2)])] > 0
+            if whole and start < sides - 1:
+                continue
+            ring = edge + place(4)
+            k, n = start, 0
+            while n < sides:
+                line = indices[ring + place(k)]
+                work[place(lengths + n)] = work[place(kept + line)]
+                k, n = k + 1 if k < sides - 1 else 0, n + 1
+                if not work[place(power + indices[ring + place(sides + k)])] > 0:
+                    break
+            if whole and n < sides:
+                continue
+
+            angle = place(angles + indices[edge + place(3)])
+            sine = angle + place(3 + start * (sides - 1))
+            area = work[place(lengths)] * work[place(lengths + 1)] * numbers[sine]
+            if n > 2:
+                area, k = 0.0, start
+                for m in range(n - 1):
+                    across, sine = 0.0, angle + place(2 + k * (sides - 1))
+                    for gap in range(1, n - m):
+                        across += (
+                            work[place(lengths + m + gap)] * numbers[sine + place(gap)]
+                        )
+                    area += work[place(lengths + m)] * across
+                    k = k + 1 if k < sides - 1 else 0
+
+            i, j = indices[edge], indices[edge + place(1)]
+            to_i, to_j = place(toward + 3 * i), place(toward + 3 * j)
+            u, v, w = (
+                numbers[angle],
+                numbers[angle + place(1)],
+                numbers[angle + place(2)],
+            )
+            along_i = (
+                u * work[to_i] + v * work[to_i + place(1)] + w * work[to_i + place(2)]
+            )
+            along_j = (
+                u * work[to_j] + v * work[to_j + place(1)] + w * work[to_j + place(2)]
+            )
+            if laplace:
+                along_i, along_j = -along_j, -along_i
+            work[place(volume + i)] += area * along_j
+            work[place(volume + j)] -= area * along_i

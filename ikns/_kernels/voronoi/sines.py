@@ -1,0 +1,84 @@
+"""Sines of the angles between the sides of Voronoi polygons.
+
+A side is at a right angle to a facet around the polygon's edge, so two sides are at as
+much of an angle as their facets. With the edge a, a facet's unit normal n, and y from
+the edge's first site to the other facet's third, that is how high y is over the facet,
+for its distance from the edge:
+
+    sine = n . y |a| / |a x y|
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns._kernels.compiled import compiled
+from ikns._kernels.voronoi.double_double import difference, twofold_dot
+
+__all__ = ["sines"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@compiled
+def sines(
+    x: Floats,
+    facets: Integers,
+    behind: Integers,
+    normal: Floats,
+    normal_rest: Floats,
+    area: Floats,
+    edges: Integers,
+    begin: Integers,
+    side_facet: Integers,
+    entering: Integers,
+    canceled: float,
+    first: Integers,
+    second: Integers,
+    sine: Floats,
+) -> None:
+    """Write the pairs of sides of one polygon, edge by edge, and their sines.
+
+    A height below the part `canceled` of |y|_1 is left out: the sine is NaN.
+
+    Parameters
+    ----------
+    x : (N, 3) array
+        Sites.
+    facets : (F, 3) integer array
+        Seen from where their normals point, their sites turn left.
+    area : (F,) array
+        Twice the facets' areas.
+    begin : (E + 1,) integer array
+        Where the sides of an edge begin.
+    behind, normal, normal_rest, edges, side_facet, entering, first, second, sine
+        As in a Voronoi diagram.
+    """
+    p = 0
+    for e in range(len(edges)):
+        i, j = edges[e, 0], edges[e, 1]
+        along = 0.0
+        for k in range(3):
+            along += (x[j, k] - x[i, k]) ** 2
+        along = sqrt(along)
+        for s in range(begin[e], begin[e + 1]):
+            f = side_facet[s]
+            sign = 1.0 if entering[s] == behind[f] else -1.0
+            n = (normal[f, 0], normal[f, 1], normal[f, 2])
+            n_rest = (normal_rest[f, 0], normal_rest[f, 1], normal_rest[f, 2])
+            for t in range(s + 1, begin[e + 1]):
+                g = side_facet[t]
+                third = facets[g, 0] + facets[g, 1] + facets[g, 2] - i - j
+                u, u_rest = difference(x[third, 0], x[i, 0])
+                v, v_rest = difference(x[third, 1], x[i, 1])
+                w, w_rest = difference(x[third, 2], x[i, 2])
+                height = twofold_dot(n, n_rest, (u, v, w), (u_rest, v_rest, w_rest))
+                if abs(height) < canceled * (abs(u) + abs(v) + abs(w)):
+                    height = np.nan
+                first[p], second[p] = s, t
+                sine[p] = sign * height / area[g] * along
+                p += 1

@@ -1,0 +1,1 @@
+"""Analysis of recorded motions: learned against analytic null spaces, and variance."""

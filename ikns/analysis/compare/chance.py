@@ -1,0 +1,117 @@
+"""What subspaces that know nothing would show: the level to compare a finding with."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import beta
+
+from ikns.errors import InvalidInput
+from ikns.numerics.subspace import principal_angles
+
+__all__ = ["chance_angles", "chance_inside", "random_subspaces"]
+
+Array = NDArray[np.float64]
+
+#: Draws where there is no closed form.
+_DRAWS = 4000
+
+
+def chance_angles(
+    d: int,
+    null_dim: int,
+    n: int,
+    *,
+    shares: ArrayLike = (0.05, 0.5),
+    seed: int | np.random.Generator = 0,
+) -> Array:
+    """Quantiles of the largest principal angle to a subspace drawn at random.
+
+    For a line the squared cosine is Beta(null_dim / 2, (n - null_dim) / 2) (Anderson
+    2003, An introduction to multivariate statistical analysis, section 4.2); the same
+    holds for any d against a line. Otherwise 4000 subspaces are drawn uniformly.
+
+    Parameters
+    ----------
+    d : int
+        Directions learned.
+    null_dim : int
+        Dimensions of the null space.
+    n : int
+        Joints.
+    shares : array_like
+        Which quantiles, in (0, 1).
+    seed : int or numpy.random.Generator
+        Source of randomness; without effect on the closed form.
+
+    Returns
+    -------
+    array like `shares`
+        Rad. An angle below the first has one chance in twenty to be that small.
+
+    Examples
+    --------
+    >>> np.degrees(chance_angles(1, 1, 7)).round(1)
+    array([45. , 73.7])
+    """
+    if not (1 <= d <= n and 1 <= null_dim <= n):
+        raise InvalidInput(
+            f"expected 1 to {n} dimensions, found {d} directions and a null space of "
+            f"{null_dim}."
+        )
+    wanted = np.asarray(shares, dtype=np.float64)
+    if d + null_dim > n:
+        # They share a line at least; the largest angle is the same as between what is
+        # orthogonal to both.
+        d, null_dim = n - null_dim, n - d
+        if d == 0 or null_dim == 0:
+            return np.zeros(wanted.shape)
+    few, many = sorted((d, null_dim))
+    if few == 1:
+        cosine = beta.ppf(1 - wanted, many / 2, (n - many) / 2)
+        return np.asarray(np.arccos(np.sqrt(cosine)))
+    drawn = random_subspaces(few, n, _DRAWS, np.random.default_rng(seed))
+    angles = principal_angles(drawn, np.eye(n)[:many])
+    return np.quantile(angles.max(axis=-1), wanted)
+
+
+def chance_inside(
+    covariance: ArrayLike,
+    null_dim: int,
+    *,
+    shares: ArrayLike = (0.5, 0.95),
+    seed: int | np.random.Generator = 0,
+) -> Array:
+    """Quantiles of the variance share inside a subspace drawn at random.
+
+    Its mean is ``null_dim / n`` whatever the covariance; how far it strays depends on
+    how few directions hold the variance.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+        Of the joint angles, rad^2.
+    null_dim : int
+        Dimensions of the null space.
+    shares : array_like
+        Which quantiles.
+    seed : int or numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    array like `shares`
+    """
+    S = np.asarray(covariance, dtype=np.float64)
+    variances = np.clip(np.linalg.eigvalsh(S), 0.0, None)
+    if not variances.sum() > 0:
+        return np.full(np.shape(shares), np.nan)
+    drawn = random_subspaces(null_dim, len(S), _DRAWS, np.random.default_rng(seed))
+    inside = np.sum(drawn**2, axis=1) @ variances / variances.sum()
+    return np.quantile(inside, np.asarray(shares, dtype=np.float64))
+
+
+def random_subspaces(d: int, n: int, draws: int, rng: np.random.Generator) -> Array:
+    """Uniformly distributed subspaces as orthonormal rows, (draws, d, n)."""
+    columns = np.linalg.qr(rng.normal(size=(draws, n, d)))[0]
+    return np.swapaxes(columns, 1, 2)

@@ -1,0 +1,185 @@
+"""Crosstalk: how the control signal changes when the hand is carried elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.numerics.bootstrap import block_counts, block_length, student_interval
+
+__all__ = ["Crosstalk", "crosstalk", "find_reaches"]
+
+Array = NDArray[np.float64]
+
+#: Neighboring reaches share the rest between them, so their changes are correlated, by
+#: 0.22 for normally distributed c at unrelated rests. Then G / g(0) of
+#: :func:`ikns.numerics.bootstrap.block_length` is 0.3 and its rule asks for three
+#: reaches; a dozen reaches are too few for it to see that by itself.
+_LEAST_BLOCK = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Crosstalk:
+    """What :func:`crosstalk` found; one entry a reach.
+
+    Parameters
+    ----------
+    reaches : (R, 2) integer array
+        Last sample of the rest before and first of the rest after.
+    change : (R,) array
+        c after the reach less c before it.
+    distance : (R,) array
+        From rest to rest, m.
+    excursion : (R,) array
+        Farthest that c goes from where it was before, meanwhile.
+    mean_change, per_meter, largest : float
+        Mean of ``abs(change)``; its sum over the sum of distances, 1/m; the largest
+        excursion.
+    mean_change_interval, per_meter_interval : (float, float)
+        NaN with fewer than 6 reaches.
+    """
+
+    reaches: NDArray[np.int64]
+    change: Array
+    distance: Array
+    excursion: Array
+    mean_change: float
+    mean_change_interval: tuple[float, float]
+    per_meter: float
+    per_meter_interval: tuple[float, float]
+    largest: float
+
+
+def find_reaches(
+    speed: ArrayLike,
+    position: ArrayLike,
+    *,
+    max_hand_speed: float = 0.05,
+    min_distance: float = 0.05,
+) -> NDArray[np.int64]:
+    """Reaches: the hand above the gate between two rests.
+
+    Parameters
+    ----------
+    speed : (T,) array
+        Of the hand, m/s; NaN where it is not known.
+    position : (T, 3) array
+        Of the hand, m.
+    max_hand_speed : float
+        Slower is a rest, m/s.
+    min_distance : float
+        Rests that are nearer to each other do not count as a reach, m.
+
+    Returns
+    -------
+    (R, 2) integer array
+        Last sample of the rest before, first sample of the rest after. A stretch with
+        an unknown speed or position is no reach.
+
+    Examples
+    --------
+    >>> x = np.array([0, 0, 0.1, 0.3, 0.4, 0.4])
+    >>> speed = [0, 0.01, 1, 2, 0.01, 0]
+    >>> find_reaches(speed, np.stack([x, x, x], axis=1)).tolist()
+    [[1, 4]]
+    """
+    v, x = np.asarray(speed, dtype=np.float64), np.asarray(position, dtype=np.float64)
+    if x.shape != (len(v), 3) or not max_hand_speed > 0:
+        raise InvalidInput(
+            f"expected speeds (T,), positions (T, 3) and a gate above 0, found "
+            f"{v.shape}, {x.shape} and {max_hand_speed:g} m/s."
+        )
+    known = np.isfinite(v) & np.isfinite(x).all(axis=1)
+    rest = known & (v < max_hand_speed)
+    ends = np.flatnonzero(np.diff(rest.astype(int)) == -1)  # last of each rest
+    found = []
+    for first in ends.tolist():
+        after = np.flatnonzero(rest[first + 1 :])
+        if not after.size:
+            break
+        last = first + 1 + int(after[0])
+        far = float(np.linalg.norm(x[last] - x[first]))
+        if known[first : last + 1].all() and far >= min_distance:
+            found.append((first, last))
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
+def crosstalk(
+    c: ArrayLike,
+    speed: ArrayLike,
+    position: ArrayLike,
+    *,
+    max_hand_speed: float = 0.05,
+    min_distance: float = 0.05,
+    resamples: int = 400,
+    level: float = 0.95,
+    seed: int | np.random.Generator = 0,
+) -> Crosstalk:
+    """Measure how reaches change the control signal.
+
+    Parameters
+    ----------
+    c : (T,) array
+        Control signal, not clipped; reaches where it is not known are left out.
+    speed, position, max_hand_speed, min_distance
+        See :func:`find_reaches`.
+    resamples : int
+        Of the block bootstrap over the sequence of reaches; 0 for no intervals. The
+        intervals are Student's on the logarithm, as both values are scales.
+    level : float
+        Confidence.
+    seed : int or numpy.random.Generator
+        Source of randomness.
+
+    Raises
+    ------
+    NotEnoughData
+        When there is no reach.
+    """
+    signal, x = np.asarray(c, dtype=np.float64), np.asarray(position, dtype=np.float64)
+    if signal.shape != (len(x),):
+        raise InvalidInput(
+            f"expected one control signal of {len(x)} samples, found {signal.shape}."
+        )
+    found = find_reaches(
+        speed, x, max_hand_speed=max_hand_speed, min_distance=min_distance
+    )
+    shown = [bool(np.isfinite(signal[a : b + 1]).all()) for a, b in found]
+    found = found[np.array(shown, dtype=bool)]
+    if not len(found):
+        raise NotEnoughData(
+            f"expected reaches of {min_distance:g} m or more between rests slower than "
+            f"{max_hand_speed:g} m/s, found none."
+        )
+    before, after = found.T
+    change = signal[after] - signal[before]
+    distance = np.linalg.norm(x[after] - x[before], axis=1)
+    excursion = np.array(
+        [np.abs(signal[a : b + 1] - signal[a]).max() for a, b in found]
+    )
+    size, R = np.abs(change), len(found)
+    mean, ratio = float(size.mean()), float(size.sum() / distance.sum())
+    intervals = [(np.nan, np.nan)] * 2
+    if resamples and R >= 6 and mean > 0:
+        scores = np.stack([size, size - ratio * distance], axis=1)
+        length = max(_LEAST_BLOCK, block_length(scores))
+        counts = block_counts(R, length, resamples, np.random.default_rng(seed))
+        with np.errstate(divide="ignore"):
+            logs = np.log([counts @ size / R, (counts @ size) / (counts @ distance)])
+        for i, value in enumerate((mean, ratio)):
+            ends = student_interval(np.log(value), logs[i], R / length, level=level)
+            intervals[i] = (float(np.exp(ends[0])), float(np.exp(ends[1])))
+    return Crosstalk(
+        reaches=found,
+        change=change,
+        distance=distance,
+        excursion=excursion,
+        mean_change=mean,
+        mean_change_interval=intervals[0],
+        per_meter=ratio,
+        per_meter_interval=intervals[1],
+        largest=float(excursion.max()),
+    )

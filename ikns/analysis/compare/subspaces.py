@@ -1,0 +1,190 @@
+"""The learned directions against the null space, point by point."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.numerics.bootstrap import (
+    block_counts,
+    block_length,
+    length_interval,
+    student_interval,
+)
+from ikns.numerics.subspace import principal_angles
+
+__all__ = [
+    "Resampled",
+    "Subspaces",
+    "angle_interval",
+    "compare_subspaces",
+    "learned_directions",
+    "span_covariance",
+]
+
+Array = NDArray[np.float64]
+
+
+class Resampled(NamedTuple):
+    """Blocks drawn from the samples of a point.
+
+    Parameters
+    ----------
+    counts : (B, N) array
+        How often each sample was drawn.
+    blocks : float
+        Blocks that fit into the samples.
+    """
+
+    counts: Array
+    blocks: float
+
+
+class Subspaces(NamedTuple):
+    """One null space against the directions.
+
+    Parameters
+    ----------
+    angles : (k,) array
+        Principal angles, rad, increasing.
+    residual : (n,) array
+        What of the direction farthest away is outside the null space; its length is
+        the sine of the largest angle.
+    replicates : (B, n) array
+        The same from resamples.
+    """
+
+    angles: Array
+    residual: Array
+    replicates: Array
+
+
+def learned_directions(
+    q: ArrayLike, reference: ArrayLike, *, variance: float = 0.8
+) -> Array:
+    """Directions that principal components of some samples give.
+
+    As in :class:`ikns.nullspace.map.NullSpaceMap`: for one degree of freedom the
+    normalized sum of the components that explain `variance`, each times its ratio and
+    the sign that agrees with the reference; for d the d leading ones, turned within
+    their span toward the reference.
+
+    Parameters
+    ----------
+    q : (N, n) array
+        Joint vectors, rad.
+    reference : (d, n) array
+        Directions to agree with.
+    variance : float
+        Part of the variance that the summed components explain.
+
+    Returns
+    -------
+    (d, n) array
+        Orthonormal rows.
+    """
+    rows = np.asarray(q, dtype=np.float64)
+    around = rows - rows.mean(axis=0)
+    return span_covariance(around.T @ around, np.asarray(reference), variance)
+
+
+def span_covariance(S: Array, reference: Array, variance: float = 0.8) -> Array:
+    """Directions from covariances (..., n, n), see :func:`learned_directions`."""
+    values, vectors = np.linalg.eigh(S)
+    values = np.clip(values[..., ::-1], 0.0, None)
+    ratios = values / np.maximum(values.sum(axis=-1, keepdims=True), 1e-300)
+    components = np.swapaxes(vectors[..., ::-1], -2, -1)
+    d = len(reference)
+    if d > 1:
+        leading = components[..., :d, :]
+        u, _, vt = np.linalg.svd(reference @ np.swapaxes(leading, -2, -1))
+        return np.asarray(u @ vt @ leading)
+    before = np.cumsum(ratios, axis=-1) - ratios
+    weights = np.where(before < variance - 1e-12, ratios, 0.0)
+    signs = np.where(components @ reference[0] < 0, -1.0, 1.0)
+    total = np.einsum("...k,...kn->...n", weights * signs, components)
+    return np.asarray(total / np.linalg.norm(total, axis=-1, keepdims=True))[
+        ..., None, :
+    ]
+
+
+def covariances(q: Array, counts: Array) -> tuple[Array, Array]:
+    """Means (B, n) and scatter matrices (B, n, n) of resampled rows (N, n)."""
+    centered = q - q.mean(axis=0)
+    share = counts / counts.sum(axis=1, keepdims=True)
+    mean = share @ centered
+    second = share @ (centered[:, :, None] * centered[:, None, :]).reshape(len(q), -1)
+    n = q.shape[1]
+    scatter = second.reshape(-1, n, n) - mean[:, :, None] * mean[:, None, :]
+    return mean + q.mean(axis=0), scatter
+
+
+def draw(scores: Array, resamples: int, rng: np.random.Generator) -> Resampled:
+    """Draw blocks as long as these scores (N, m) ask for."""
+    n, length = len(scores), block_length(scores)
+    counts = block_counts(n, length, resamples, rng)
+    return Resampled(counts, n / length)
+
+
+def direction_scores(q: Array, directions: Array) -> Array:
+    """How much each sample turns the directions: along times across, (N, n)."""
+    centered = q - q.mean(axis=0)
+    along = centered @ directions.T
+    return along[:, :1] * (centered - along @ directions)
+
+
+def compare_subspaces(
+    directions: Array, null: Array, moved: Array, nulls: Array
+) -> Subspaces:
+    """Compare directions with a null space, once and for every resample.
+
+    Parameters
+    ----------
+    directions : (d, n) array
+        Orthonormal rows.
+    null : (r, n) array
+        Orthonormal rows.
+    moved : (B, d, n) array
+        Directions of the resamples.
+    nulls : (B, r, n) or (r, n) array
+        Null spaces of the resamples.
+    """
+    angles = principal_angles(directions, null)
+    nulls = np.broadcast_to(nulls, (len(moved), *nulls.shape[-2:]))
+    # The smaller space may lie in the larger one, never the other way round.
+    pairs = [(directions, null), (moved, nulls)]
+    if len(directions) > len(null):
+        pairs = [(b, a) for a, b in pairs]
+    (a, b), (A, B) = pairs
+    outside = a - (a @ b.T) @ b
+    farthest = np.linalg.svd(outside)[0][:, 0]
+    return Subspaces(
+        angles,
+        farthest @ outside,
+        farthest @ (A - (A @ np.swapaxes(B, -2, -1)) @ B),
+    )
+
+
+def angle_interval(
+    found: Subspaces, blocks: float, *, level: float, rng: np.random.Generator
+) -> tuple[float, float]:
+    """Interval of the largest angle, rad, through the sine as a length."""
+    low, high = length_interval(
+        found.residual, found.replicates, blocks, level=level, rng=rng
+    )
+    return float(np.arcsin(min(low, 1.0))), float(np.arcsin(min(high, 1.0)))
+
+
+def share_interval(
+    share: float, replicates: Array, blocks: float, *, level: float
+) -> tuple[float, float]:
+    """Interval of a share, by its log odds."""
+    if not 0 < share < 1:
+        return np.nan, np.nan
+    odds = np.log(replicates / (1 - replicates))
+    found = float(np.log(share / (1 - share)))
+    ends = student_interval(found, odds, blocks, level=level)
+    low, high = (float(1 / (1 + np.exp(-end))) for end in ends)
+    return low, high

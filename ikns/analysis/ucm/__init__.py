@@ -1,0 +1,31 @@
+"""Uncontrolled manifold: joint variance where a task sees it, and where it does not.
+
+The joint variance over repetitions is split along the null space of the task's Jacobian
+(V_UCM) and across it (V_ORT), each per degree of freedom (Scholz and Schoner 1999, Exp
+Brain Res 126:289). From plain arrays, or from motions of a skeleton.
+"""
+
+from ikns.analysis.ucm.designs import across_trials, within_trial
+from ikns.analysis.ucm.intervals import Interval, confidence_interval, mean_interval
+from ikns.analysis.ucm.split import VarianceSplit, delta_vz, variance_split
+from ikns.analysis.ucm.surrogates import SurrogateTest, surrogate_test
+from ikns.analysis.ucm.tasks import chain_task, numerical_task
+from ikns.analysis.ucm.trials import aligned_angles, movement, normalize_time
+
+__all__ = [
+    "Interval",
+    "SurrogateTest",
+    "VarianceSplit",
+    "across_trials",
+    "aligned_angles",
+    "chain_task",
+    "confidence_interval",
+    "delta_vz",
+    "mean_interval",
+    "movement",
+    "normalize_time",
+    "numerical_task",
+    "surrogate_test",
+    "variance_split",
+    "within_trial",
+]

@@ -1,0 +1,137 @@
+"""Surrogates: the same joints, each as variable as before, but no longer together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.analysis.ucm.split import VarianceSplit, half_log_ratio, sums_of_squares
+from ikns.errors import InvalidInput
+
+__all__ = ["SurrogateTest", "surrogate_test"]
+
+Array = NDArray[np.float64]
+
+#: Differences of dVz up to this are rounding: the same trials summed in another order.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class SurrogateTest:
+    """dVz beside what it would be if the joints did not vary together.
+
+    Parameters
+    ----------
+    observed : (...) array
+        dVz of the data.
+    surrogates : (S, ...) array
+        dVz of each surrogate.
+    p : (...) array
+        ``(1 + surrogates at least as large) / (1 + S)``; not corrected for looking at
+        several times. NaN where there is no split.
+    p_overall : float
+        The same for the mean over all (...), which is one test.
+    """
+
+    observed: Array
+    surrogates: Array
+    p: Array
+    p_overall: float
+
+    @property
+    def mean(self) -> Array:
+        """Mean dVz of the surrogates, (...)."""
+        return np.asarray(self.surrogates.mean(axis=0))
+
+    @property
+    def excess(self) -> Array:
+        """How much the joints' covariation adds to dVz, (...)."""
+        return np.asarray(self.observed - self.mean)
+
+    def band(self, level: float = 0.95) -> Array:
+        """Central range of the surrogates, (2, ...)."""
+        edge = (1 - level) / 2
+        return np.asarray(np.quantile(self.surrogates, [edge, 1 - edge], axis=0))
+
+
+def surrogate_test(
+    split: VarianceSplit,
+    *,
+    n_surrogates: int = 1000,
+    by: Literal["trials", "shift"] = "trials",
+    seed: int | np.random.Generator = 0,
+) -> SurrogateTest:
+    """Test whether joints covary so as to keep the task.
+
+    Each joint is shuffled on its own over the trials, the whole time course with it
+    (Muller and Sternad 2003, Biol Cybern 89:22). Mean posture,
+    Jacobian, the variance of every joint and its course over time stay; covariance
+    between joints goes. The null hypothesis is that joints vary independently of each
+    other; a small p says that they covary *and* that this puts more of the variance
+    into the null space. It does not say that V_UCM exceeds V_ORT: joints that the task
+    hardly sees may be variable without any covariation.
+
+    Parameters
+    ----------
+    split : VarianceSplit
+    n_surrogates : int
+        S; the smallest p is 1 / (1 + S).
+    by : {"trials", "shift"}
+        ``"trials"`` are exchangeable and get shuffled. Samples of one trial are not:
+        neighbors are alike. ``"shift"`` turns the whole series of each joint, end to
+        start, by a random number of samples.
+    seed : int or numpy.random.Generator
+
+    Returns
+    -------
+    SurrogateTest
+        One-sided: large dVz counts.
+
+    Raises
+    ------
+    InvalidInput
+        When `n_surrogates` is below 1 or `by` is neither.
+    """
+    if n_surrogates < 1 or by not in ("trials", "shift"):
+        raise InvalidInput(
+            "expected at least 1 surrogate by 'trials' or 'shift', found "
+            f"{n_surrogates} by {by!r}."
+        )
+    rng = np.random.default_rng(seed)
+    deviations, seen = split.deviations, split.seen
+    n_trials, n = len(deviations), split.n_joints
+    flat = deviations.reshape(n_trials, -1, n)
+    known = seen.reshape(n_trials, -1)
+    basis = split.basis.reshape(-1, *split.basis.shape[-2:])
+    drawn = np.empty((n_surrogates, flat.shape[1]))
+    complete = bool(known.all())
+    shuffled = np.empty_like(flat)
+    rows = np.arange(n_trials)
+    for s in range(n_surrogates):
+        for j in range(n):
+            if by == "trials":
+                order = rng.permutation(n_trials)
+            else:
+                order = np.roll(rows, rng.integers(n_trials))
+            column = flat[order, :, j]
+            if not complete:
+                # Known trials first, in this order, so that they meet known ones.
+                first = np.argsort(~known[order], axis=0, kind="stable")
+                column = np.take_along_axis(column, first, axis=0)
+            shuffled[:, :, j] = column
+        drawn[s] = half_log_ratio(*sums_of_squares(shuffled, basis))
+    observed = split.delta_vz
+    surrogates = drawn.reshape(n_surrogates, *np.shape(observed))
+    defined = np.isfinite(drawn).all(axis=0)
+    p = (1 + np.sum(surrogates >= observed - _SAME, axis=0)) / (1 + n_surrogates)
+    total = observed.reshape(-1)[defined].mean() if defined.any() else np.nan
+    beyond = np.sum(drawn[:, defined].mean(axis=1) >= total - _SAME)
+    return SurrogateTest(
+        observed=observed,
+        surrogates=surrogates,
+        p=np.where(np.isnan(observed), np.nan, p)[()],
+        p_overall=float((1 + beyond) / (1 + n_surrogates)) if defined.any() else np.nan,
+    )

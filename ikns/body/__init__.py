@@ -1,0 +1,1 @@
+"""The body: anthropometry, the chains of tasks, marker sets, and the skeleton."""

@@ -1,0 +1,56 @@
+"""Which joints make up the chain of a task, and whose hands carry it out.
+
+Joint order within a chain is the order of the names in :data:`CHAINS`, never the
+order of a file or a model, so a direction learned today means the same tomorrow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ikns.errors import InvalidInput
+
+__all__ = ["CHAINS", "SIDES", "chain_joints", "chain_sides"]
+
+#: Order of the side axis of every per-hand array.
+SIDES = ("right", "left")
+
+_ARM = (
+    "shoulder_abduction",
+    "shoulder_flexion",
+    "shoulder_rotation",
+    "elbow_flexion",
+    "forearm_pronation",
+    "wrist_flexion",
+    "wrist_deviation",
+)
+_CLAVICLE = ("clavicle_protraction", "clavicle_elevation")
+
+
+def _named(side: str, joints: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"{side}_{joint}" for joint in joints)
+
+
+#: Joints that a task employs (the intrinsic part); all others are extrinsic.
+CHAINS: dict[str, tuple[str, ...]] = {
+    "right_arm": _named("right", _ARM),
+    "left_arm": _named("left", _ARM),
+    "right_arm_clavicle": _named("right", _CLAVICLE + _ARM),
+    "left_arm_clavicle": _named("left", _CLAVICLE + _ARM),
+    "both_arms": _named("right", _ARM) + _named("left", _ARM),
+}
+
+
+def chain_joints(chain: str) -> tuple[str, ...]:
+    """Return the joint names of a chain, in chain order."""
+    if chain not in CHAINS:
+        raise InvalidInput(
+            f"unknown chain '{chain}', expected one of {sorted(CHAINS)}."
+        )
+    return CHAINS[chain]
+
+
+def chain_sides(chain: str) -> tuple[str, ...]:
+    """Return the sides whose hands carry out the chain's task."""
+    joints = chain_joints(chain)
+    return tuple(side for side in SIDES if any(j.startswith(side) for j in joints))

@@ -1,0 +1,234 @@
+"""Which marker sits on which segment: a TOML file beside the URDF.
+
+Positions are in the link's frame (X forward, Y up, Z right in the zero pose), in
+millimeters in the file and meters here, for the generic body.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.body.model_file import urdf_folder
+from ikns.errors import FileError, MarkerMismatch
+
+__all__ = ["Marker", "MarkerSet"]
+
+_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Marker:
+    """One marker.
+
+    Parameters
+    ----------
+    label : str
+        Its name.
+    link : str
+        The URDF link that carries it.
+    position : (3,) tuple
+        Nominal place in the link's frame, meters.
+    placement_sd : (3,) tuple
+        How far from the nominal place people put it along each axis, standard
+        deviation, meters: small on a bony landmark, large for a technical marker. One
+        number in the file stands for all three.
+    static_only : bool
+        Worn in the static trial only.
+    aliases : tuple of str
+        Other labels of the same marker.
+    weight : float
+        How much inverse kinematics trusts it, relative to the others: less where soft
+        tissue moves under it.
+    """
+
+    label: str
+    link: str
+    position: tuple[float, float, float]
+    placement_sd: tuple[float, float, float]
+    static_only: bool = False
+    aliases: tuple[str, ...] = ()
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class MarkerSet:
+    """Markers of a body, and the joints that they cannot observe.
+
+    Parameters
+    ----------
+    name : str
+        Short name.
+    markers : tuple of Marker
+        In the order of every marker axis that a skeleton hands out.
+    held : tuple of str
+        Joints that these markers cannot tell apart from others.
+    source : str
+        Where the layout is described.
+    """
+
+    name: str
+    markers: tuple[Marker, ...]
+    held: tuple[str, ...] = ()
+    source: str = ""
+
+    @classmethod
+    def load(cls, name_or_path: str | Path) -> MarkerSet:
+        """Read a marker set by its name (``oxford24``) or from a TOML file.
+
+        >>> len(MarkerSet.load("oxford24").markers)
+        24
+        """
+        path = Path(name_or_path)
+        if path.suffix != ".toml":
+            path = urdf_folder() / "markers" / f"{name_or_path}.toml"
+            if not path.is_file():
+                known = sorted(p.stem for p in path.parent.glob("*.toml"))
+                raise FileError(
+                    f"there is no marker set '{name_or_path}'; known are "
+                    f"{', '.join(known)}, or the path of a .toml file."
+                )
+        try:
+            table = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise FileError(
+                f"{path}: cannot be read as a marker set: {error}"
+            ) from None
+        if table.get("format") != _FORMAT:
+            raise FileError(
+                f"{path}: expected marker-set format {_FORMAT}, "
+                f"found {table.get('format')}."
+            )
+        try:
+            markers = tuple(_read_marker(k, v) for k, v in table["markers"].items())
+            held = tuple(table.get("held", ()))
+            return cls(table["name"], markers, held, table.get("source", ""))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise FileError(
+                f"{path}: every marker needs link, position_mm (3 numbers) and "
+                f"placement_sd_mm; found a fault at {error}."
+            ) from None
+
+    def write(self, path: str | Path) -> None:
+        """Write the set as a TOML file that :meth:`load` reads back."""
+        import tomli_w
+
+        table = {
+            "format": _FORMAT,
+            "name": self.name,
+            "source": self.source,
+            "held": list(self.held),
+            "markers": {m.label: _write_marker(m) for m in self.markers},
+        }
+        Path(path).write_text(tomli_w.dumps(table), encoding="utf-8")
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the markers, in order."""
+        return tuple(marker.label for marker in self.markers)
+
+    def columns(self, labels: Sequence[str]) -> NDArray[np.int64]:
+        """Find each marker among a recording's labels, (M,); -1 where it is missing.
+
+        A subject prefix is ignored (``ADL001:RSHO1`` is ``RSHO1``), as is case, and an
+        alias counts as the label.
+
+        Raises
+        ------
+        MarkerMismatch
+            When two labels could be the same marker.
+        """
+        places: dict[str, list[int]] = {}
+        for column, label in enumerate(labels):
+            key = label.rsplit(":", 1)[-1].strip().casefold()
+            places.setdefault(key, []).append(column)
+        found = np.full(len(self.markers), -1, dtype=np.int64)
+        for i, marker in enumerate(self.markers):
+            names = [marker.label, *marker.aliases]
+            matches = [c for n in names for c in places.get(n.casefold(), [])]
+            if len(matches) > 1:
+                raise MarkerMismatch(
+                    f"marker {marker.label} must match one label, found "
+                    f"{', '.join(labels[c] for c in matches)}; keep one subject."
+                )
+            if matches:
+                found[i] = matches[0]
+        return found
+
+    def pick(
+        self, labels: Sequence[str], markers: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Sort a recording's markers into this set's order.
+
+        Parameters
+        ----------
+        labels : sequence of str
+            Labels of the recording.
+        markers : (..., len(labels), 3) array
+            Positions.
+
+        Returns
+        -------
+        (..., M, 3) array
+            Positions of this set's markers; NaN where the recording has none.
+        """
+        columns = self.columns(labels)
+        picked = np.full((*markers.shape[:-2], len(columns), 3), np.nan)
+        picked[..., columns >= 0, :] = markers[..., columns[columns >= 0], :]
+        return picked
+
+    def without_static(self) -> MarkerSet:
+        """Return the set as it is worn after the static trial."""
+        return self.only(m.label for m in self.markers if not m.static_only)
+
+    def only(self, labels: Iterable[str]) -> MarkerSet:
+        """Return the set with these markers alone, in its own order."""
+        kept = set(labels)
+        return replace(self, markers=tuple(m for m in self.markers if m.label in kept))
+
+    def at(self, positions: NDArray[np.float64]) -> MarkerSet:
+        """Return the set with the markers at these places, (M, 3) m in their links."""
+        moved = tuple(
+            replace(marker, position=(float(p[0]), float(p[1]), float(p[2])))
+            for marker, p in zip(self.markers, positions, strict=True)
+        )
+        return replace(self, markers=moved)
+
+
+def _read_marker(label: str, table: Mapping[str, Any]) -> Marker:
+    x, y, z = (float(value) / 1000 for value in table["position_mm"])
+    spread = table["placement_sd_mm"]
+    sx, sy, sz = (
+        float(value) / 1000
+        for value in (spread if isinstance(spread, list) else 3 * [spread])
+    )
+    return Marker(
+        label,
+        str(table["link"]),
+        (x, y, z),
+        (sx, sy, sz),
+        bool(table.get("static_only", False)),
+        tuple(table.get("aliases", ())),
+        float(table.get("weight", 1.0)),
+    )
+
+
+def _write_marker(marker: Marker) -> dict[str, object]:
+    table: dict[str, object] = {
+        "link": marker.link,
+        "position_mm": [1000 * value for value in marker.position],
+        "placement_sd_mm": [1000 * value for value in marker.placement_sd],
+    }
+    if marker.static_only:
+        table["static_only"] = True
+    if marker.aliases:
+        table["aliases"] = list(marker.aliases)
+    if marker.weight != 1:
+        table["weight"] = marker.weight
+    return table

@@ -1,0 +1,239 @@
+"""The body as a file: where the URDF lies and how it is resized, as text.
+
+A segment's size is one factor on everything that belongs to its link: the joints that
+hang on it, its center of mass, its shape. Joint axes and limits never change.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.body.anthropometry import Segment
+from ikns.errors import FileError, InvalidInput
+
+__all__ = [
+    "GENERIC_STATURE",
+    "SEGMENTS",
+    "Inertial",
+    "link_inertials",
+    "relative_sizes",
+    "resize_urdf",
+    "segment_ends",
+    "segment_lengths",
+    "urdf_folder",
+]
+
+#: Stature of the generic body: mean of the ANSUR II means of women and men, m.
+GENERIC_STATURE = (1.6285 + 1.7562) / 2
+#: The trunk's center of mass lies this far behind the sternal notch: midway between
+#: notch and C7, where ISB puts the thorax's long axis; m in the generic body.
+_TRUNK_DEPTH = 0.060
+#: Trunk length (sternal notch to hip) of the generic body, de Leva 1996, m.
+_TRUNK_LENGTH = 0.5166
+
+#: Segments that scale, each named like its link, with the joint that ends it (the
+#: trunk has no such joint: its length is not a distance in the model).
+SEGMENTS: dict[str, str | None] = {
+    "thorax": None,
+    **{
+        f"{side}_{segment}": f"{side}_{end}"
+        for side in ("right", "left")
+        for segment, end in (
+            ("clavicle", "shoulder_abduction"),
+            ("upper_arm", "elbow_flexion"),
+            ("forearm", "wrist_flexion"),
+            ("hand", "knuckle_fixed"),
+        )
+    },
+}
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """Mass (kg), center of mass (3,) m and principal inertias (3,) kg m^2 of a link.
+
+    Both vectors are expressed in the link's frame, whose axes are the principal ones.
+    """
+
+    mass: float
+    center: tuple[float, float, float]
+    inertia: tuple[float, float, float]
+
+
+def urdf_folder() -> Path:
+    """Return the folder of the URDF files, in an installed and in a source tree."""
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "urdf", package.parent / "urdf"):
+        if (folder / "upper_body.urdf").is_file():
+            return folder
+    raise FileError(
+        f"upper_body.urdf should lie in {package / 'urdf'}; reinstall the package."
+    )
+
+
+def segment_lengths(urdf: str) -> dict[str, float]:
+    """Joint-to-joint length of each segment, meters.
+
+    >>> text = (urdf_folder() / "upper_body.urdf").read_text()
+    >>> 0.25 < segment_lengths(text)["right_upper_arm"] < 0.30
+    True
+    """
+    return {
+        segment: float(np.linalg.norm(end))
+        for segment, end in segment_ends(urdf).items()
+    }
+
+
+def segment_ends(urdf: str) -> dict[str, NDArray[np.float64]]:
+    """Joint that ends each limb segment, in its link's frame, (3,) m."""
+    origins = _joint_origins(urdf)
+    return {name: origins[end] for name, end in SEGMENTS.items() if end in origins}
+
+
+def relative_sizes(urdf: str, reference: str) -> dict[str, float]:
+    """Size of each segment over the same segment of a reference URDF."""
+    ours, theirs = _joint_origins(urdf), _joint_origins(reference)
+    # The trunk grows with the place of the joint that hangs on it.
+    ends = {name: end or "right_clavicle_protraction" for name, end in SEGMENTS.items()}
+    return {
+        name: float(np.linalg.norm(ours[end]) / np.linalg.norm(theirs[end]))
+        for name, end in ends.items()
+    }
+
+
+def link_inertials(urdf: str, parts: Mapping[str, Segment]) -> dict[str, Inertial]:
+    """Inertial properties of each segment's link, by link name.
+
+    Parameters
+    ----------
+    urdf : str
+        Gives the direction of each segment in its link.
+    parts : mapping
+        As from :func:`ikns.body.anthropometry.segments`: principal moments about the
+        front-back axis, the long axis, and the axis across both, palms forward.
+    """
+    trunk = parts["trunk_head"]
+    inertials = {
+        "thorax": Inertial(
+            trunk.mass_kg,
+            (-_TRUNK_DEPTH * trunk.length_m / _TRUNK_LENGTH, -trunk.com_m, 0.0),
+            trunk.inertia_kg_m2,
+        )
+    }
+    for name, along in segment_ends(urdf).items():
+        part = parts[name.split("_", 1)[1]]
+        center = part.com_m * along / np.linalg.norm(along)
+        front, long, across = part.inertia_kg_m2
+        moments = {
+            "clavicle": (front, across, long),  # long axis sideways
+            "upper_arm": (front, long, across),
+            # Thumbs forward in the zero pose: a quarter turn from palms forward.
+            "forearm": (across, long, front),
+            "hand": (across, long, front),
+        }[part.name]
+        x, y, z = (float(value) for value in center)
+        inertials[name] = Inertial(part.mass_kg, (x, y, z), moments)
+    return inertials
+
+
+def resize_urdf(
+    urdf: str,
+    factors: Mapping[str, float],
+    *,
+    inertials: Mapping[str, Inertial] | None = None,
+) -> str:
+    """Return the URDF with segments resized.
+
+    Parameters
+    ----------
+    urdf : str
+        URDF text.
+    factors : mapping
+        Size factor per segment (a link name); a segment without one keeps its size.
+        Lengths scale with the factor, mass with its cube and inertia with its fifth
+        power (same shape, same density), unless `inertials` says otherwise.
+    inertials : mapping, optional
+        New inertial properties by link name.
+
+    Raises
+    ------
+    InvalidInput
+        When a factor is not positive or a segment does not exist.
+    """
+    robot = ET.fromstring(
+        urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
+    )
+    links = {link.get("name"): link for link in robot.iter("link")}
+    given = {} if inertials is None else inertials
+    for name in [*factors, *given]:
+        if name not in links:
+            raise InvalidInput(f"the URDF has no link '{name}' to resize.")
+    for name, factor in factors.items():
+        if not (np.isfinite(factor) and factor > 0):
+            raise InvalidInput(f"size factor of {name} must be positive, not {factor}.")
+        _resize_link(links[name], factor)
+        for joint in robot.iter("joint"):
+            parent = joint.find("parent")
+            if parent is not None and parent.get("link") == name:
+                _scale(joint.find("origin"), "xyz", factor)
+    for name, inertial in given.items():
+        _set_inertial(links[name], inertial)
+    ET.indent(robot)
+    return '<?xml version="1.0"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
+
+
+def _resize_link(link: ET.Element, factor: float) -> None:
+    for origin in link.iter("origin"):
+        _scale(origin, "xyz", factor)
+    for shape in link.iter("cylinder"):
+        _scale(shape, "radius", factor)
+        _scale(shape, "length", factor)
+    for shape in link.iter("sphere"):
+        _scale(shape, "radius", factor)
+    for shape in link.iter("box"):
+        _scale(shape, "size", factor)
+    _scale(link.find("inertial/mass"), "value", factor**3)
+    for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
+        _scale(link.find("inertial/inertia"), name, factor**5)
+
+
+def _set_inertial(link: ET.Element, inertial: Inertial) -> None:
+    old = link.find("inertial")
+    if old is not None:
+        link.remove(old)
+    element = ET.Element("inertial")
+    ET.SubElement(element, "origin", xyz=_text(np.array(inertial.center)))
+    ET.SubElement(element, "mass", value=f"{inertial.mass:.9g}")
+    xx, yy, zz = (f"{value:.9g}" for value in inertial.inertia)
+    ET.SubElement(element, "inertia", ixx=xx, ixy="0", ixz="0", iyy=yy, iyz="0", izz=zz)
+    link.insert(0, element)
+
+
+def _joint_origins(urdf: str) -> dict[str | None, NDArray[np.float64]]:
+    """Place of each joint in its parent link, (3,) m, by joint name."""
+    return {
+        joint.get("name"): _vector(joint.find("origin"), "xyz")
+        for joint in ET.fromstring(urdf).iter("joint")
+    }
+
+
+def _vector(element: ET.Element | None, attribute: str) -> NDArray[np.float64]:
+    if element is None:
+        return np.zeros(3)
+    return np.array([float(x) for x in element.get(attribute, "0 0 0").split()])
+
+
+def _scale(element: ET.Element | None, attribute: str, factor: float) -> None:
+    if element is not None and element.get(attribute) is not None:
+        element.set(attribute, _text(factor * _vector(element, attribute)))
+
+
+def _text(values: NDArray[np.float64]) -> str:
+    # Adding zero turns -0 into 0.
+    return " ".join(f"{value + 0.0:.9g}" for value in values)

@@ -1,0 +1,6 @@
+"""Bodies and robots from a URDF; sole owner of Pinocchio's model."""
+
+from ikns.body.skeleton.robot import Robot
+from ikns.body.skeleton.skeleton import Skeleton
+
+__all__ = ["Robot", "Skeleton"]

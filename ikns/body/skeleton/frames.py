@@ -1,0 +1,136 @@
+"""Link frames seen from the thorax, and how the joints move them: compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from ikns._kernels.body.paths import Paths, place_frames, write_jacobians
+from ikns._kernels.body.tree import Tree
+from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.skeleton.tree import joint_tree
+from ikns.errors import FileError, InvalidInput
+
+__all__ = ["Frames"]
+
+Array = NDArray[np.float64]
+
+
+class Frames:
+    """The links of a model whose joint 0 carries the thorax.
+
+    Parameters
+    ----------
+    model : pin.Model
+        As :func:`ikns.body.skeleton.tree.joint_tree` takes it.
+    """
+
+    def __init__(self, model: pin.Model) -> None:
+        self._model = model
+        self.tree: Tree
+        self.tree, self.turned = joint_tree(model)
+        self.joint_names: tuple[str, ...] = tuple(model.names)[2:]
+        self._known: dict[tuple[tuple[str, ...], tuple[str, ...]], Paths] = {}
+
+    def index(self, link: str) -> int:
+        """Return the number of a link's frame in the model."""
+        # Pinocchio answers an unknown name with the number of frames.
+        index = self._model.getFrameId(link, pin.FrameType.BODY)
+        if index >= self._model.nframes:
+            raise FileError(f"the URDF has no link '{link}'.")
+        return int(index)
+
+    def in_tree(self, link: str) -> tuple[int, Array, Array]:
+        """Joint of the tree that carries a link, and the link's pose in its frame."""
+        frame = self._model.frames[self.index(link)]
+        joint = frame.parentJoint - 1
+        back = self.turned[joint].T
+        pose = frame.placement
+        return joint, back @ pose.rotation, back @ pose.translation
+
+    def place(self, q: ArrayLike, links: Sequence[str]) -> tuple[Array, Array]:
+        """Origins (..., E, 3) m and orientations (..., E, 3, 3) of E links."""
+        angles, batch = self._angles(q)
+        position = np.empty((len(angles), len(links), 3))
+        rotation = np.empty((*position.shape, 3))
+        place_frames(self.paths(tuple(links)), angles, rotation, position)
+        shape = (*batch, *position.shape[1:])
+        return position.reshape(shape), rotation.reshape(*shape, 3)
+
+    def jacobian(self, q: ArrayLike, chain: str, task: str) -> Array:
+        """Jacobians of a chain's hands, (..., k, n)."""
+        hands = tuple(f"{side}_knuckle" for side in chain_sides(chain))
+        return self.jacobian_of(q, hands, chain_joints(chain), task)
+
+    def jacobian_of(
+        self, q: ArrayLike, links: tuple[str, ...], joints: tuple[str, ...], task: str
+    ) -> Array:
+        """Jacobians of links by joints, (..., k, n)."""
+        if task not in ("pose", "position"):
+            raise InvalidInput(f"task must be 'pose' or 'position', not '{task}'.")
+        rows = 6 if task == "pose" else 3
+        angles, batch = self._angles(q)
+        jacobian = np.zeros((len(angles), rows * len(links), len(joints)))
+        write_jacobians(self.paths(links, joints), angles, rows, jacobian)
+        return jacobian.reshape(*batch, *jacobian.shape[1:])
+
+    def swivel(self, q: ArrayLike) -> Array:
+        """Elbow angle about the line from shoulder to wrist, (..., 2) rad."""
+        links = [
+            f"{s}_{link}" for link in ("upper_arm", "forearm", "hand") for s in SIDES
+        ]
+        position = self.place(q, links)[0]
+        position = position.reshape(*position.shape[:-2], 3, len(SIDES), 3)
+        shoulder, elbow, wrist = np.moveaxis(position, -3, 0)
+        lx, ly, lz = np.moveaxis(wrist - shoulder, -1, 0)
+        ex, ey, ez = np.moveaxis(elbow - shoulder, -1, 0)
+        # The direction below the line is -Y less its part along the line; what stands
+        # out sideways is that direction crossed with the line. Both have length
+        # hypot(lx, lz) / |line|, which the ratio does not see.
+        length = np.sqrt(lx * lx + ly * ly + lz * lz)
+        along = (ex * lx + ey * ly + ez * lz) / length**2
+        down = along * ly - ey
+        outward = (ez * lx - ex * lz) / length * [1.0, -1.0]
+        straight = (down == 0) & (outward == 0)
+        return np.where(straight, np.nan, np.arctan2(outward, down))
+
+    def _angles(self, q: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+        """Joint angles as rows, and the shape of the batch."""
+        array, n = np.asarray(q, dtype=np.float64), len(self.joint_names)
+        if not array.ndim or array.shape[-1] not in (n, n + 7):
+            raise InvalidInput(
+                f"expected configurations (..., {n + 7}) or joint angles (..., {n}), "
+                f"found an array {array.shape}."
+            )
+        # A copy, as the kernels are compiled for arrays that can be written.
+        return np.array(array[..., -n:], order="C").reshape(-1, n), array.shape[:-1]
+
+    def paths(self, links: tuple[str, ...], columns: tuple[str, ...] = ()) -> Paths:
+        """Ways from the thorax to the links, made once."""
+        if (links, columns) not in self._known:
+            self._known[links, columns] = self._paths_to(links, columns)
+        return self._known[links, columns]
+
+    def _paths_to(self, links: tuple[str, ...], columns: tuple[str, ...]) -> Paths:
+        tree, ends = self.tree, [self.in_tree(link) for link in links]
+        ways = [self.way(joint) for joint, _, _ in ends]
+        joints = np.array(sum(ways, []), dtype=np.int64)
+        names = [self.joint_names[joint - 1] for joint in joints]
+        column = np.array(
+            [columns.index(name) if name in columns else -1 for name in names],
+            dtype=np.int64,
+        )
+        return Paths(
+            ends=np.cumsum([len(way) for way in ways]),
+            joint=np.stack([tree.kind[joints], joints - 1, column], axis=1),
+            rotation=np.stack([*tree.rotation[joints], *(R for _, R, _ in ends)]),
+            translation=np.stack([*tree.translation[joints], *(p for _, _, p in ends)]),
+        )
+
+    def way(self, joint: int) -> list[int]:
+        """Joints from the thorax to this one, without the thorax's own."""
+        parent = int(self.tree.parent[joint])
+        return [] if parent < 0 else [*self.way(parent), joint]

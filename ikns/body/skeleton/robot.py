@@ -1,0 +1,205 @@
+"""Any robot from its URDF: the joints on the way to one frame, seen from the base.
+
+What is learned and analyzed from a person's arm needs joint angles, a hand and a
+Jacobian, nothing else, so a robot arm does as well.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from ikns._kernels.body.tree import Tree
+from ikns.body.skeleton.frames import Frames
+from ikns.errors import FileError, InvalidInput
+from ikns.numerics.subspace import null_spaces
+
+__all__ = ["Robot"]
+
+Array = NDArray[np.float64]
+
+#: How many of a robot's links an error names.
+_NAMED = 12
+
+
+class Robot:
+    """The kinematics of a robot from its base to one of its links.
+
+    Parameters
+    ----------
+    urdf : str
+        URDF text. Meshes it names are not opened.
+    frame : str
+        The link that does the task.
+
+    Attributes
+    ----------
+    frame : str
+    joint_names : tuple of str
+        The n movable joints from the base to the frame, in this order; all others do
+        not matter and stay out.
+    lower, upper : (n,) array
+        Limits, rad (m for sliding joints); infinite for continuous joints.
+
+    Raises
+    ------
+    FileError
+        When the text is no URDF.
+    InvalidInput
+        When it has no such link, or the way there leads through no joint, or through
+        one that is neither revolute nor sliding.
+
+    Examples
+    --------
+    >>> urdf = '''<robot name="planar"><link name="base"/><link name="arm"/>
+    ...   <joint name="turn" type="continuous"><parent link="base"/>
+    ...   <child link="arm"/><axis xyz="0 0 1"/></joint><link name="tip"/>
+    ...   <joint name="end" type="fixed"><parent link="arm"/><child link="tip"/>
+    ...   <origin xyz="2 0 0"/></joint></robot>'''
+    >>> robot = Robot(urdf, "tip")
+    >>> robot.pose([np.pi / 2])[0].round(6)
+    array([0., 2., 0.])
+    """
+
+    def __init__(self, urdf: str, frame: str) -> None:
+        text, continuous, odd = _with_one_angle_a_joint(urdf)
+        try:
+            model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+        except (ValueError, RuntimeError) as error:
+            raise FileError(f"the URDF cannot be read: {error}") from None
+        links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
+        if frame not in links:
+            more = ", ..." if len(links) > _NAMED else ""
+            raise InvalidInput(
+                f"the robot '{model.name}' has no link '{frame}', but "
+                f"{', '.join(links[:_NAMED])}{more}."
+            )
+        self.frame = frame
+        self._frames = Frames(model)
+        carrier, rotation, translation = self._frames.in_tree(frame)
+        self.end: tuple[int, Array, Array] = (carrier, rotation, translation)
+        way = self._frames.way(carrier)
+        self.joint_names: tuple[str, ...] = tuple(model.names[j + 1] for j in way)
+        unfit = [name for name in self.joint_names if name in odd]
+        if unfit or not way:
+            found = f"joint '{unfit[0]}'" if unfit else "none"
+            raise InvalidInput(
+                f"expected revolute or sliding joints on the way to '{frame}', found "
+                f"{found}."
+            )
+        columns = np.array([model.joints[j + 1].idx_q for j in way])
+        free = np.isin(self.joint_names, list(continuous))
+        self.lower: Array = np.where(free, -np.inf, model.lowerPositionLimit[columns])
+        self.upper: Array = np.where(free, np.inf, model.upperPositionLimit[columns])
+        self._places = np.array(
+            [self._frames.joint_names.index(name) for name in self.joint_names]
+        )
+
+    @classmethod
+    def load(cls, path: str | Path, frame: str) -> Robot:
+        """Read a URDF file.
+
+        Parameters
+        ----------
+        path : str or Path
+        frame : str
+            The link that does the task.
+        """
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(f"{path}: cannot be read as a URDF: {error}") from None
+        return cls(text, frame)
+
+    @property
+    def tree(self) -> Tree:
+        """All joints; joint 0 is a free flyer that carries the base."""
+        return self._frames.tree
+
+    def pose(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Frame seen from the base.
+
+        Parameters
+        ----------
+        q : (..., n) array
+            Joint positions, rad or m.
+
+        Returns
+        -------
+        position : (..., 3) array
+            Meters.
+        rotation : (..., 3, 3) array
+        """
+        position, rotation = self._frames.place(self._all(q), (self.frame,))
+        return position[..., 0, :], rotation[..., 0, :, :]
+
+    def jacobian(self, q: ArrayLike, *, task: str = "pose") -> Array:
+        """Jacobian of the frame seen from the base, (..., 6, n) or (..., 3, n).
+
+        Parameters
+        ----------
+        q : (..., n) array
+            Joint positions, rad or m.
+        task : {"pose", "position"}
+            Rows: linear velocity (m/rad), and for ``"pose"`` angular velocity below.
+        """
+        return self._frames.jacobian_of(
+            self._all(q), (self.frame,), self.joint_names, task
+        )
+
+    def null_spaces(
+        self, q: ArrayLike, *, task: str = "pose", rtol: float = 1e-9
+    ) -> tuple[Array, NDArray[np.int64]]:
+        """Joint motions that leave the frame where it is.
+
+        Returns
+        -------
+        basis : (..., d, n) array
+            Orthonormal rows, see :func:`ikns.numerics.subspace.null_spaces`.
+        rank : (...) integer array
+            Of the Jacobian; -1 where it is not finite.
+        """
+        return null_spaces(self.jacobian(q, task=task), rtol=rtol)
+
+    def _all(self, q: ArrayLike) -> Array:
+        """Positions of all joints, those off the way at zero."""
+        given = np.asarray(q, dtype=np.float64)
+        n = len(self.joint_names)
+        if not given.ndim or given.shape[-1] != n:
+            raise InvalidInput(
+                f"expected positions (..., {n}) of {', '.join(self.joint_names)}, "
+                f"found an array {given.shape}."
+            )
+        every = np.zeros((*given.shape[:-1], len(self._frames.joint_names)))
+        every[..., self._places] = given
+        return every
+
+
+def _with_one_angle_a_joint(urdf: str) -> tuple[str, set[str], set[str]]:
+    """Text whose joints all have one position, and which were continuous or odd.
+
+    Pinocchio holds a continuous joint as cosine and sine; here it is an angle. A
+    floating or planar joint is fixed instead and told of where it matters.
+    """
+    try:
+        robot = ET.fromstring(urdf)
+    except ET.ParseError as error:
+        raise FileError(f"the URDF cannot be read: {error}.") from None
+    continuous, odd = set(), set()
+    for joint in robot.iter("joint"):
+        name, kind = joint.get("name", ""), joint.get("type")
+        if kind == "continuous":
+            continuous.add(name)
+        elif kind in ("floating", "planar"):
+            odd.add(name)
+        else:
+            continue
+        joint.set("type", "revolute")
+        for old in joint.findall("limit"):
+            joint.remove(old)
+        ET.SubElement(joint, "limit", lower="-1", upper="1", effort="1", velocity="1")
+    return ET.tostring(robot, encoding="unicode"), continuous, odd

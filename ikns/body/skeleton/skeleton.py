@@ -1,0 +1,376 @@
+"""The skeleton: a person's URDF and markers; sole owner of Pinocchio's model and data.
+
+A configuration ``q`` is (25,): position of the thorax in the world (m), its unit
+quaternion x, y, z, w, then 18 joint angles (rad) in the order of
+:attr:`Skeleton.joint_names`. Its tangent ``v`` is (24,): linear and angular velocity of
+the thorax in its own frame, then the joint velocities.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from ikns._kernels.body.paths import Paths
+from ikns._kernels.body.tree import Tree
+from ikns.body.anthropometry import Segment, segments
+from ikns.body.chains import SIDES, chain_joints
+from ikns.body.marker_set import MarkerSet
+from ikns.body.model_file import (
+    GENERIC_STATURE,
+    SEGMENTS,
+    Inertial,
+    link_inertials,
+    relative_sizes,
+    resize_urdf,
+    segment_lengths,
+    urdf_folder,
+)
+from ikns.body.skeleton.frames import Frames
+from ikns.body.skeleton.markers import Markers, part_along
+from ikns.errors import FileError, InvalidInput
+from ikns.numerics.subspace import null_spaces
+
+__all__ = ["Skeleton"]
+
+Array = NDArray[np.float64]
+
+#: Columns of `q` and `v` that hold the thorax.
+_NQ_ROOT, _NV_ROOT = 7, 6
+
+
+class Skeleton:
+    """An upper body with markers on it.
+
+    Parameters
+    ----------
+    urdf : str
+        URDF text; the root link is the thorax, which gets a free flyer.
+    marker_set : MarkerSet
+        Markers in link frames.
+
+    Raises
+    ------
+    FileError
+        When the URDF cannot be read or is not an upper body.
+    MarkerMismatch
+        When a marker sits on a link that the URDF does not have.
+    """
+
+    def __init__(self, urdf: str, marker_set: MarkerSet) -> None:
+        try:
+            # Pinocchio's own parser prints to the terminal before it raises.
+            ET.fromstring(urdf)
+            model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+        except (ET.ParseError, ValueError, RuntimeError) as error:
+            raise FileError(f"the URDF cannot be read: {error}") from None
+        self.urdf = urdf
+        self.marker_set = marker_set
+        self._model = model
+        self.joint_names: tuple[str, ...] = tuple(model.names)[2:]
+        needed = {j for side in SIDES for j in chain_joints(f"{side}_arm_clavicle")}
+        needed |= {*SEGMENTS, *(f"{side}_knuckle" for side in SIDES)}
+        bodies = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
+        missing = needed - set(self.joint_names) - bodies
+        if missing or model.nq != _NQ_ROOT + len(self.joint_names):
+            raise FileError(
+                "the URDF is not an upper body of revolute joints: it lacks "
+                f"{', '.join(sorted(missing)) or 'one-angle joints'}."
+            )
+        self.lower: Array = np.array(model.lowerPositionLimit[_NQ_ROOT:])
+        self.upper: Array = np.array(model.upperPositionLimit[_NQ_ROOT:])
+        self._markers = Markers(model, marker_set)
+
+    @classmethod
+    def load(
+        cls, path: str | Path | None = None, *, marker_set: str | Path = "oxford24"
+    ) -> Skeleton:
+        """Read a URDF file; without one, the generic upper body.
+
+        >>> len(Skeleton.load().joint_names)
+        18
+        """
+        file = urdf_folder() / "upper_body.urdf" if path is None else Path(path)
+        try:
+            text = file.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(f"{file}: cannot be read as a URDF: {error}") from None
+        return cls(text, MarkerSet.load(marker_set))
+
+    @classmethod
+    def from_anthropometry(
+        cls,
+        stature: float,
+        mass: float,
+        sex: str,
+        *,
+        marker_set: str | Path = "oxford24",
+    ) -> Skeleton:
+        """Return the body of an average adult of this stature, mass and sex.
+
+        Parameters
+        ----------
+        stature : float
+            Meters.
+        mass : float
+            Kilograms.
+        sex : str
+            "female" or "male".
+        marker_set : str or path
+            What the person wears.
+
+        Examples
+        --------
+        >>> skeleton = Skeleton.from_anthropometry(1.75, 70, "female")
+        >>> round(skeleton.segment_lengths["right_upper_arm"], 3)
+        0.277
+        """
+        return cls.load(marker_set=marker_set).proportioned(
+            segments(stature, mass, sex), stature=stature
+        )
+
+    def proportioned(self, parts: Mapping[str, Segment], *, stature: float) -> Skeleton:
+        """Return a skeleton with a person's segments.
+
+        Parameters
+        ----------
+        parts : mapping
+            As from :func:`ikns.body.anthropometry.segments`.
+        stature : float
+            Meters; sizes the thorax.
+        """
+        lengths = self.segment_lengths
+        factors = {"thorax": stature / GENERIC_STATURE}
+        for name in lengths:
+            factors[name] = parts[name.split("_", 1)[1]].length_m / lengths[name]
+        return self.resized(factors, inertials=link_inertials(self.urdf, parts))
+
+    def resized(
+        self,
+        factors: Mapping[str, float],
+        *,
+        inertials: Mapping[str, Inertial] | None = None,
+    ) -> Skeleton:
+        """Return a skeleton with segments resized; markers keep their place along them.
+
+        Parameters
+        ----------
+        factors : mapping
+            Size factor per segment (see :data:`ikns.body.model_file.SEGMENTS`).
+        inertials : mapping, optional
+            New inertial properties by link name.
+        """
+        urdf = resize_urdf(self.urdf, factors, inertials=inertials)
+        growth = [factors.get(m.link, 1.0) - 1 for m in self.marker_set.markers]
+        positions = self.marker_positions
+        positions += np.array(growth).reshape(-1, 1) * part_along(
+            self.urdf, self.marker_set, positions
+        )
+        return Skeleton(urdf, self.marker_set.at(positions))
+
+    def with_markers(self, marker_set: MarkerSet) -> Skeleton:
+        """Return the same body wearing these markers where the set says."""
+        return Skeleton(self.urdf, marker_set)
+
+    def wearing(self, marker_set: MarkerSet) -> Skeleton:
+        """Return the same body with markers at the nominal places for its size.
+
+        A shipped set's places are those on the generic body; along a longer limb they
+        lie farther apart.
+        """
+        generic = Skeleton.load().urdf
+        sizes = relative_sizes(self.urdf, generic)
+        sized = Skeleton(generic, marker_set).resized(sizes).marker_set
+        return Skeleton(self.urdf, sized)
+
+    def write(self, path: str | Path) -> None:
+        """Write the URDF."""
+        Path(path).write_text(self.urdf, encoding="utf-8")
+
+    @property
+    def segment_lengths(self) -> dict[str, float]:
+        """Joint-to-joint length of each segment, meters."""
+        return segment_lengths(self.urdf)
+
+    @property
+    def marker_positions(self) -> Array:
+        """Markers in their link's frame, (M, 3) m."""
+        return np.array([m.position for m in self.marker_set.markers]).reshape(-1, 3)
+
+    @property
+    def nv(self) -> int:
+        """Dimension of the tangent space, 24 for the upper body."""
+        return int(self._model.nv)
+
+    def neutral(self) -> Array:
+        """Thorax at the world's origin, arms hanging, (25,)."""
+        return np.array(pin.neutral(self._model))
+
+    def integrate(self, q: Array, v: Array) -> Array:
+        """Return the configuration after the tangent step `v` from `q`."""
+        return np.array(pin.integrate(self._model, q, v))
+
+    def difference(self, q0: Array, q1: Array) -> Array:
+        """Return the tangent step that leads from `q0` to `q1`."""
+        return np.array(pin.difference(self._model, q0, q1))
+
+    def columns(self, joints: tuple[str, ...]) -> NDArray[np.int64]:
+        """Columns of the tangent space that belong to these joints."""
+        unknown = [joint for joint in joints if joint not in self.joint_names]
+        if unknown:
+            raise InvalidInput(f"the skeleton has no joint {', '.join(unknown)}.")
+        return np.array([_NV_ROOT + self.joint_names.index(j) for j in joints])
+
+    # --- the body as arrays, for kernels --------------------------------------------
+
+    @property
+    def tree(self) -> Tree:
+        """The joints; joint 0 is the thorax's free flyer."""
+        return self._frames.tree
+
+    @cached_property
+    def tree_markers(self) -> tuple[NDArray[np.int64], Array]:
+        """Each marker's joint in the tree, (M,), and place in its frame, (M, 3) m."""
+        joint = self._markers.joint - 1
+        turned = self._frames.turned[joint]
+        return joint, np.einsum("mji,mj->mi", turned, self._markers.in_joint)
+
+    @cached_property
+    def tree_hands(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """Right and left knuckle frame in the tree.
+
+        Returns
+        -------
+        joint : (2,) integer array
+        rotation : (2, 3, 3) array
+        translation : (2, 3) array
+            The frame's placement in the joint's frame, m.
+        """
+        hands = [self._frames.in_tree(f"{side}_knuckle") for side in SIDES]
+        joint, rotation, translation = zip(*hands, strict=True)
+        return np.array(joint), np.stack(rotation), np.stack(translation)
+
+    def tree_link(self, link: str) -> tuple[int, Array, Array]:
+        """Joint of the tree that carries a link, and the link's pose in its frame.
+
+        Rotation (3, 3) and translation (3,) m.
+        """
+        return self._frames.in_tree(link)
+
+    @cached_property
+    def hand_paths(self) -> Paths:
+        """From the thorax to the right and the left knuckle frame."""
+        return self._frames.paths(tuple(f"{side}_knuckle" for side in SIDES))
+
+    @cached_property
+    def _frames(self) -> Frames:
+        return Frames(self._model)
+
+    # --- markers in the world -------------------------------------------------------
+
+    def markers_in_world(self, q: Array) -> Array:
+        """Marker positions at `q`, (M, 3) m."""
+        return self._markers.place(q)
+
+    def marker_jacobian(self, q: Array) -> tuple[Array, Array]:
+        """Marker positions and their derivative by the tangent of `q`.
+
+        Returns
+        -------
+        positions : (M, 3) array
+            Meters in the world.
+        jacobian : (M, 3, nv) array
+            d position / d v: column j is ``linear_j + angular_j x position`` for the
+            joints between the root and the marker, else zero.
+        """
+        return self._markers.jacobian(q)
+
+    def size_jacobian(self, q: Array) -> tuple[Array, Array]:
+        """Differentiate the marker positions by the body's sizes.
+
+        Returns
+        -------
+        by_size : (M, 3, S) array
+            d position / d log(factor) of each segment of
+            :data:`ikns.body.model_file.SEGMENTS`, m.
+        by_position : (M, 3, 3) array
+            d position / d (marker position in its link): the link's orientation.
+        """
+        along = part_along(self.urdf, self.marker_set, self._markers.in_joint)
+        return self._markers.by_size(q, along)
+
+    # --- the body seen from the thorax ----------------------------------------------
+    #
+    # `q` is one configuration or many, (..., 25), or joint angles alone, (..., 18). NaN
+    # in a configuration comes out as NaN.
+
+    def link_in_thorax(self, q: ArrayLike, link: str) -> tuple[Array, Array]:
+        """Origin of a link, (..., 3) m, and orientation, (..., 3, 3)."""
+        position, rotation = self._frames.place(q, (link,))
+        return position[..., 0, :], rotation[..., 0, :, :]
+
+    def hands_in_thorax(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Right and left knuckle, (..., 2, 3) m, and orientation, (..., 2, 3, 3)."""
+        return self._frames.place(q, [f"{side}_knuckle" for side in SIDES])
+
+    def chain_jacobian(self, q: ArrayLike, chain: str, *, task: str = "pose") -> Array:
+        """Jacobian of a chain's hands in the thorax frame.
+
+        Parameters
+        ----------
+        q : (..., 25) or (..., 18) array
+            Configurations, or joint angles alone.
+        chain : str
+            See :data:`ikns.body.chains.CHAINS`.
+        task : {"pose", "position"}
+            Hand position and orientation, or position alone.
+
+        Returns
+        -------
+        (..., k, n) array
+            Per hand 3 rows of linear velocity (m/rad), then for ``"pose"`` 3 rows of
+            angular velocity (rad/rad); columns in chain order.
+        """
+        return self._frames.jacobian(q, chain, task)
+
+    def null_spaces(
+        self, q: ArrayLike, chain: str, *, task: str = "pose", rtol: float = 1e-9
+    ) -> tuple[Array, NDArray[np.int64]]:
+        """Joint motions of a chain that leave its hands where they are.
+
+        Parameters
+        ----------
+        q, chain, task
+            As :meth:`chain_jacobian` takes them.
+        rtol : float
+            See :func:`ikns.numerics.subspace.null_spaces`, which this returns.
+
+        Returns
+        -------
+        basis : (..., d, n) array
+            Orthonormal rows, below them zeros where others have more.
+        rank : (...) integer array
+            Of the Jacobian; -1 where it is not finite.
+
+        Examples
+        --------
+        >>> skeleton = Skeleton.load()
+        >>> basis, rank = skeleton.null_spaces(np.full((10, 18), 0.3), "right_arm")
+        >>> basis.shape
+        (10, 1, 7)
+        """
+        return null_spaces(self.chain_jacobian(q, chain, task=task), rtol=rtol)
+
+    def swivel(self, q: ArrayLike) -> Array:
+        """Elbow angle about the line from shoulder to wrist, (..., 2) rad.
+
+        Zero with the elbow straight below the line, positive where the elbow is lifted
+        outwards (the right one to the right); NaN for a straight arm.
+        """
+        return self._frames.swivel(q)

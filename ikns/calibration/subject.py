@@ -1,0 +1,250 @@
+"""A calibrated person: body, markers and null-space map, in memory and on disk.
+
+A subject folder is plain text: ``skeleton.urdf``, ``markers.toml``, ``map.json`` and
+``calibration.json``, the last two with a format version, and ``samples.csv`` where the
+still samples of the calibration are known.
+"""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.body.chains import chain_joints
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
+from ikns.errors import FileError, IknsError, InvalidInput, naming
+from ikns.motion.motion import Motion
+from ikns.nullspace.map import NullSpaceMap
+from ikns.output_folder import check_output_folder, output_folder
+
+__all__ = ["FILES", "FORMAT", "Subject"]
+
+#: Version of the folder's layout and of the JSON files in it.
+FORMAT = 1
+_NEEDED = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
+_SAMPLES = "samples.csv"
+#: What a subject folder holds, and nothing else; the last is not needed to use it.
+FILES = (*_NEEDED, _SAMPLES)
+
+#: Columns of the still samples: where the hand was, m in the thorax frame, and to which
+#: PCA point it counts, from 1; 0 to none.
+_COLUMNS = "x_m,y_m,z_m,point"
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What a calibration found out about a person.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The scaled body with its markers.
+    null_space_map : NullSpaceMap
+        Fitted, or from a file.
+    chain : str
+        Joints of the map, see :data:`ikns.body.chains.CHAINS`.
+    report : dict
+        How the calibration went: strings, finite numbers, None, lists and dicts.
+    motions : tuple of Motion
+        The explorations as tracked. They are not saved.
+    samples : (N, 4) array, optional
+        Still samples to draw: x, y, z of the hand, m in the thorax frame, and the PCA
+        point that each counts to, from 1; 0 where it was discarded.
+    """
+
+    skeleton: Skeleton
+    null_space_map: NullSpaceMap
+    chain: str
+    report: dict[str, Any]
+    motions: tuple[Motion, ...] = field(default=(), repr=False)
+    samples: NDArray[np.float64] | None = field(default=None, repr=False)
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Write the subject folder; it appears whole or not at all.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Made when missing; its parent must exist.
+        force : bool
+            Whether to replace a subject folder that exists.
+
+        Raises
+        ------
+        InvalidInput
+            When the folder exists and may not be replaced.
+        FileError
+            When it cannot be written.
+        """
+        check_output_folder(folder, FILES, force=force)
+        with output_folder(folder) as part:
+            self.skeleton.write(part / "skeleton.urdf")
+            self.skeleton.marker_set.write(part / "markers.toml")
+            _write_json(part / "map.json", self._map())
+            _write_json(part / "calibration.json", {"format": FORMAT} | self.report)
+            if self.samples is not None:
+                # A tenth of a millimeter is finer than cameras see.
+                np.savetxt(
+                    part / _SAMPLES,
+                    self.samples,
+                    fmt=["%.4f"] * 3 + ["%d"],
+                    delimiter=",",
+                    header=_COLUMNS,
+                    comments="",
+                )
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Subject:
+        """Read a subject folder.
+
+        Raises
+        ------
+        FileError
+            When a file is missing, damaged or of an unknown version.
+        MarkerMismatch
+            When a marker sits on a link that the URDF does not have.
+        """
+        place = Path(folder)
+        if not place.is_dir():
+            raise FileError(
+                f"{place}: expected a folder that `ikns calibrate` wrote, found "
+                f"{'a file' if place.exists() else 'nothing there'}."
+            )
+        missing = [name for name in _NEEDED if not (place / name).is_file()]
+        if missing:
+            raise FileError(
+                f"{place}: expected a subject folder with {', '.join(_NEEDED)}, found "
+                f"no {', '.join(missing)}."
+            )
+        urdf = place / "skeleton.urdf"
+        worn = MarkerSet.load(place / "markers.toml")
+        with naming(str(urdf)):
+            skeleton = Skeleton(_read_xml(urdf), worn)
+        report = _read_json(place / "calibration.json")
+        del report["format"]
+        table = _read_json(place / "map.json")
+        try:
+            chain = table["chain"]
+            if tuple(table["joints"]) != chain_joints(chain):
+                raise InvalidInput(
+                    f"expected the joints {', '.join(chain_joints(chain))}, found "
+                    f"{', '.join(map(str, table['joints']))}."
+                )
+            points = table["points"]
+            learned = NullSpaceMap.from_arrays(
+                *(
+                    [point[key] for point in points]
+                    for key in ("center_m", "directions", "lower_rad", "upper_rad")
+                ),
+                counts=[int(point["samples"]) for point in points],
+                outside=table["outside"],
+            )
+            learned.radius_ = float(table["radius_m"])
+            if all("mean_rad" in point for point in points):
+                means = np.array([point["mean_rad"] for point in points], dtype=float)
+                if means.shape != learned.directions_[:, 0].shape:
+                    raise InvalidInput("a mean posture needs one entry a joint.")
+                learned.cluster_means_ = means
+            if learned.directions_.shape[2] != len(table["joints"]):
+                raise InvalidInput("a direction needs one entry a joint.")
+        except (LookupError, TypeError, ValueError) as error:
+            fault = f"{error}" if isinstance(error, IknsError) else f"({error!r})."
+            raise FileError(
+                f"{place / 'map.json'}: cannot be read as a null-space map: {fault}"
+            ) from None
+        samples = _read_samples(place / _SAMPLES, n_points=len(learned.centers_))
+        return cls(skeleton, learned, chain, report, samples=samples)
+
+    def _map(self) -> dict[str, Any]:
+        learned = self.null_space_map
+        # A map that was not fitted knows no postures.
+        known = getattr(learned, "cluster_means_", None)
+        means: list[dict[str, Any]] = [{} for _ in learned.centers_]
+        if known is not None:
+            means = [{"mean_rad": mean.tolist()} for mean in known]
+        return {
+            "format": FORMAT,
+            "chain": self.chain,
+            "joints": list(chain_joints(self.chain)),
+            "outside": learned.outside,
+            "radius_m": learned.radius_,
+            "points": [
+                {
+                    "center_m": center.tolist(),
+                    "directions": directions.tolist(),
+                    "lower_rad": lower.tolist(),
+                    "upper_rad": upper.tolist(),
+                    "samples": int(count),
+                }
+                | mean
+                for center, directions, lower, upper, count, mean in zip(
+                    learned.centers_,
+                    learned.directions_,
+                    learned.lower_,
+                    learned.upper_,
+                    learned.counts_,
+                    means,
+                    strict=True,
+                )
+            ],
+        }
+
+
+def _write_json(path: Path, table: dict[str, Any]) -> None:
+    text = json.dumps(table, indent=1, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def _read_xml(path: Path) -> str:
+    # Pinocchio's parser would print what it stumbles over to stderr.
+    try:
+        text = path.read_text(encoding="utf-8")
+        ET.fromstring(text)
+    except (OSError, ValueError, ET.ParseError) as error:
+        raise FileError(f"{path}: cannot be read as XML: {error}.") from None
+    return text
+
+
+def _read_samples(path: Path, *, n_points: int) -> NDArray[np.float64] | None:
+    """Read the still samples; None where a folder has none."""
+    if not path.exists():
+        return None
+    try:
+        header, *rows = path.read_text(encoding="utf-8").splitlines()
+        if header != _COLUMNS:
+            raise InvalidInput(f"the columns {_COLUMNS} were expected, not {header}.")
+        samples = np.array([row.split(",") for row in rows], dtype=np.float64)
+        samples = samples.reshape(-1, 4) if not rows else samples
+        if samples.ndim != 2 or samples.shape[1] != 4 or not np.isfinite(samples).all():
+            raise InvalidInput("four finite numbers were expected in each row.")
+        point = samples[:, 3]
+        if np.any((point % 1 != 0) | (point < 0) | (point > n_points)):
+            raise InvalidInput(f"points 0 to {n_points} were expected.")
+    except (OSError, ValueError) as error:
+        fault = f"{error}" if isinstance(error, IknsError) else f"({error})."
+        raise FileError(
+            f"{path}: cannot be read as still samples: {fault} Nothing needs them but "
+            "pictures: the file can go."
+        ) from None
+    return samples
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise FileError(f"{path}: cannot be read as JSON: {error}.") from None
+    version = table.get("format") if isinstance(table, dict) else None
+    if version != FORMAT:
+        raise FileError(
+            f"{path}: expected format version {FORMAT}, found {version!r}; calibrate "
+            "again or use the version of ikns that wrote it."
+        )
+    return dict(table)

@@ -1,0 +1,105 @@
+"""Doors of the cockpit: every request passes the gate, and pages load nothing else."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from urllib.parse import urlsplit
+
+from tornado.web import RequestHandler
+from tornado.websocket import WebSocketHandler
+
+from ikns.experiments.cockpit.hub import Hub
+
+__all__ = ["FILES", "GuardedSocket", "Page"]
+
+#: What is served, and as what.
+FILES = {
+    "/": ("participant.html", "text/html"),
+    "/panel": ("panel.html", "text/html"),
+    "/cockpit.css": ("cockpit.css", "text/css"),
+    "/link.js": ("link.js", "text/javascript"),
+    "/plot.js": ("plot.js", "text/javascript"),
+    "/hands.js": ("hands.js", "text/javascript"),
+    "/participant.js": ("participant.js", "text/javascript"),
+    "/panel.js": ("panel.js", "text/javascript"),
+}
+
+
+class _Guarded(RequestHandler):
+    def initialize(self, cockpit: Hub) -> None:
+        self.cockpit = cockpit
+
+    def set_default_headers(self) -> None:
+        self.clear_header("Server")
+        for name, value in {
+            "Cache-Control": "no-store",
+            "Cross-Origin-Opener-Policy": "same-origin",
+            "Cross-Origin-Resource-Policy": "same-origin",
+            "Referrer-Policy": "no-referrer",
+            "X-Content-Type-Options": "nosniff",
+            "X-Frame-Options": "DENY",
+        }.items():
+            self.set_header(name, value)
+
+    def prepare(self) -> None:
+        gate = self.cockpit.gate
+        if not gate.knows_host(self.request.headers.get("Host")):
+            self._refuse("this address does not belong to a cockpit")
+        elif not self._has_token():
+            self._refuse("open the address that the command printed")
+
+    def _has_token(self) -> bool:
+        gate = self.cockpit.gate
+        return gate.knows_token(self.get_cookie(gate.cookie))
+
+    def _refuse(self, reason: str) -> None:
+        self.set_status(403)
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(f"Refused: {reason}.\n")
+
+
+class Page(_Guarded):
+    """A file of the cockpit."""
+
+    def prepare(self) -> None:
+        """Exchange a token in the address for a cookie, or pass the gate."""
+        gate, told = self.cockpit.gate, self.get_query_argument("token", None)
+        known = gate.knows_host(self.request.headers.get("Host"))
+        if known and gate.token and told is not None and gate.knows_token(told):
+            self.set_cookie(gate.cookie, gate.token, httponly=True, samesite="Lax")
+            # The token leaves the address bar, and so history and pictures.
+            self.redirect(self.request.path)
+            return
+        super().prepare()
+
+    def get(self) -> None:
+        """Send it."""
+        name, kind = FILES[self.request.path]
+        view = urlsplit(str(self.cockpit.about["view"]))
+        frames = f"{view.scheme}://{view.netloc}" if view.netloc else "'none'"
+        self.set_header(
+            "Content-Security-Policy",
+            "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
+            f"connect-src 'self'; frame-src {frames}; frame-ancestors 'none'; "
+            "base-uri 'none'; form-action 'none'",
+        )
+        self.set_header("Content-Type", f"{kind}; charset=utf-8")
+        self.finish(files("ikns.experiments.cockpit").joinpath(name).read_bytes())
+
+
+class GuardedSocket(_Guarded, WebSocketHandler):
+    """A web socket that only our own pages may open."""
+
+    def prepare(self) -> None:
+        """Pass the gate; whoever does not say that it is our own page may not.
+
+        Tornado asks for the origin in some cases only, which differ by version.
+        """
+        if self.check_origin(self.request.headers.get("Origin")):
+            super().prepare()
+        else:
+            self._refuse("only the cockpit's own pages talk with it")
+
+    def check_origin(self, origin: str | None) -> bool:
+        """Whether a script of our own page asks."""
+        return self.cockpit.gate.same_origin(origin, self.request.headers.get("Host"))

@@ -1,0 +1,198 @@
+"""The recordings folder: every take as C3D, and what was decided about each.
+
+A take is on disk before anybody judges it, so a crash loses the step being recorded and
+nothing else. Takes are never deleted or overwritten.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ikns.errors import FileError, InvalidInput
+from ikns.live.calibration.protocol import Step
+from ikns.live.calibration.verdict import Verdict
+from ikns.recording.files import read, write_c3d
+from ikns.recording.recording import Recording
+
+__all__ = ["RecordingsFolder"]
+
+#: Version of ``protocol.json``.
+FORMAT = 1
+_NAME = "protocol.json"
+
+
+class RecordingsFolder:
+    """Takes and decisions of one live calibration.
+
+    Parameters
+    ----------
+    path : Path
+    settings : dict
+        What must stay the same when it is resumed: text and numbers.
+    resume : bool
+        Go on with a folder that exists.
+
+    Raises
+    ------
+    InvalidInput
+        When the folder exists and is not resumed, or was made with other settings.
+    FileError
+        When there is nothing to resume, or it cannot be read or written.
+    """
+
+    def __init__(
+        self, path: Path, settings: dict[str, Any], *, resume: bool = False
+    ) -> None:
+        self.path = path
+        self._takes: list[dict[str, Any]] = []
+        self._settings = settings
+        if resume:
+            self._open()
+            return
+        if path.exists():
+            raise InvalidInput(
+                f"{path}: recordings are there already; go on with --resume or name "
+                "another folder with --recordings."
+            )
+        if not path.absolute().parent.is_dir():
+            raise InvalidInput(f"{path}: expected an existing folder to write into.")
+        try:
+            path.mkdir()
+        except OSError as error:
+            raise FileError(f"{path}: cannot be made: {error.strerror}.") from None
+        self._write()
+
+    @property
+    def accepted(self) -> dict[str, Path]:
+        """Recording of each accepted step; of several, the last."""
+        return {
+            take["step"]: self.path / take["recording"]
+            for take in self._takes
+            if take["outcome"] == "accepted"
+        }
+
+    def pending(self, steps: Sequence[Step]) -> dict[str, Path]:
+        """Return recordings that were kept but not decided on, by step."""
+        decided = {take["recording"] for take in self._takes}
+        found: dict[str, Path] = {}
+        for step in steps:
+            if step.name not in self.accepted:
+                new = [p for p in self._files(step) if p.name not in decided]
+                found |= {step.name: new[-1]} if new else {}
+        return found
+
+    def keep(self, step: Step, recording: Recording) -> Recording:
+        """Write a take, synced to the disk.
+
+        Returns
+        -------
+        Recording
+            As read back: the numbers that a calibration from the files will see.
+
+        Raises
+        ------
+        FileError, InvalidInput
+            When it cannot be written.
+        """
+        take = len(self._files(step)) + 1
+        path = self.path / f"{step.name}{f'_take_{take}' * (take > 1)}.c3d"
+        write_c3d(path, recording)
+        _sync(path)
+        return read(path)
+
+    def decide(self, step: Step, outcome: str, verdict: Verdict) -> None:
+        """Write down what became of the last take of a step."""
+        files = self._files(step)
+        decided = {take["recording"] for take in self._takes}
+        if not files or files[-1].name in decided:  # nothing was recorded
+            return
+        self._takes.append(
+            {
+                "step": step.name,
+                "recording": files[-1].name,
+                "outcome": outcome,
+                "recommended": "keep" if verdict.keep else "redo",
+                "reason": verdict.reason,
+                "values": _plain(verdict.values),
+            }
+        )
+        self._write()
+
+    @property
+    def takes(self) -> list[dict[str, Any]]:
+        """Every take that was decided on, in that order."""
+        return [dict(take) for take in self._takes]
+
+    def _files(self, step: Step) -> list[Path]:
+        """Return the takes of a step, the first one first."""
+        first = self.path / f"{step.name}.c3d"
+        more = sorted(
+            self.path.glob(f"{step.name}_take_*.c3d"),
+            key=lambda p: int(p.stem.rsplit("_", 1)[-1]),
+        )
+        return [first, *more] if first.exists() else more
+
+    def _open(self) -> None:
+        place = self.path / _NAME
+        try:
+            table = json.loads(place.read_text(encoding="utf-8"))
+            if table["format"] != FORMAT:
+                raise ValueError(f"format {table['format']}")
+            settings, self._takes = table["settings"], table["takes"]
+            self.accepted  # noqa: B018 - a damaged table must show here
+        except FileNotFoundError:
+            raise FileError(
+                f"{self.path}: expected recordings of a live calibration to go on "
+                "with, found none."
+            ) from None
+        except (OSError, ValueError, LookupError, TypeError) as error:
+            raise FileError(
+                f"{place}: cannot be read as a live calibration ({error!r})."
+            ) from None
+        for name, value in self._settings.items():
+            if settings.get(name) != value:
+                raise InvalidInput(
+                    f"{self.path}: was recorded with {name} {settings.get(name)}, "
+                    f"found {value}; resume with the same."
+                )
+        gone = [path for path in self.accepted.values() if not path.is_file()]
+        if gone:
+            raise FileError(f"{gone[0]}: the accepted recording is gone.")
+
+    def _write(self) -> None:
+        place = self.path / _NAME
+        table = {"format": FORMAT, "settings": self._settings, "takes": self._takes}
+        part = place.with_suffix(".part")
+        try:
+            part.write_text(json.dumps(table, indent=1, allow_nan=False) + "\n")
+            _sync(part)
+            part.replace(place)
+            _sync(self.path)
+        except OSError as error:
+            raise FileError(f"{place}: cannot be written: {error.strerror}.") from None
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON holds; a number that is not finite becomes null."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    return value

@@ -1,0 +1,115 @@
+"""The judge of all steps: what accepted steps taught is what later ones are held to."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Skeleton
+from ikns.errors import IknsError, InvalidInput
+from ikns.live.calibration.point_verdict import judge_point
+from ikns.live.calibration.protocol import Step
+from ikns.live.calibration.verdict import Verdict, judge_free, judge_static
+from ikns.recording.recording import Recording
+
+__all__ = ["Judge"]
+
+
+class Judge:
+    """Judge recordings with the settings of the calibration to come.
+
+    Parameters
+    ----------
+    generic : Skeleton
+        Body to start from.
+    marker_set, chain, n_dof, variance, max_hand_speed, min_static, min_still
+        Of :func:`ikns.calibrate`.
+
+    Attributes
+    ----------
+    skeleton : Skeleton or None
+        The person's, once the static trial is accepted.
+    explored : (N, 3) array or None
+        Where the hand went in the free exploration, thorax frame, m.
+    places : dict of str to (3,) array
+        Accepted points, thorax frame, m.
+
+    Raises
+    ------
+    InvalidInput
+        When a setting is out of its range: better now than after the protocol.
+    """
+
+    def __init__(
+        self,
+        generic: Skeleton,
+        *,
+        marker_set: str = "oxford24",
+        chain: str = "right_arm",
+        n_dof: int = 1,
+        variance: float = 0.8,
+        max_hand_speed: float = 0.05,
+        min_static: float = 1.0,
+        min_still: float = 0.5,
+    ) -> None:
+        n = len(chain_joints(chain))
+        for right, sentence in (
+            (1 <= n_dof <= n, f"n_dof between 1 and the {n} joints, found {n_dof}"),
+            (0 < variance <= 1, f"variance above 0 and at most 1, found {variance:g}"),
+            (max_hand_speed > 0, f"max_hand_speed above 0, found {max_hand_speed:g}"),
+            (0 <= min_static < math.inf, f"min_static of 0 s on, found {min_static:g}"),
+            (0 <= min_still < math.inf, f"min_still of 0 s on, found {min_still:g}"),
+        ):
+            if not right:
+                raise InvalidInput(f"expected {sentence}.")
+        self.chain, self.marker_set = chain, marker_set
+        self.skeleton: Skeleton | None = None
+        self.explored: NDArray[np.float64] | None = None
+        self.places: dict[str, NDArray[np.float64]] = {}
+        self._generic, self._min_static = generic, min_static
+        self._n_dof, self._variance = n_dof, variance
+        self._max_hand_speed, self._min_still = max_hand_speed, min_still
+
+    def judge(self, step: Step, recording: Recording | None) -> Verdict:
+        """Say what a recording of a step is good for; None stands for no frames."""
+        if recording is None:
+            return Verdict(False, False, "No frames came.", {})
+        try:
+            return self._judge(step, recording)
+        except (IknsError, np.linalg.LinAlgError) as error:
+            # The person is still there and can do it again.
+            return Verdict(False, False, f"It cannot be judged: {error}", {})
+
+    def accept(self, step: Step, verdict: Verdict) -> None:
+        """Learn from a step that was accepted."""
+        if verdict.skeleton is not None:
+            self.skeleton = verdict.skeleton
+        if verdict.explored is not None:
+            self.explored = verdict.explored
+        if verdict.place is not None:
+            self.places[step.name] = verdict.place
+
+    def _judge(self, step: Step, recording: Recording) -> Verdict:
+        if step.kind == "static":
+            return judge_static(
+                recording,
+                self._generic,
+                marker_set=self.marker_set,
+                min_static=self._min_static,
+            )
+        assert self.skeleton is not None, "the static trial comes first"
+        if step.kind == "free":
+            return judge_free(recording, self.skeleton, chain=self.chain)
+        return judge_point(
+            recording,
+            self.skeleton,
+            chain=self.chain,
+            n_dof=self._n_dof,
+            variance=self._variance,
+            max_hand_speed=self._max_hand_speed,
+            min_still=self._min_still,
+            earlier=self.places,
+        )

@@ -1,0 +1,168 @@
+"""Is a stay at a point good enough? Hand still, elbow moving, and a new place."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.analysis.compare.leak import slopes
+from ikns.body.chains import chain_joints
+from ikns.body.skeleton import Skeleton
+from ikns.calibration import elbow_reference, track_chain
+from ikns.errors import IknsError
+from ikns.live.calibration.measures import (
+    median,
+    millimeters,
+    missing_percent,
+    tracking_fault,
+)
+from ikns.live.calibration.verdict import ONE_PLACE, Verdict
+from ikns.nullspace.map import MapWarning, NullSpaceMap, still
+from ikns.recording.recording import Recording
+
+__all__ = ["judge_point"]
+
+Array = NDArray[np.float64]
+
+#: Least share of samples with the hand still. A virtual person who holds the hand, with
+#: soft tissue and all, has 0.47 at the worst of ten points; a quarter of 5 s is more
+#: than twice what a point needs.
+STEADY_SHARE = 0.25
+#: Least motion along Z, rad: noise of a joint angle is about 0.5 deg, so c would carry
+#: more than 5 % of noise.
+LEAST_RANGE = math.radians(10.0)
+
+
+def judge_point(
+    recording: Recording,
+    skeleton: Skeleton,
+    *,
+    chain: str,
+    n_dof: int = 1,
+    variance: float = 0.8,
+    max_hand_speed: float = 0.05,
+    min_still: float = 0.5,
+    earlier: Mapping[str, Array] | None = None,
+) -> Verdict:
+    """Judge a stay at a point: hand still, elbow moving, one freedom, a new place.
+
+    Directions and ranges come from a map of this one point, the code that the
+    calibration itself uses.
+
+    Parameters
+    ----------
+    recording : Recording
+    skeleton : Skeleton
+        The person's.
+    chain : str
+        See :data:`ikns.body.chains.CHAINS`.
+    n_dof, variance, max_hand_speed, min_still
+        Of :func:`ikns.calibrate`.
+    earlier : mapping of str to (3,) array
+        Points accepted so far, thorax frame, m.
+    """
+    values: dict[str, Any] = {
+        "seconds": len(recording.time) / recording.rate,
+        "missing_percent": missing_percent(recording, skeleton),
+    }
+    try:
+        motion = track_chain(skeleton, recording, chain)
+    except IknsError as error:
+        return Verdict(False, False, str(error), values)
+    gate = still(motion, chain, max_hand_speed=max_hand_speed)
+    known = np.isfinite(motion.hand_speed(chain))
+    steady = gate.sum() / max(1, known.sum())
+    values |= {
+        "still_percent": 100 * float(steady),
+        "samples": int(gate.sum()),
+        "residual_mm": millimeters(median(motion.residual)),
+    }
+    # As in the calibration, which leaves a point with fewer out.
+    enough = max(int(np.ceil(min_still * recording.rate)), len(chain_joints(chain)) + 1)
+    reason = tracking_fault(skeleton, recording, motion, known, chain=chain)
+    if gate.sum() < enough:
+        speed = median(motion.hand_speed(chain))
+        return Verdict(
+            False,
+            False,
+            reason
+            or f"The hand was not steady: {gate.sum()} samples below "
+            f"{max_hand_speed:g} m/s of the {enough} needed, its median speed "
+            f"{speed:.2f} m/s.",
+            values,
+        )
+    x, q = motion.place(chain)[gate], motion.chain_angles(chain)[gate]
+    place = x.mean(axis=0)
+    learned = NullSpaceMap(
+        1,
+        n_dof=n_dof,
+        variance=variance,
+        reference=elbow_reference(
+            skeleton, motion.angles[gate].mean(axis=0), chain, n_dof=n_dof
+        ),
+        min_samples=1,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MapWarning)
+        learned.fit(x, q)
+    width = (learned.upper_ - learned.lower_)[0]
+    c = np.reshape(learned.control_signal(q, x), (len(q), n_dof))
+    known_c = bool(np.isfinite(c).all())  # unless no joint moves at all
+    leak = np.linalg.norm(slopes(c, x), axis=1) if known_c else np.full(n_dof, np.nan)
+    components = int(learned.n_components_[0])
+    values |= {
+        "components": components,
+        "range_deg": np.degrees(width).round(1).tolist(),
+        "leak_mm_per_c": np.round(1e3 * leak, 1).tolist(),
+    }
+    apart = {
+        name: float(np.linalg.norm(place - p)) for name, p in (earlier or {}).items()
+    }
+    near = min(apart, key=lambda name: apart[name]) if apart else ""
+    values["nearest"] = near or None
+    values["nearest_cm"] = 100 * apart[near] if near else None
+    reason = reason or _fault(
+        float(steady), components, n_dof, float(width.min()), float(leak.max()), apart
+    )
+    words = reason or "The hand was steady and the elbow moved."
+    return Verdict(not reason, True, words, values, place=place)
+
+
+def _fault(
+    steady: float,
+    components: int,
+    n_dof: int,
+    width: float,
+    leak: float,
+    apart: Mapping[str, float],
+) -> str:
+    """Say what is wrong first of all; empty where nothing is."""
+    if steady < STEADY_SHARE:
+        return (
+            f"The hand was steady in {100 * steady:.0f} % of the samples only, "
+            f"expected {100 * STEADY_SHARE:.0f} % or more."
+        )
+    if width < LEAST_RANGE:
+        return (
+            f"The elbow hardly moved: {math.degrees(width):.0f} deg along Z, expected "
+            f"at least {math.degrees(LEAST_RANGE):.0f} deg."
+        )
+    if components > n_dof:
+        return (
+            f"It took {components} components, so more moved than the elbow: the hand "
+            "turned or the shoulder went along."
+        )
+    if not leak < ONE_PLACE:
+        return f"The hand went with the elbow, {1e3 * leak:.0f} mm from end to end."
+    for name, distance in sorted(apart.items(), key=lambda item: item[1])[:1]:
+        if distance < ONE_PLACE:
+            return (
+                f"It is the place of {name}, {100 * distance:.0f} cm away, expected at "
+                f"least {100 * ONE_PLACE:.0f} cm."
+            )
+    return ""

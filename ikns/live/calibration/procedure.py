@@ -1,0 +1,238 @@
+"""From a source of frames to accepted recordings: protocol, judge and folder together.
+
+Time is the device's clock while frames come, so a recording played at full speed goes
+through the protocol as the person did; between frames it is this machine's.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
+from ikns.calibration import sight_needs
+from ikns.errors import MarkerMismatch, NotEnoughData, StreamError
+from ikns.live.calibration.clock import DeviceClock
+from ikns.live.calibration.folder import RecordingsFolder
+from ikns.live.calibration.guidance import Outlook, Status
+from ikns.live.calibration.judge import Judge
+from ikns.live.calibration.protocol import Change, Key, LiveProtocol, Step
+from ikns.live.calibration.verdict import Verdict
+from ikns.live.stream import Frame, Source
+from ikns.recording.files import read
+
+__all__ = ["accepted_recordings", "carry_out", "check_labels", "recall"]
+
+#: Called with a change, the verdict where there is one, and where the hand should go.
+OnChange = Callable[[Change, Verdict | None, str], None]
+
+#: Seconds to wait for a frame before looking at the keys again.
+_WAIT = 0.05
+
+
+def check_labels(
+    source: Source, marker_set: str, chain: str, *, generic: Skeleton
+) -> None:
+    """Make sure that every marker of the thorax and of the chain can come.
+
+    Markers of the static trial alone may be missing, and those of an arm that takes no
+    part.
+
+    Raises
+    ------
+    MarkerMismatch
+        With the labels that are missing.
+    """
+    worn = MarkerSet.load(marker_set).without_static()
+    needed = sorted(
+        column
+        for own, _ in sight_needs(generic.wearing(worn), chain).values()
+        for column in own
+    )
+    columns = worn.columns(source.labels)
+    missing = [worn.labels[i] for i in needed if columns[i] < 0]
+    if missing:
+        raise MarkerMismatch(
+            f"{source.name}: expected markers {', '.join(missing)} of {worn.name}, "
+            f"found only {', '.join(source.labels)}."
+        )
+
+
+def recall(judge: Judge, folder: RecordingsFolder, steps: Sequence[Step]) -> None:
+    """Teach the judge what was accepted before."""
+    accepted = folder.accepted
+    for step in steps:
+        if step.name in accepted:
+            judge.accept(step, judge.judge(step, read(accepted[step.name])))
+
+
+def accepted_recordings(
+    folder: RecordingsFolder, steps: Sequence[Step]
+) -> tuple[Path, list[Path]]:
+    """Return the static trial and the points to calibrate from.
+
+    Raises
+    ------
+    NotEnoughData
+        When there is no static trial, or there are fewer points than a map needs: 4,
+        or all where fewer were asked for.
+    """
+    accepted = folder.accepted
+    static = [s for s in steps if s.kind == "static" and s.name in accepted]
+    asked = [s for s in steps if s.kind == "point"]
+    points = [s for s in asked if s.name in accepted]
+    need = min(4, len(asked))
+    if not static or len(points) < need:
+        raise NotEnoughData(
+            f"{folder.path}: expected an accepted static trial and at least {need} "
+            f"accepted points, found {'a' if static else 'no'} static trial and "
+            f"{len(points)} of {len(asked)} points; the recordings stay, so go on with "
+            "--resume."
+        )
+    return accepted[static[0].name], [accepted[step.name] for step in points]
+
+
+def carry_out(
+    source: Source,
+    protocol: LiveProtocol,
+    judge: Judge,
+    folder: RecordingsFolder,
+    *,
+    n_points: int,
+    keys: Callable[[bool], Sequence[Key]] = lambda waiting: (),
+    on_change: OnChange = lambda change, verdict, where: None,
+    on_status: Callable[[Status], None] | None = None,
+    status_every: float = 0.1,
+    patience: float = 10.0,
+) -> None:
+    """Go through the protocol until it is done or stopped.
+
+    Parameters
+    ----------
+    source : Source
+    protocol : LiveProtocol
+        Not begun yet.
+    judge : Judge
+        That knows what was accepted before, see :func:`recall`.
+    folder : RecordingsFolder
+    n_points : int
+        Points in all, for the places to suggest.
+    keys : callable
+        Called with whether only a key goes on; returns the keys that were pressed.
+    on_change : callable
+        Called with every change, the verdict where there is one, and words for where
+        the hand should go.
+    on_status : callable, optional
+        Called with a :class:`Status` about every `status_every` seconds.
+    patience : float
+        Seconds without a frame after which nobody waits any longer where no key could
+        end the wait.
+
+    Raises
+    ------
+    StreamError
+        When the source ends, or falls silent with nobody at the keys.
+    """
+    _Run(source, protocol, judge, folder, n_points, on_change).go(
+        keys, on_status, status_every, patience
+    )
+
+
+class _Run:
+    """State of one way through the protocol."""
+
+    def __init__(
+        self,
+        source: Source,
+        protocol: LiveProtocol,
+        judge: Judge,
+        folder: RecordingsFolder,
+        n_points: int,
+        on_change: OnChange,
+    ) -> None:
+        self._source, self._protocol = source, protocol
+        self._judge, self._folder, self._n_points = judge, folder, n_points
+        self._on_change = on_change
+        self._verdict: Verdict | None = None
+        self._clock = DeviceClock()
+        self._frame: Frame | None = None
+        self._outlook = Outlook(source, judge, n_points)
+
+    def go(
+        self,
+        keys: Callable[[bool], Sequence[Key]],
+        on_status: Callable[[Status], None] | None,
+        status_every: float,
+        patience: float,
+    ) -> None:
+        protocol, source = self._protocol, self._source
+        self._handle(protocol.begin(0.0))
+        shown = -math.inf
+        while not protocol.over:
+            while not protocol.over and (pressed := keys(protocol.waiting)):
+                for key in pressed:
+                    self._handle(protocol.key(key, self._clock.now))
+            if protocol.over:
+                break
+            frame = source.read(_WAIT)
+            self._clock.advance(frame)
+            if frame is not None:
+                self._frame = frame
+                self._handle(protocol.frame(frame, self._clock.now))
+            else:
+                self._handle(protocol.tick(self._clock.now))
+                self._wait(patience)
+            if on_status and not protocol.over:
+                if time.monotonic() - shown >= status_every:
+                    shown = time.monotonic()
+                    silence = self._clock.silence
+                    on_status(self._outlook.status(protocol, self._frame, silence))
+
+    def _wait(self, patience: float) -> None:
+        protocol, source = self._protocol, self._source
+        step = protocol.step.name if protocol.step else "the end"
+        if source.ended and not protocol.waiting and not protocol.over:
+            raise StreamError(
+                f"{source.name}: ended at {step}; what was recorded is in "
+                f"{self._folder.path}, so go on with --resume."
+            )
+        if protocol.auto and self._clock.silence > patience:
+            raise StreamError(
+                f"{source.name}: no frame for {patience:g} s at {step}; what was "
+                f"recorded is in {self._folder.path}, so go on with --resume."
+            )
+        if source.ended:
+            time.sleep(_WAIT)
+
+    def _handle(self, changes: list[Change]) -> None:
+        while changes:
+            change, *changes = changes
+            step = change.step
+            if step is not None and change.what in ("accepted", "redo", "skipped"):
+                if self._verdict is not None:
+                    if change.what == "accepted":
+                        self._judge.accept(step, self._verdict)
+                    self._folder.decide(step, change.what, self._verdict)
+            if change.what == "stopped":
+                self._verdict = None
+            self._on_change(change, self._verdict, self._outlook.where(step))
+            if change.what in ("accepted", "redo", "skipped"):
+                self._verdict = None
+            if change.what == "judging":
+                changes += self._settle(change)
+
+    def _settle(self, change: Change) -> list[Change]:
+        """Keep the take, then judge it: a judge that fails loses nothing."""
+        protocol, step = self._protocol, change.step
+        assert step is not None
+        take = protocol.take
+        if take is not None and not protocol.kept:
+            take = self._folder.keep(step, take)
+        verdict = self._judge.judge(step, take)
+        self._verdict = verdict
+        return protocol.judged(
+            keep=verdict.keep, usable=verdict.usable, now=change.time
+        )

@@ -1,0 +1,195 @@
+"""Is a recording good enough? Asked before the person leaves the cameras.
+
+The limits are named constants: none is in the paper, and each says where it comes from.
+A verdict recommends; the experimenter decides. Points have a file of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
+from ikns.calibration import track_chain
+from ikns.calibration.scaling import scale
+from ikns.errors import IknsError
+from ikns.live.calibration.measures import (
+    SEEN_SHARE,
+    median,
+    millimeters,
+    missing_percent,
+    percent,
+    stray,
+    tracking_fault,
+)
+from ikns.nullspace.clustering import minimum_bounding_box
+from ikns.recording.recording import Recording
+
+__all__ = ["ONE_PLACE", "Verdict", "judge_free", "judge_static"]
+
+Array = NDArray[np.float64]
+
+#: Markers of a person who stands still stray less than markers are misplaced on the
+#: skin (10 mm for most of a set), once the sway of the whole body is taken out, m. Two
+#: real static trials have 0.7 and 1.2 mm, simulated ones 2 to 7 mm.
+STILL_MARKERS = 0.010
+#: A hand that travels farther is not at one place, nor are two points that are nearer
+#: to each other two places, m (a fifth of a small workspace; our choice).
+ONE_PLACE = 0.05
+#: Smallest side of the explored box, m: thinner holds no two layers of points.
+LEAST_BOX = 2 * ONE_PLACE
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What a recording is good for.
+
+    Parameters
+    ----------
+    keep : bool
+        The recommendation.
+    usable : bool
+        Whether a calibration can use it at all.
+    reason : str
+        One sentence.
+    values : dict
+        Numbers behind it by name, units in the names, ready for JSON.
+    place : (3,) array, optional
+        Where the hand was held, thorax frame, m.
+    explored : (N, 3) array, optional
+        Where the hand went, thorax frame, m.
+    skeleton : Skeleton, optional
+        The person's, from the static trial.
+    """
+
+    keep: bool
+    usable: bool
+    reason: str
+    values: dict[str, Any]
+    place: Array | None = field(default=None, repr=False)
+    explored: Array | None = field(default=None, repr=False)
+    skeleton: Skeleton | None = field(default=None, repr=False)
+
+
+def judge_static(
+    recording: Recording,
+    generic: Skeleton,
+    *,
+    marker_set: str,
+    min_static: float = 1.0,
+) -> Verdict:
+    """Judge the static trial: seen, steady, and enough to scale a body.
+
+    Parameters
+    ----------
+    recording : Recording
+    generic : Skeleton
+        Body to start from.
+    marker_set : str
+        What the person wears.
+    min_static : float
+        Shortest trial to accept, s.
+    """
+    worn = MarkerSet.load(marker_set)
+    markers = worn.pick(recording.labels, recording.markers)
+    seen = np.all(np.isfinite(markers), axis=2)
+    never = [m for m, s in zip(worn.labels, seen.any(axis=0), strict=True) if not s]
+    spread = stray(markers)
+    values: dict[str, Any] = {
+        "seconds": len(recording.time) / recording.rate,
+        "markers_seen": len(worn.labels) - len(never),
+        "markers_expected": len(worn.labels),
+        "markers_never_seen": never,
+        "missing_percent": percent(~seen),
+        "spread_mm": millimeters(spread.max(initial=0.0)),
+    }
+    try:
+        skeleton, report = scale(
+            generic, recording, marker_set=marker_set, min_duration=min_static
+        )
+    except IknsError as error:
+        return Verdict(False, False, str(error), values)
+    values["residual_mm"] = millimeters(max(report.residuals.values()))
+    reason = ""
+    if spread.max() > STILL_MARKERS:
+        reason = (
+            f"The person moved: {worn.labels[int(spread.argmax())]} strayed "
+            f"{millimeters(spread.max()):.0f} mm, expected at most "
+            f"{millimeters(STILL_MARKERS):.0f} mm."
+        )
+    elif not report.converged:
+        reason = "The body could not be fitted to the markers."
+    elif lost := _lost(worn, seen.any(axis=0), recording.labels, report.dropped):
+        reason = (
+            f"Never in sight: {', '.join(lost)}; what the static trial does not show "
+            "cannot be used later."
+        )
+    elif np.mean(seen[:, seen.any(axis=0)]) < SEEN_SHARE:
+        reason = f"{values['missing_percent']:.0f} % of the markers were missing."
+    return Verdict(
+        not reason, True, reason or "The person stood still.", values, skeleton=skeleton
+    )
+
+
+def _lost(
+    worn: MarkerSet,
+    seen: NDArray[np.bool_],
+    labels: Sequence[str],
+    dropped: Sequence[str],
+) -> list[str]:
+    """Name markers that the calibration will do without though they may be worn.
+
+    They are of segments of which something was seen, and the recording knows them.
+    """
+    shown = {m.link for m, s in zip(worn.markers, seen, strict=True) if s}
+    return [
+        m.label
+        for m, s in zip(worn.markers, seen, strict=True)
+        if not (s or m.static_only)
+        and m.link in shown
+        and m.label in dropped
+        and {m.label, *m.aliases} & set(labels)
+    ]
+
+
+def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdict:
+    """Judge the free exploration, which only tells where the hand can go.
+
+    Parameters
+    ----------
+    recording : Recording
+    skeleton : Skeleton
+        The person's.
+    chain : str
+        See :data:`ikns.body.chains.CHAINS`.
+    """
+    values: dict[str, Any] = {
+        "seconds": len(recording.time) / recording.rate,
+        "missing_percent": missing_percent(recording, skeleton),
+    }
+    try:
+        motion = track_chain(skeleton, recording, chain)
+    except IknsError as error:
+        return Verdict(False, False, str(error), values)
+    places = motion.place(chain)
+    known = np.all(np.isfinite(places), axis=1)
+    explored = places[known]
+    values["hand_seen_percent"] = percent(known)
+    values["residual_mm"] = millimeters(median(motion.residual))
+    if len(explored) < 4:
+        return Verdict(False, False, "The hand was hardly ever in sight.", values)
+    box = minimum_bounding_box(explored)
+    values["box_cm"] = np.round(200 * box.half_lengths, 1).tolist()
+    reason = tracking_fault(skeleton, recording, motion, known, chain=chain)
+    if not reason and 2 * box.half_lengths.min() < LEAST_BOX:
+        reason = (
+            f"The hand explored a volume only {200 * box.half_lengths.min():.0f} cm "
+            f"thick, expected at least {100 * LEAST_BOX:.0f} cm."
+        )
+    words = reason or "The hand explored a volume."
+    return Verdict(not reason, True, words, values, explored=explored)

@@ -1,0 +1,89 @@
+"""Why a frame does not count: what a person who looks after the markers can act on."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.calibration import say_apart, segment_pairs, sight_needs
+from ikns.live.control.frame import ControlFrame, FrameSolver
+from ikns.live.control.settings import Settings
+
+__all__ = ["explains", "refusal"]
+
+
+def explains(solved: ControlFrame, settings: Settings) -> bool:
+    """Whether a pose explains the markers; without a number nothing is explained."""
+    return (
+        solved.residual <= settings.max_residual
+        and solved.worst_residual <= settings.max_worst_residual
+        and solved.intermarker_error <= settings.max_intermarker_error
+    )
+
+
+def refusal(
+    solver: FrameSolver,
+    settings: Settings,
+    markers: NDArray[np.float64],
+    solved: ControlFrame,
+    *,
+    new: bool,
+) -> str:
+    """Say why a frame does not count; nothing if it does.
+
+    Parameters
+    ----------
+    solver : FrameSolver
+        What solved it.
+    settings : Settings
+    markers : (M, 3) array
+        What was seen, m in the world.
+    solved : ControlFrame
+    new : bool
+        Whether it shows anything new.
+    """
+    if not new:
+        return "the same picture again"
+    if not solved.in_sight:
+        return f"the {_hidden(solver, markers)} is not in sight"
+    if not solved.intermarker_error <= settings.max_intermarker_error:
+        return _apart(solver, markers)
+    if not solved.worst_residual <= settings.max_worst_residual:
+        return _astray(solver, markers, solved)
+    if not solved.residual <= settings.max_residual:
+        return f"no posture fits the markers ({_mm(solved.residual)} off)"
+    if not np.isfinite(solved.c[0]):
+        return "the hand is outside the map"
+    return ""
+
+
+def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
+    seen = np.all(np.isfinite(markers), axis=1)
+    needs = sight_needs(solver.skeleton, solver.chain)
+    hidden = [link for link, (own, need) in needs.items() if seen[own].sum() < need]
+    return ", ".join(hidden).replace("_", " ")
+
+
+def _apart(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
+    """Name the two markers whose distance is farthest off."""
+    pairs, worn = segment_pairs(solver.skeleton, solver.chain)
+    first, second = markers[pairs.T]
+    change = np.linalg.norm(first - second, axis=1) - worn
+    k = int(np.nanargmax(np.abs(change)))
+    return f"{say_apart(solver.skeleton, pairs[k], change[k])} than at calibration"
+
+
+def _astray(
+    solver: FrameSolver, markers: NDArray[np.float64], solved: ControlFrame
+) -> str:
+    """Name the marker that is farthest from where the pose has it."""
+    away = np.linalg.norm(solver.skeleton.markers_in_world(solved.q) - markers, axis=1)
+    needs = sight_needs(solver.skeleton, solver.chain).values()
+    columns = np.concatenate([own for own, _ in needs])
+    marker = columns[int(np.nanargmax(away[columns]))]
+    label = solver.skeleton.marker_set.labels[marker]
+    return f"{label} is {_mm(away[marker])} from where any posture has it"
+
+
+def _mm(meters: float) -> str:
+    return f"{1000 * meters:.0f} mm"

@@ -1,0 +1,8 @@
+"""The live loop: source, pose, signal, finger, session; and again from disk."""
+
+from ikns.live.runtime.loop import run
+from ikns.live.runtime.priority import check_realtime
+from ikns.live.runtime.replay import Replayed, replay_run
+from ikns.live.runtime.report import Report, Status
+
+__all__ = ["Replayed", "Report", "Status", "check_realtime", "replay_run", "run"]

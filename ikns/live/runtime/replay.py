@@ -1,0 +1,101 @@
+"""A run of a session again, from its markers and times, against what it recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.calibration.subject import Subject
+from ikns.errors import FileError
+from ikns.live.control.controller import Controller
+from ikns.live.control.frame import FrameSolver
+from ikns.live.control.settings import Settings
+from ikns.live.session import Run
+from ikns.live.session.channels import STATES
+
+__all__ = ["Replayed", "replay_run"]
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """What a replay computed, and where it differs from what was recorded.
+
+    Parameters
+    ----------
+    c, flexion : (T,) array
+        Raw control signal, and what the finger was asked.
+    state : (T,) integer array
+        Of the safety machine, numbered as in :data:`ikns.live.session.channels.STATES`.
+    different : dict of str to int
+        Frames that differ from the record in any bit, by column.
+    """
+
+    c: NDArray[np.float64]
+    flexion: NDArray[np.float64]
+    state: NDArray[np.int64]
+    different: dict[str, int]
+
+    @property
+    def same(self) -> bool:
+        """Whether every bit is as recorded."""
+        return not any(self.different.values())
+
+
+def replay_run(run: Run) -> Replayed:
+    """Compute c and the commands of a run again.
+
+    Parameters
+    ----------
+    run : Run
+        As from :func:`ikns.live.session.read_run`; the subject and the settings are
+        those that it was made with.
+
+    Returns
+    -------
+    Replayed
+
+    Raises
+    ------
+    FileError
+        When the settings or the subject are missing or damaged.
+    """
+    subject = Subject.load(run.subject_folder)
+    try:
+        settings = Settings(**run.configuration["settings"])
+    except (LookupError, TypeError) as error:
+        raise FileError(
+            f"{run.session}: the configuration of run {run.number} has no settings: "
+            f"{error}."
+        ) from None
+    solver = FrameSolver(subject.skeleton, subject.null_space_map, subject.chain)
+    controller = Controller(solver, settings)
+    machine = controller.machine
+    rows = len(run.frame)
+    c, flexion, state = np.empty(rows), np.empty(rows), np.empty(rows, dtype=np.int64)
+    # The watchdog follows from the times of the frames; what was asked for does not.
+    stops = [onset for onset, _, what, _ in run.events if what == "stop"]
+    machine.arm(0.0)
+    for i in range(rows):
+        made = controller.frame(
+            run.markers[i], float(run.device_time[i]), float(run.receive_time[i])
+        )
+        c[i], flexion[i] = made.solved.c[0], made.flexion
+        state[i] = STATES.index(made.state)
+        if made.valid and made.state == "armed":
+            machine.activate(float(run.receive_time[i]))
+        following = run.receive_time[i + 1] if i + 1 < rows else np.inf
+        while stops and stops[0] < following:
+            machine.stop(stops.pop(0), "recorded")
+    first = "c" if "c" in run.model else "c1"
+    recorded = {
+        "c": (c, run.model[first]),
+        "flexion_asked": (flexion, run.model["flexion_asked"]),
+        "state": (state.astype(float), run.model["state"]),
+    }
+    different = {
+        name: int(np.sum(~((ours == theirs) | (np.isnan(ours) & np.isnan(theirs)))))
+        for name, (ours, theirs) in recorded.items()
+    }
+    return Replayed(c, flexion, state, different)

@@ -1,0 +1,113 @@
+"""Stricter than the BIDS validator: rows match, time runs, nobody is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ikns.errors import FileError
+from ikns.live.session.dataset import next_run, run_files
+from ikns.live.session.reader import Run, read_run, runs
+
+__all__ = ["check_session", "mend_session"]
+
+
+def check_session(session: str | Path) -> list[str]:
+    """Look for what is wrong with a session.
+
+    Parameters
+    ----------
+    session : str or Path
+
+    Returns
+    -------
+    list of str
+        One sentence a finding; none when all is well.
+
+    Raises
+    ------
+    FileError
+        When the folder is no session.
+    """
+    place = Path(session)
+    next_run(place)
+    found = _people(place)
+    for number in runs(place):
+        try:
+            run = read_run(place, number)
+        except FileError as error:
+            found.append(str(error))
+        else:
+            found += [f"run {number}: {finding}" for finding in _findings(run)]
+    if not runs(place):
+        found.append("the session has no run.")
+    return found
+
+
+def mend_session(session: str | Path) -> list[str]:
+    """Cut what a crash left: rows without an end, and rows without their partner.
+
+    Returns
+    -------
+    list of str
+        What was cut, one sentence a file.
+    """
+    place, done = Path(session), []
+    participant, _ = next_run(place)
+    for number in runs(place):
+        files = run_files(place, participant, number)
+        whole = {name: path.read_bytes() for name, path in files.items()}
+        whole = {name: data[: data.rfind(b"\n") + 1] for name, data in whole.items()}
+        rows = min(whole[name].count(b"\n") for name in ("markers", "model"))
+        for name, path in files.items():
+            data = whole[name]
+            if name != "events":
+                data = b"".join(data.splitlines(keepends=True)[:rows])
+            cut = path.stat().st_size - len(data)
+            if cut:
+                with path.open("r+b") as file:
+                    file.truncate(len(data))
+                done.append(f"{path.name}: {cut} bytes cut.")
+    return done
+
+
+def _people(place: Path) -> list[str]:
+    lines = (place / "participants.tsv").read_text("utf-8").splitlines()
+    extra = [column for column in lines[0].split("\t") if column != "participant_id"]
+    if extra:
+        return [f"participants.tsv tells more than a pseudonym: {', '.join(extra)}."]
+    return []
+
+
+def _findings(run: Run) -> list[str]:
+    found = [
+        f"the file of {name} ends within a row ({size} bytes); mend it."
+        for name, size in run.torn.items()
+        if size
+    ]
+    participant = run.participant
+    files = run_files(run.session, participant, run.number)
+    rows = {
+        name: files[name].read_bytes().count(b"\n") for name in ("markers", "model")
+    }
+    if rows["markers"] != rows["model"]:
+        found.append(
+            f"{rows['markers']} rows of markers, but {rows['model']} of the model."
+        )
+    for name in ("device_time", "receive_time"):
+        time = getattr(run, name)
+        if not np.isfinite(time).all():
+            found.append(f"{name} is missing in {np.sum(~np.isfinite(time))} rows.")
+    if not (np.diff(run.receive_time) >= 0).all():
+        found.append("receive_time runs back.")
+    sent = run.model["flexion_sent"]
+    beyond = np.sum((sent < 0) | (sent > 1))
+    if beyond:
+        found.append(f"flexion_sent is outside 0 to 1 in {beyond} rows.")
+    early = [onset for onset, *_ in run.events if not onset >= 0]
+    if early:
+        found.append(f"{len(early)} events have no onset.")
+    if not run.subject_folder.is_dir():
+        found.append("the subject that the run was made with is missing.")
+    return found

@@ -1,0 +1,28 @@
+"""Live sources of markers: a recording, LSL, Qualisys or Vicon, all read alike.
+
+A source is an iterator of frames and a context manager. What went wrong on the way is
+counted (:class:`Continuity`) and told (``events``), never hidden.
+"""
+
+from ikns.live.stream.address import open_source
+from ikns.live.stream.broadcast import Broadcast, broadcast
+from ikns.live.stream.continuity import Continuity, Counts
+from ikns.live.stream.faults import Faults, inject
+from ikns.live.stream.frame import Event, Feed, Frame
+from ikns.live.stream.lsl_outlet import LslOutlet
+from ikns.live.stream.source import Source
+
+__all__ = [
+    "Broadcast",
+    "Continuity",
+    "Counts",
+    "Event",
+    "Faults",
+    "Feed",
+    "Frame",
+    "LslOutlet",
+    "Source",
+    "broadcast",
+    "inject",
+    "open_source",
+]

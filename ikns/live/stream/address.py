@@ -1,0 +1,165 @@
+"""Open a source by its address."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from urllib.parse import parse_qsl
+
+from ikns.body.marker_set import MarkerSet
+from ikns.errors import IknsError, InvalidInput, MarkerMismatch
+from ikns.live.stream import qualisys, vicon
+from ikns.live.stream.frame import Feed
+from ikns.live.stream.lsl_feed import LslFeed
+from ikns.live.stream.replay import Replay
+from ikns.live.stream.source import Source
+from ikns.recording.files import read
+
+__all__ = ["open_source"]
+
+_KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST"
+
+
+def open_source(
+    address: str,
+    *,
+    needs: MarkerSet | None = None,
+    patience: float = 10.0,
+    late_after: float | None = None,
+) -> Source:
+    """Open a live source.
+
+    Parameters
+    ----------
+    address : str
+        ``replay:FILE`` (``?speed=2``, ``?speed=max`` for as fast as frames are read,
+        ``?loop=yes``), ``lsl:NAME`` (``?scope=machine`` to look on this machine only),
+        ``qualisys:HOST`` or ``vicon:HOST`` (``HOST:PORT`` too). A live one also takes
+        ``?timeout=SECONDS``; options are joined by ``&``.
+    needs : MarkerSet, optional
+        Every marker of it that is worn in motion must be among the labels.
+    patience : float
+        Seconds without a frame after which iterating gives up.
+    late_after : float, optional
+        Seconds from which a frame counts as late; one frame period by default.
+
+    Returns
+    -------
+    Source
+
+    Raises
+    ------
+    InvalidInput
+        When the address is wrong.
+    FileError
+        When the file is not a recording.
+    StreamError
+        When the source does not answer, or is not what it should be.
+    MarkerMismatch
+        When a marker of `needs` is missing.
+    """
+    scheme, colon, rest = address.partition(":")
+    place, _, query = rest.rpartition("?") if "?" in rest else (rest, "", "")
+    kind = _KINDS.get(scheme) if colon else None
+    if kind is None:
+        raise InvalidInput(f"unknown source '{address}', expected {_KNOWN}.")
+    open_feed, options_known = kind
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    for option in options:
+        if option not in options_known:
+            raise InvalidInput(
+                f"{address}: unknown option '{option}', expected "
+                f"{' or '.join(options_known)}."
+            )
+    if not place and scheme != "lsl":
+        raise InvalidInput(f"{address}: expected {_KNOWN}.")
+    try:
+        feed = open_feed(place, options)
+    except IknsError as error:
+        if str(error).startswith(tuple(filter(None, (f"{scheme}:", place)))):
+            raise
+        raise type(error)(f"{address}: {error}") from None
+    source = Source(feed, patience=patience, late_after=late_after)
+    try:
+        if needs is not None:
+            _check_labels(source, needs.without_static())
+    except BaseException:
+        source.close()
+        raise
+    return source
+
+
+def _check_labels(source: Source, needs: MarkerSet) -> None:
+    columns = needs.columns(source.labels)
+    missing = [label for label, c in zip(needs.labels, columns, strict=True) if c < 0]
+    if missing:
+        raise MarkerMismatch(
+            f"{source.name}: expected markers {', '.join(missing)}, found only "
+            f"{', '.join(source.labels)}."
+        )
+
+
+Options = dict[str, str]
+
+
+def _replay(path: str, options: Options) -> Feed:
+    speed = options.get("speed", "1")
+    loop = options.get("loop", "no")
+    if loop not in ("", "yes", "no"):
+        raise InvalidInput(f"expected loop=yes or loop=no, found loop={loop}.")
+    return Replay(
+        read(path),
+        speed=0.0 if speed == "max" else _number("speed", speed),
+        loop=loop != "no",
+    )
+
+
+def _lsl(stream: str, options: Options) -> Feed:
+    scope = options.get("scope", "network")
+    if scope not in ("machine", "network"):
+        raise InvalidInput(f"expected scope=machine or network, found scope={scope}.")
+    return LslFeed(stream, timeout=_timeout(options), this_machine=scope == "machine")
+
+
+def _qualisys(host: str, options: Options) -> Feed:
+    return qualisys.QualisysFeed(*_host(host, qualisys.PORT), timeout=_timeout(options))
+
+
+def _vicon(host: str, options: Options) -> Feed:
+    return vicon.ViconFeed(*_host(host, vicon.PORT), timeout=_timeout(options))
+
+
+_KINDS: dict[str, tuple[Callable[[str, Options], Feed], tuple[str, ...]]] = {
+    "replay": (_replay, ("speed", "loop")),
+    "lsl": (_lsl, ("timeout", "scope")),
+    "qualisys": (_qualisys, ("timeout",)),
+    "vicon": (_vicon, ("timeout",)),
+}
+
+
+def _host(text: str, port: int) -> tuple[str, int]:
+    """Split host and port; an IPv6 address with a port stands in brackets.
+
+    >>> _host("10.0.0.5", 801), _host("[fe80::1]:802", 801), _host("fe80::1", 801)
+    (('10.0.0.5', 801), ('fe80::1', 802), ('fe80::1', 801))
+    """
+    host, colon, number = text.rpartition(":")
+    bracketed = host.startswith("[") and host.endswith("]")
+    if not colon or (":" in host and not bracketed):
+        return text.strip("[]"), port
+    if not (number.isascii() and number.isdigit() and 0 < int(number) < 65536):
+        raise InvalidInput(f"expected a port from 1 to 65535, found '{number}'.")
+    return host.strip("[]"), int(number)
+
+
+def _timeout(options: Options) -> float:
+    seconds = _number("timeout", options.get("timeout", "5"))
+    if not 0 < seconds < 1e6:
+        raise InvalidInput(f"expected a timeout above 0 s, found {seconds:g}.")
+    return seconds
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InvalidInput(f"expected a number for {name}, found '{text}'.") from None

@@ -1,9 +1,0 @@
-"""Marker inverse kinematics: the joint angles that put markers where they were seen.
-
-The formula is in `solver`; `reference` solves it plainly, `kernel` compiled.
-"""
-
-from ikns.marker_ik.pose import LIMIT, PRIOR, Pose
-from ikns.marker_ik.solver import MarkerIK
-
-__all__ = ["LIMIT", "PRIOR", "MarkerIK", "Pose"]

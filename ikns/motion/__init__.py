@@ -1,0 +1,1 @@
+"""Joints over time: marker inverse kinematics, and reported joint angles."""

@@ -1,0 +1,180 @@
+"""Marker inverse kinematics: the joint angles that put markers where they were seen.
+
+Each frame minimizes, over the configuration q,
+
+    sum over seen markers weight_m |p_m(q) - seen_m|^2         marker distances, m^2
+    + (PRIOR |q - q_before|)^2                        weak pull to the pose before
+    + (LIMIT max(0, lower - q, q - upper))^2          soft joint limits
+
+A marker that was not seen weighs nothing; what no marker shows stays where it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.body.skeleton import Skeleton
+from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.motion.marker_ik.kernel import KernelSolver
+from ikns.motion.marker_ik.pose import MAX_ITERATIONS, STEP_TOLERANCE, Frames, Pose
+from ikns.motion.marker_ik.reference import ReferenceSolver
+from ikns.motion.motion import Motion
+from ikns.numerics.derivative import slope
+from ikns.recording.recording import Recording
+
+__all__ = ["MarkerIK"]
+
+Array = NDArray[np.float64]
+
+#: Frames between two reports of progress: milliseconds when compiled.
+_CHUNK = 500
+
+
+class MarkerIK:
+    """Solve for joint angles, frame by frame, each starting from the one before.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Body and markers; static-only markers weigh nothing.
+    max_iterations : int
+        Steps per frame.
+    tolerance : float
+        A frame has converged when no joint moves more than this in a step, rad and m.
+    compiled : bool
+        The plain solver finds the same minimum a hundred times as slowly; it is what
+        the compiled one is checked against.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        *,
+        max_iterations: int = MAX_ITERATIONS,
+        tolerance: float = STEP_TOLERANCE,
+        compiled: bool = True,
+    ) -> None:
+        if max_iterations < 1 or not tolerance > 0:
+            raise InvalidInput(
+                "expected at least one iteration and a tolerance above 0, found "
+                f"{max_iterations} and {tolerance:g}."
+            )
+        self.skeleton = skeleton
+        self.max_iterations = max_iterations
+        self.tolerance = tolerance
+        self.held = skeleton.marker_set.held
+        worn = skeleton.marker_set.markers
+        self._tracked = np.array([not marker.static_only for marker in worn])
+        self._markers_shape = (len(worn), 3)
+        self._pose_shape = (7 + len(skeleton.joint_names),)
+        self.solver = (KernelSolver if compiled else ReferenceSolver)(
+            skeleton, max_iterations=max_iterations, tolerance=tolerance
+        )
+
+    def solve(self, markers: ArrayLike, q: Array | None = None) -> Pose:
+        """Solve one frame.
+
+        Parameters
+        ----------
+        markers : (M, 3) array
+            Positions in the world (m) in the order of the skeleton's marker set; NaN
+            where not seen.
+        q : (nq,) array, optional
+            The pose before; without it the solver starts from scratch.
+
+        Returns
+        -------
+        Pose
+            With every marker gone it is the pose before, residual NaN, not converged.
+        """
+        seen = np.ascontiguousarray(markers, dtype=np.float64)
+        if seen.shape != self._markers_shape:
+            raise InvalidInput(
+                f"expected markers {self._markers_shape}, found {seen.shape}."
+            )
+        if q is not None:
+            q = np.ascontiguousarray(q, dtype=np.float64)
+            if q.shape != self._pose_shape:
+                raise InvalidInput(
+                    f"expected a pose {self._pose_shape}, found {q.shape}."
+                )
+        pose = self.solver.solve(seen, q)
+        if pose.iterations < 0:
+            raise InvalidInput(
+                "marker positions must be finite or NaN, found infinity."
+            )
+        if pose.residual == np.inf:
+            raise InvalidInput("the pose before must be finite, found NaN or infinity.")
+        return pose
+
+    def track(
+        self,
+        recording: Recording,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Motion:
+        """Solve a whole recording.
+
+        Parameters
+        ----------
+        recording : Recording
+            Any recording that holds at least three of the skeleton's markers.
+        progress : callable, optional
+            Called with (frames done, frames in all).
+
+        Raises
+        ------
+        MarkerMismatch
+            When fewer than three of the skeleton's markers are in the recording.
+        """
+        marker_set = self.skeleton.marker_set
+        known = (marker_set.columns(recording.labels) >= 0) & self._tracked
+        if known.sum() < 3:
+            raise MarkerMismatch(
+                f"{recording.source}: expected markers of {marker_set.name} "
+                f"({', '.join(marker_set.labels[:4])}, ...), found "
+                f"{', '.join(recording.labels[:4])}, ...; name the right marker set."
+            )
+        markers = np.ascontiguousarray(
+            marker_set.pick(recording.labels, recording.markers), dtype=np.float64
+        )
+        n = len(markers)
+        # Start where most markers are seen, then go both ways.
+        visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
+        start = int(np.argmax(visible))
+        first = self.solve(markers[start])
+        frames = Frames.empty(n, len(first.q))
+        frames.put(start, first)
+        done = 1
+        for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
+            for at in range(begin, end, way * _CHUNK):
+                stop = min(at + _CHUNK, n) if way == 1 else max(at - _CHUNK, -1)
+                self.solver.solve_many(markers, at, stop, way, frames)
+                done += abs(stop - at)
+                if progress is not None:
+                    progress(done, n)
+        return self._motion(recording.time, frames)
+
+    def _motion(self, time: Array, frames: Frames) -> Motion:
+        """Add hands, and velocities by :func:`ikns.numerics.derivative.slope`."""
+        skeleton, q = self.skeleton, frames.q
+        position, rotation = skeleton.hands_in_thorax(q)
+        steps = np.zeros((len(q), skeleton.nv))
+        for i in range(1, len(q)):
+            steps[i] = skeleton.difference(q[i - 1], q[i])
+        return Motion(
+            time=np.array(time),
+            q=q,
+            v=slope(np.cumsum(steps, axis=0), time),
+            joint_names=skeleton.joint_names,
+            hand_in_thorax=position,
+            hand_rotation_in_thorax=rotation,
+            hand_velocity_in_thorax=slope(position, time),
+            residual=frames.residual,
+            iterations=frames.iterations,
+            converged=frames.converged,
+            held=self.held,
+        )

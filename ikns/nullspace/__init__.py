@@ -1,0 +1,1 @@
+"""The null space learned from samples: clustering, interpolation, the map."""

@@ -1,0 +1,45 @@
+"""How large the faces between Voronoi cells look from their sites."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns._kernels.voronoi import faces
+from ikns.nullspace.interpolation.voronoi import Voronoi
+
+__all__ = ["solid_angles"]
+
+Floats = NDArray[np.float64]
+
+
+def solid_angles(diagram: Voronoi, points: Floats) -> Floats:
+    """How much of site i's view the face that it shares with site j fills.
+
+    Diagonals of co-spherical sites are chosen by chance or by rounding; their polygons
+    have no area, or hardly any, or they are far away. This tells them from the others
+    on any scale.
+
+    Parameters
+    ----------
+    diagram : Voronoi
+    points : (N, 3) array
+        The sites that it was built from.
+
+    Returns
+    -------
+    (E,) array
+        Steradian, to about 1e-15; the whole view is 4 pi.
+    """
+    d = diagram
+    return faces.solid_angles(
+        points,
+        d.corner + points[d.simplices[:, 0]],
+        d.normal,
+        d.edges,
+        d.axis,
+        d.side_facet,
+        d.side_edge,
+        d.entering,
+        d.leaving,
+    )

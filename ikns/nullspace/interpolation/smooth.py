@@ -1,0 +1,108 @@
+"""Sibson's smooth interpolant: his weights and tangent planes at the sites.
+
+The formula, and its source, are in ikns._kernels.voronoi.query.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.errors import InvalidInput
+from ikns.nullspace.interpolation.domain import Domain
+
+__all__ = ["slopes", "smooth_values"]
+
+Floats = NDArray[np.float64]
+
+
+def slopes(
+    space: Domain, view: Floats, values: Floats | None, gradients: ArrayLike | None
+) -> Floats:
+    """Gradients at the sites: those that are given, or estimated from the values.
+
+    Parameters
+    ----------
+    space : Domain
+    view : (E,) array
+        How large the faces of edges look from their sites.
+    values : (N, ...) array
+    gradients : (N, ..., 3) array, optional
+        Per m.
+
+    Returns
+    -------
+    (N, M, 3) array
+        Per scaled unit of length.
+    """
+    if values is None:
+        raise InvalidInput("method 'sibson_c1' needs values.")
+    if gradients is None:
+        return _estimated(space, view, values.reshape(len(values), -1))
+    given = np.array(gradients, dtype=np.float64)
+    if given.shape != (*values.shape, 3):
+        raise InvalidInput(
+            f"expected gradients of shape {(*values.shape, 3)}, one for each value, "
+            f"found {given.shape}."
+        )
+    if not np.isfinite(given).all():
+        raise InvalidInput("all gradients must be finite, found NaN or infinity.")
+    return given.reshape(len(values), -1, 3) / space.scale
+
+
+def _estimated(space: Domain, view: Floats, values: Floats) -> Floats:
+    """Slopes of the planes through the sites that are nearest to their neighbors.
+
+    In the mean of squares, each weighted with how large the neighbor's face looks over
+    its squared distance. So values that are linear in space have their own gradients.
+    """
+    edges = space.diagram.edges
+    mine = np.concatenate([edges[:, 0], edges[:, 1]])
+    other = np.concatenate([edges[:, 1], edges[:, 0]])
+    way = space.sites[other] - space.sites[mine]
+    seen = np.tile(view.clip(0, None), 2)
+    trust = np.sqrt(seen / (way**2).sum(axis=1))[:, None]
+    way, rise = trust * way, trust * (values[other] - values[mine])
+    order, neighbors = np.argsort(mine, kind="stable"), np.bincount(mine)
+    first = np.cumsum(neighbors) - neighbors
+    found = np.empty((len(neighbors), values.shape[1], 3))
+    for count in np.unique(neighbors):
+        sites = np.flatnonzero(neighbors == count)
+        rows = order[first[sites, None] + np.arange(count)]
+        found[sites] = (np.linalg.pinv(way[rows]) @ rise[rows]).transpose(0, 2, 1)
+    return found
+
+
+def smooth_values(
+    space: Domain, places: Floats, weights: Floats, values: Floats, gradients: Floats
+) -> Floats:
+    """Sibson's Z1.
+
+    Parameters
+    ----------
+    space : Domain
+    places : (Q, 3) array
+        Queries, scaled.
+    weights : (Q, N) array
+        Sibson's weights there.
+    values : (N, M) array
+    gradients : (N, M, 3) array
+        Per scaled unit of length.
+
+    Returns
+    -------
+    (Q, M) array
+    """
+    p = space.sites - places[:, None]
+    distance = np.linalg.norm(p, axis=2)
+    one_site = (weights == 1).any(axis=1)
+    distance[one_site] = 1
+    plain = weights @ values
+    near = weights / distance
+    nearness = near.sum(axis=1)
+    alpha = (weights * distance).sum(axis=1) / nearness
+    beta = (weights * distance**2).sum(axis=1)
+    rise = np.einsum("qn,nmk,qnk->qm", near, gradients, p)
+    tangents = (near @ values - rise) / nearness[:, None]
+    share = np.where(one_site, 0, beta / (alpha + beta))[:, None]
+    return (1 - share) * plain + share * tangents

@@ -1,0 +1,12 @@
+"""The null-space map: learned from still samples or computed from the Jacobian.
+
+The method is in `estimator`, read top to bottom; the signs that it needs in
+`alignment`, the gate in `samples`, the map without learning in `analytic`.
+"""
+
+from ikns.nullspace.map.analytic import analytic_map
+from ikns.nullspace.map.checks import MapWarning
+from ikns.nullspace.map.estimator import NullSpaceMap
+from ikns.nullspace.map.samples import null_space_samples, still
+
+__all__ = ["MapWarning", "NullSpaceMap", "analytic_map", "null_space_samples", "still"]

@@ -1,0 +1,129 @@
+"""Agreeing signs: principal components have none of their own, a robot needs one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.numerics.subspace import largest_entry_positive
+
+__all__ = ["align", "spanning_tree"]
+
+Floats = NDArray[np.float64]
+
+
+def spanning_tree(
+    strength: Floats, edges: NDArray[np.int64], root: int
+) -> list[tuple[int, int]]:
+    """Maximum spanning tree of a connected graph, grown from its root (Prim 1957).
+
+    Parameters
+    ----------
+    strength : (E,) array
+        How strongly each edge ties its ends.
+    edges : (E, 2) integer array
+        Pairs of nodes.
+    root : int
+
+    Returns
+    -------
+    list of (parent, child)
+        In the order of growth, so each parent is the root or an earlier child.
+    """
+    tree: list[tuple[int, int]] = []
+    reached = np.zeros(edges.max(initial=root) + 1, dtype=bool)
+    reached[root] = True
+    while True:
+        crossing = reached[edges[:, 0]] != reached[edges[:, 1]]
+        if not crossing.any():
+            return tree
+        a, b = edges[np.where(crossing, strength, -np.inf).argmax()]
+        parent, child = (a, b) if reached[a] else (b, a)
+        tree.append((int(parent), int(child)))
+        reached[child] = True
+
+
+def align(
+    components: Sequence[Floats],
+    weights: Sequence[Floats],
+    *,
+    n_dof: int,
+    edges: NDArray[np.int64],
+    root: int,
+    reference: Floats | None = None,
+) -> tuple[Floats, list[tuple[int, int]]]:
+    """Directions of all points with agreeing signs.
+
+    For one degree of freedom a direction is the normalized sum of the point's
+    components, each times its weight and the sign that agrees with the point before it
+    in the tree; for d degrees of freedom it is the point's d components, turned within
+    their span to agree best with the point before (orthogonal Procrustes, Schoenemann
+    1966). The tree grows from `root`, which follows the reference, along the edges
+    whose ends agree best: by the smallest cosine between the spans of their `n_dof`
+    leading components.
+
+    Parameters
+    ----------
+    components : sequence of P (k_i, n) arrays
+        Orthonormal rows, leading one first; at least `n_dof`, or none where nothing is
+        known.
+    weights : sequence of P (k_i,) arrays
+        Used for one degree of freedom.
+    n_dof : int
+        Degrees of freedom d.
+    edges : (E, 2) integer array
+        Neighbors, as a connected graph.
+    root : int
+        Where to begin.
+    reference : (d, n) array, optional
+        The sum of all directions has a positive product with it, row by row. Without
+        it the entry of largest magnitude of that sum is positive.
+
+    Returns
+    -------
+    directions : (P, d, n) array
+        Orthonormal rows for each point, zeros where it has no components.
+    tree : list of (parent, child)
+    """
+    known = np.array([len(rows) > 0 for rows in components])
+    components = [largest_entry_positive(rows) for rows in components]
+    leading = np.zeros((len(components), n_dof, components[root].shape[1]))
+    for k in np.flatnonzero(known):
+        leading[k] = components[k][:n_dof]
+    overlap = leading[edges[:, 0]] @ np.swapaxes(leading[edges[:, 1]], 1, 2)
+    strength = np.linalg.svd(overlap, compute_uv=False).min(axis=1, initial=1.0)
+    tree = spanning_tree(strength, edges, root)
+
+    def toward(k: int, target: Floats) -> Floats:
+        if not known[k]:
+            return target  # hand on the sign to those behind
+        if n_dof > 1:
+            return _procrustes(leading[k], target)
+        sign = np.where(components[k] @ target[0] < 0, -1.0, 1.0)
+        direction = (sign * weights[k]) @ components[k]
+        return (direction / np.linalg.norm(direction))[None]
+
+    directions = np.zeros_like(leading)
+    # Without a reference every component of the root keeps its largest entry positive.
+    first = components[root].sum(axis=0)[None] if n_dof == 1 else leading[root]
+    directions[root] = toward(root, first if reference is None else reference)
+    for parent, child in tree:
+        directions[child] = toward(child, directions[parent])
+    directions[~known] = 0.0
+    total = directions.sum(axis=0)
+    if reference is None:
+        flip = np.where((largest_entry_positive(total) == total).all(axis=1), 1.0, -1.0)
+        return directions * flip[:, None], tree
+    return _turn(total, reference) @ directions, tree
+
+
+def _turn(rows: Floats, target: Floats) -> Floats:
+    """Orthogonal (d, d) matrix that turns rows (d, n) to agree best with the target."""
+    u, _, vt = np.linalg.svd(target @ rows.T)
+    return u @ vt
+
+
+def _procrustes(rows: Floats, target: Floats) -> Floats:
+    return _turn(rows, target) @ rows

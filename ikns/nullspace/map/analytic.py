@@ -1,0 +1,108 @@
+"""The map without learning: the null space of the Jacobian where the arm has been."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.motion.motion import Motion
+from ikns.nullspace.clustering import nearest_center
+from ikns.nullspace.map.assembly import assemble
+from ikns.nullspace.map.checks import at, checked_settings
+from ikns.nullspace.map.estimator import NullSpaceMap
+from ikns.nullspace.map.interpolator import between
+from ikns.nullspace.map.samples import null_space_samples, still
+from ikns.numerics.subspace import mean_null_direction
+
+if TYPE_CHECKING:
+    from ikns.body.skeleton import Skeleton
+
+__all__ = ["analytic_map"]
+
+
+def analytic_map(
+    skeleton: Skeleton,
+    motion: Motion,
+    centers: ArrayLike,
+    *,
+    chain: str = "right_arm",
+    task: Literal["pose", "position"] = "pose",
+    max_hand_speed: float = 0.05,
+    min_duration: float = 0.0,
+    radius: float | None = None,
+    **parameters: Any,
+) -> NullSpaceMap:
+    """Map of the null spaces that the Jacobian has where the arm has been.
+
+    At each center Z is the null space of the chain's Jacobian averaged over the visited
+    postures (:func:`ikns.numerics.subspace.mean_null_direction`): those of the still
+    samples that are nearest to this center. m and M are the ends of ``Z @ q`` over the
+    same samples, and signs agree as in a learned map.
+
+    Where the null space has more dimensions than `n_dof` (seven joints that hold the
+    position alone have four), Z is what varies least between postures, whether or not
+    the arm moved that way; a :class:`MapWarning` then tells of neighbors that disagree.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Owner of the Jacobian.
+    motion : Motion
+        What the arm did.
+    centers : (P, 3) array
+        PCA points, m; those of a learned map to compare with it.
+    chain : str
+        See :data:`ikns.body.chains.CHAINS`.
+    task : {"pose", "position"}
+        What is held: hand position and orientation, or position alone.
+    max_hand_speed, min_duration : float
+        See :func:`ikns.nullspace.map.still`, m/s and s.
+    radius : float, optional
+        Samples farther from their center are left out, m; the ``radius_`` of a learned
+        map to use its samples. Default as in
+        :func:`ikns.nullspace.clustering.nearest_center`.
+    **parameters
+        Of :class:`NullSpaceMap`: `n_dof`, `quantiles`, `outside`, `reference`.
+
+    Returns
+    -------
+    NullSpaceMap
+        With all centers in use, in their order.
+
+    Raises
+    ------
+    InvalidInput
+        When a parameter is out of its range.
+    NotEnoughData
+        When a center has no still sample, or the centers lie in a plane.
+    """
+    places = np.asarray(centers, dtype=np.float64)
+    if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
+        raise InvalidInput(f"expected finite centers (P, 3), found {places.shape}.")
+    gate = {"max_hand_speed": max_hand_speed, "min_duration": min_duration}
+    x, q = null_space_samples(motion, chain, **gate)
+    visited = motion.q[still(motion, chain, **gate)]
+    made = NullSpaceMap(len(places), **parameters)
+    settings = checked_settings(made, q.shape)
+    labels, _ = nearest_center(x, places, radius=radius)
+    rows = [np.flatnonzero(labels == k) for k in range(len(places))]
+    for k, r in enumerate(rows):
+        if not r.size:
+            raise NotEnoughData(
+                f"expected still samples at the point {at(places, k)} m, found none."
+            )
+    jacobians = skeleton.chain_jacobian(visited, chain, task=task)
+    spans = [mean_null_direction(jacobians[r], settings.n_dof)[0] for r in rows]
+    arrays = assemble(
+        places,
+        spans,
+        [np.ones(settings.n_dof)] * len(places),
+        [q[r] for r in rows],
+        settings=settings,
+        edges=between(places, made.outside).edges,
+    )
+    counts = np.array([r.size for r in rows])
+    return NullSpaceMap.from_arrays(places, *arrays, counts=counts, **parameters)

@@ -1,0 +1,115 @@
+"""From each point's components to directions with agreeing signs and their ranges."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.nullspace.map.alignment import align
+from ikns.nullspace.map.checks import MapWarning, Settings, at
+
+__all__ = ["assemble"]
+
+Floats = NDArray[np.float64]
+
+# Directions more than 60 degrees apart say little about each other's sign.
+_WEAK = 0.5
+# A reference within 6 degrees of orthogonal would turn its verdict with a little noise.
+_INDIFFERENT = 0.1
+
+
+def assemble(
+    centers: Floats,
+    components: Sequence[Floats],
+    weights: Sequence[Floats],
+    samples: Sequence[Floats],
+    *,
+    settings: Settings,
+    edges: NDArray[np.int64],
+) -> tuple[Floats, Floats, Floats]:
+    """Directions and ranges of all points.
+
+    Parameters
+    ----------
+    centers : (P, 3) array
+        Where the points are, m.
+    components : sequence of P (k_i, n) arrays
+        Orthonormal rows, leading one first; none where no joint moves.
+    weights : sequence of P (k_i,) arrays
+        Weight of each component in the sum, for one degree of freedom.
+    samples : sequence of P (N_i, n) arrays
+        Joint vectors at each point, rad.
+    settings : Settings
+    edges : (E, 2) integer array
+        Which points are neighbors, as a connected graph.
+
+    Returns
+    -------
+    directions : (P, d, n) array
+    lower, upper : (P, d) arrays
+        Quantiles of the projections of the samples, which are not centered, rad.
+
+    Warns
+    -----
+    MapWarning
+        When neighbors disagree or the reference decides nothing.
+    """
+    sizes = [
+        len(q) * (len(rows) > 0) for q, rows in zip(samples, components, strict=True)
+    ]
+    directions, tree = align(
+        components,
+        weights,
+        n_dof=settings.n_dof,
+        edges=edges,
+        root=int(np.argmax(sizes)),
+        reference=settings.reference,
+    )
+    _warn_of_disagreement(centers, directions, tree, edges)
+    if settings.reference is not None:
+        _warn_of_indifference(directions, settings.reference)
+    ends = [
+        np.quantile(q @ z.T, settings.quantiles, axis=0)
+        for q, z in zip(samples, directions, strict=True)
+    ]
+    return directions, *np.swapaxes(ends, 0, 1)
+
+
+def _warn_of_disagreement(
+    centers: Floats,
+    directions: Floats,
+    tree: Sequence[tuple[int, int]],
+    edges: NDArray[np.int64],
+) -> None:
+    """Name neighbors that are almost orthogonal, or opposed in spite of the tree."""
+    weak = []
+    both = np.abs(directions[edges]).max(axis=(2, 3)).all(axis=1)
+    for i, j in edges[both].tolist():
+        cosine = float((directions[i] * directions[j]).sum(axis=1).min())
+        least = _WEAK if (i, j) in tree or (j, i) in tree else 0.0
+        if cosine < least:
+            weak.append(f"{at(centers, i)} and {at(centers, j)} (cosine {cosine:.2f})")
+    if weak:
+        warnings.warn(
+            "the directions of neighboring points differ so much that their signs, and "
+            f"c between them, are uncertain: {'; '.join(weak)}.",
+            MapWarning,
+            stacklevel=4,
+        )
+
+
+def _warn_of_indifference(directions: Floats, reference: Floats) -> None:
+    """Say so when the reference is almost orthogonal to all that it should sign."""
+    total = directions.sum(axis=0)
+    size = np.linalg.norm(total, axis=1) * np.linalg.norm(reference, axis=1)
+    cosine = float(((total * reference).sum(axis=1) / np.maximum(size, 1e-300)).min())
+    if cosine < _INDIFFERENT:
+        warnings.warn(
+            "the reference is almost orthogonal to the directions (cosine "
+            f"{cosine:.2f}), so which way c rises is uncertain.",
+            MapWarning,
+            stacklevel=4,
+        )

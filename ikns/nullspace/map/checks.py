@@ -1,0 +1,249 @@
+"""What a map accepts, checked once, and what a person should look at."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.nullspace.clustering import BoundingBoxKMeans
+
+__all__ = [
+    "MapWarning",
+    "Settings",
+    "at",
+    "checked_map",
+    "checked_rows",
+    "checked_settings",
+    "checked_velocities",
+    "usable_points",
+    "warn_of_components",
+]
+
+Floats = NDArray[np.float64]
+
+DOMAINS = ("position", "velocity")
+OUTSIDES = ("nearest", "project", "nan")
+# Thinner than this part of the width is a sheet: 2 cm of 40 cm, which is how far a hand
+# drifts that is held still.
+_SHEET = 0.05
+# A point with less than this part of an equal share of the samples is left out.
+_SHARE = 0.1
+
+
+class MapWarning(UserWarning):
+    """The map was made, but a person should look at what the sentence says."""
+
+
+class Settings(NamedTuple):
+    """Checked parameters of a map.
+
+    Parameters
+    ----------
+    n_dof : int
+    variance : float
+    quantiles : (float, float)
+    reference : (d, n) array or None
+    min_samples : int
+    """
+
+    n_dof: int
+    variance: float
+    quantiles: tuple[float, float]
+    reference: Floats | None
+    min_samples: int
+
+
+def checked_settings(parameters: Any, shape: tuple[int, int]) -> Settings:
+    """Return what a map's parameters mean for samples (N, n), or say what is wrong."""
+    p = parameters
+    if len(p.quantiles) != 2 or p.n_points < 1:
+        raise InvalidInput(
+            f"expected two quantiles and at least one point, found {p.quantiles} and "
+            f"n_points={p.n_points}."
+        )
+    low, high = p.quantiles
+    least = p.min_samples
+    if least is None:
+        least = max(1, int(_SHARE * shape[0] / p.n_points))
+    n = shape[1]
+    for right, sentence in (
+        (1 <= p.n_dof <= n, f"n_dof between 1 and the {n} joints, found {p.n_dof}"),
+        (0 < p.variance <= 1, f"variance above 0 and at most 1, found {p.variance}"),
+        (
+            0 <= low < high <= 1,
+            f"quantiles 0 <= low < high <= 1, found {p.quantiles}",
+        ),
+        (least >= 1, f"min_samples of at least 1, found {least}"),
+        (p.domain in DOMAINS, f"domain as one of {DOMAINS}, found '{p.domain}'"),
+        (p.outside in OUTSIDES, f"outside as one of {OUTSIDES}, found '{p.outside}'"),
+    ):
+        if not right:
+            raise InvalidInput(f"expected {sentence}.")
+    reference = None
+    if p.reference is not None:
+        reference = np.atleast_2d(np.asarray(p.reference, dtype=np.float64))
+        if reference.shape != (p.n_dof, n) or not np.isfinite(reference).all():
+            raise InvalidInput(
+                f"expected a finite reference of shape ({p.n_dof}, {n}), found "
+                f"{reference.shape}."
+            )
+        if np.linalg.matrix_rank(reference) < p.n_dof:
+            raise InvalidInput(
+                f"expected a reference with {p.n_dof} independent rows, found "
+                f"{np.linalg.matrix_rank(reference)}."
+            )
+    return Settings(p.n_dof, p.variance, (low, high), reference, least)
+
+
+def checked_rows(rows: ArrayLike, width: int, what: str) -> Floats:
+    """Return an array (..., width) with NaN for all that is not finite."""
+    array = np.asarray(rows, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != width:
+        raise InvalidInput(
+            f"expected {what} of shape (..., {width}), found {array.shape}."
+        )
+    return np.where(np.isfinite(array), array, np.nan)
+
+
+def checked_map(
+    centers: ArrayLike, directions: ArrayLike, lower: ArrayLike, upper: ArrayLike
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return a map's arrays in full shape, or say what is wrong with them."""
+    places, z = np.array(centers, dtype=float), np.array(directions, dtype=float)
+    m, M = np.array(lower, dtype=float), np.array(upper, dtype=float)
+    if z.ndim == 2:
+        z = z[:, None, :]
+    m, M = (end[:, None] if end.ndim == 1 else end for end in (m, M))
+    if (
+        places.ndim != 2
+        or z.ndim != 3
+        or not len(places) == len(z)
+        or not m.shape == M.shape == z.shape[:2]
+    ):
+        raise InvalidInput(
+            f"expected centers (P, 3), directions (P, d, n), lower and upper (P, d), "
+            f"found {places.shape}, {z.shape}, {m.shape} and {M.shape}."
+        )
+    if not all(np.isfinite(array).all() for array in (places, z, m, M)):
+        raise InvalidInput("expected a map of finite numbers, found others.")
+    if (m > M).any():
+        k = int(np.argwhere(m > M)[0, 0])
+        raise InvalidInput(
+            f"expected lower <= upper, found {m[k]} and {M[k]} at {at(places, k)}."
+        )
+    return places, z, m, M
+
+
+def checked_velocities(velocity: ArrayLike | None, q: Floats) -> Floats:
+    """Return joint velocities that go with joint vectors (N, n)."""
+    if velocity is None:
+        raise InvalidInput(
+            'domain="velocity" needs joint velocities, pass them to fit as velocity.'
+        )
+    v = np.asarray(velocity, dtype=np.float64)
+    if v.shape != q.shape or not np.isfinite(v).all():
+        raise InvalidInput(
+            f"expected a finite joint velocity for each joint angle {q.shape}, found "
+            f"{v.shape} with {np.count_nonzero(~np.isfinite(v))} that are not finite."
+        )
+    return v
+
+
+def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
+    """Points with enough samples; warn about the others.
+
+    Parameters
+    ----------
+    found : BoundingBoxKMeans
+        Fitted clusters of the hand positions.
+    need : int
+        Least number of samples.
+
+    Returns
+    -------
+    list of int
+
+    Raises
+    ------
+    NotEnoughData
+        When no point is left; and of 4 points and more in space when fewer than 4 are
+        left or all samples or points lie at one place, on one line or in one plane.
+    """
+    centers, counts = found.cluster_centers_, found.counts_
+    natural = centers.shape[1] == 3 and len(centers) >= 4
+    if natural:
+        _check_volume(2 * found.box_.half_lengths, f"the {counts.sum()} samples")
+    used = np.flatnonzero(counts >= need).tolist()
+    few = [k for k in range(len(centers)) if k not in used]
+    sentence = (
+        f"{len(few)} of {len(centers)} PCA points have fewer than {need} samples and "
+        f"are left out: {'; '.join(f'{at(centers, k)} has {counts[k]}' for k in few)}"
+    )
+    if len(used) < (4 if natural else 1):
+        raise NotEnoughData(
+            f"the map needs {'4 PCA points' if natural else 'a PCA point'}, but "
+            f"{sentence} (n_samples={counts.sum()}, n_features={centers.shape[1]})."
+        )
+    if natural:
+        spread = centers[used] - centers[used].mean(axis=0)
+        axes = np.linalg.svd(spread, full_matrices=False)[2]
+        width = np.ptp(spread @ axes.T, axis=0)
+        _check_volume(width, f"the {len(used)} points")
+        if width[0] < 2 * found.radius_ or width[2] < found.radius_:
+            warnings.warn(
+                f"the PCA points are hardly farther apart ({_by(width)} m) than the "
+                f"samples around each (radius {found.radius_:.2g} m).",
+                MapWarning,
+                stacklevel=3,
+            )
+    if few:
+        warnings.warn(f"{sentence}.", MapWarning, stacklevel=3)
+    return used
+
+
+def _check_volume(width: Floats, what: str) -> None:
+    """Refuse what is a sheet, a line or a dot; `width` (3,) m, the longest first."""
+    full = np.count_nonzero(width > _SHEET * width[0])
+    if full < 3:
+        where = ("at one place", "on one line", "in one plane")[full]
+        raise NotEnoughData(
+            f"the map needs PCA points that span a volume, but {what} lie {where} "
+            f"({_by(width)} m)."
+        )
+
+
+def _by(width: Floats) -> str:
+    return " x ".join(f"{w:.2g}" for w in width)
+
+
+def warn_of_components(
+    centers: Floats, n_components: NDArray[np.int64], n_dof: int
+) -> None:
+    """Name the points where no joint moves, and those where too much does."""
+    none = [at(centers, k) for k in np.flatnonzero(n_components == 0).tolist()]
+    if none:
+        warnings.warn(
+            f"no joint moves at {'; '.join(none)}, so these points have no say in c.",
+            MapWarning,
+            stacklevel=3,
+        )
+    more = [
+        f"{at(centers, k)} took {n_components[k]} components"
+        for k in np.flatnonzero(n_components > n_dof).tolist()
+    ]
+    if more:
+        warnings.warn(
+            f"the recording holds more freedom than the {n_dof} wanted (the hand "
+            f"turned, the shoulder girdle moved, or noise): at {'; '.join(more)}.",
+            MapWarning,
+            stacklevel=3,
+        )
+
+
+def at(centers: Floats, k: int) -> str:
+    """Name a point by its place, for messages: numbers change when points drop out."""
+    return f"({', '.join(f'{x:.3f}' for x in centers[k])})"

@@ -1,0 +1,301 @@
+"""The method: from samples with a still hand to the control signal.
+
+Around each PCA point (where the user held the hand and moved the arm) joint vectors q
+vary along a direction Z, between m and M. Between the points Z, m and M are weighted
+with the natural-neighbor weights w of the hand position, so that
+
+    c = (Z^ q - m^) / (M^ - m^) = sum_i w_i (Z_i q - m_i) / sum_i w_i (M_i - m_i)
+
+is the mean of the local control signals (Z_i q - m_i) / (M_i - m_i), weighted with w_i
+times their range. Z^ is not normalized again: that would break this identity.
+
+T. Lisini Baldi et al. (arXiv 2012.03600), section II.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from ikns.nullspace.clustering import BoundingBoxKMeans
+from ikns.nullspace.map.assembly import assemble
+from ikns.nullspace.map.checks import (
+    checked_map,
+    checked_rows,
+    checked_settings,
+    checked_velocities,
+    usable_points,
+    warn_of_components,
+)
+from ikns.nullspace.map.interpolator import between
+from ikns.numerics.subspace import principal_components
+
+__all__ = ["NullSpaceMap"]
+Floats = NDArray[np.float64]
+
+
+class NullSpaceMap(BaseEstimator):
+    """Directions Z and ranges m, M at PCA points, and the control signal between them.
+
+    Fitting: hand positions are clustered
+    (:class:`ikns.nullspace.clustering.BoundingBoxKMeans`); in each cluster the
+    principal components of the joint vectors that explain at least `variance` are added
+    up, each times its explained-variance ratio and a sign, and the sum is normalized to
+    Z; m and M are the ends of ``Z @ q``.
+
+    A component has no sign of its own, and a direction and its opposite drive a robot
+    opposite ways. So signs are made to agree between neighboring points, strongest
+    agreement first (:func:`ikns.nullspace.map.alignment.align`), and one sign for all
+    comes from `reference`. For ``n_dof = d > 1`` the directions are the d leading
+    components of each point, turned within their span to agree with its neighbors', and
+    all together to agree best with the reference. Where natural neighbors mean nothing
+    (fewer than 4 points asked for, `X` not in space) the nearest point's values hold.
+
+    Parameters
+    ----------
+    n_points : int
+        PCA points.
+    n_dof : int
+        Degrees of freedom d to control.
+    variance : float
+        Part of the variance, in (0, 1], that the components summed to Z explain.
+    radius : float, optional
+        Samples farther from their centroid are left out, m; see
+        :func:`ikns.nullspace.clustering.nearest_center` for the default.
+    domain : {"position", "velocity"}
+        Components of joint vectors about their mean, or of joint velocities about zero
+        (not their mean: a null space contains zero, and slow drift within it counts).
+    outside : {"nearest", "project", "nan"}
+        Outside the points' hull: the nearest point's values (the paper's rule; c jumps
+        there), those at the nearest place of the hull (continuous), or NaN.
+    quantiles : (float, float)
+        What counts as the ends m and M; (0, 1) are minimum and maximum.
+    max_iter : int
+        Most iterations of the clustering.
+    reference : (n,) or (d, n) array, optional
+        What rises with c, as a gradient over the joints: its product with the sum of
+        all Z is made positive, row by row. Default: that sum's largest entry is.
+    min_samples : int, optional
+        Points with fewer samples are left out, with a warning. Default: a tenth of an
+        equal share, N / (10 n_points); half a second of 5 s at each point.
+
+    Attributes
+    ----------
+    centers_ : (P, 3) array
+        PCA points in use, m.
+    directions_ : (P, d, n) array
+        Z; orthonormal rows for each point.
+    lower_, upper_ : (P, d) array
+        m and M, rad.
+    counts_ : (P,) integer array
+        Samples at each point in use.
+    labels_ : (N,) integer array
+        Point of each sample, -1 for none.
+    cluster_means_ : (P, n) array
+        Mean joint vectors, rad.
+    n_components_ : (P,) integer array
+        Components that explain `variance`. More than `n_dof`, which warns: there is
+        freedom besides that wanted. Zero where no joint moves: Z, m, M are zero too,
+        and the point has no say in c.
+    explained_variance_ratio_ : (P, n) array
+        Of all components, decreasing.
+    all_centers_, all_counts_ : (n_points, 3), (n_points,) array
+        Every PCA point asked for, also those left out.
+    radius_ : float
+        Radius used, m.
+    interpolator_ : object
+        Weights, hull and neighbors; see :mod:`ikns.nullspace.interpolation`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
+    >>> x = np.repeat(corners, 50, axis=0)
+    >>> q = np.tile(np.linspace(-1, 1, 50)[:, None] * [0.6, 0.8], (8, 1))
+    >>> learned = NullSpaceMap(n_points=8).fit(x, q)
+    >>> learned.control_signal([0.3, 0.4], [0.5, 0.5, 0.5]).round(12)
+    np.float64(0.75)
+    """
+
+    def __init__(
+        self,
+        n_points: int = 10,
+        *,
+        n_dof: int = 1,
+        variance: float = 0.8,
+        radius: float | None = None,
+        domain: Literal["position", "velocity"] = "position",
+        outside: Literal["nearest", "project", "nan"] = "nearest",
+        quantiles: tuple[float, float] = (0.0, 1.0),
+        max_iter: int = 300,
+        reference: ArrayLike | None = None,
+        min_samples: int | None = None,
+    ) -> None:
+        self.n_points = n_points
+        self.n_dof = n_dof
+        self.variance = variance
+        self.radius = radius
+        self.domain = domain
+        self.outside = outside
+        self.quantiles = quantiles
+        self.max_iter = max_iter
+        self.reference = reference
+        self.min_samples = min_samples
+
+    def __sklearn_tags__(self) -> Any:
+        """Tell scikit-learn that `y` holds joint vectors and is needed."""
+        tags = super().__sklearn_tags__()
+        tags.target_tags.required = True
+        tags.target_tags.multi_output = True
+        tags.target_tags.single_output = False
+        return tags
+
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, *, velocity: ArrayLike | None = None
+    ) -> Self:
+        """Learn the map from samples whose hand is still.
+
+        Parameters
+        ----------
+        X : (N, 3) array
+            Hand positions in the thorax frame, m.
+        y : (N, n) array
+            Joint vectors there, rad.
+        velocity : (N, n) array, optional
+            Joint velocities there, rad/s, for ``domain="velocity"``.
+
+        Raises
+        ------
+        InvalidInput, ValueError
+            When a parameter is out of range, or samples are not finite or do not match.
+        NotEnoughData
+            With fewer samples than points, too few usable points, or points in a plane.
+        """
+        x, q = validate_data(self, X, y, multi_output=True, y_numeric=True)
+        x, q = np.asarray(x, float), np.asarray(q, float).reshape(len(x), -1)
+        settings = checked_settings(self, q.shape)
+        centered = self.domain == "position"
+        moves = q if centered else checked_velocities(velocity, q)
+
+        found = BoundingBoxKMeans(
+            self.n_points, max_iter=self.max_iter, radius=self.radius
+        ).fit(x)
+        used = usable_points(found, settings.min_samples)
+        centers = found.cluster_centers_[used]
+        interpolator = between(centers, self.outside)
+        rows = [np.flatnonzero(found.labels_ == k) for k in used]
+
+        parts = [principal_components(moves[r], centered=centered) for r in rows]
+        ratios = np.array([ratio for _, ratio in parts])
+        # Enough but for rounding: the last sum is 1, and `variance` may be 1 too.
+        short = np.cumsum(ratios, axis=1)[:, :-1] < self.variance - 1e-12
+        moving = np.any(ratios, axis=1)
+        n_components = np.where(moving, 1 + short.sum(axis=1), 0)
+        warn_of_components(centers, n_components, self.n_dof)
+        keep = n_components if self.n_dof == 1 else np.where(moving, self.n_dof, 0)
+        self.directions_, self.lower_, self.upper_ = assemble(
+            centers,
+            [part[:k] for (part, _), k in zip(parts, keep, strict=True)],
+            [ratio[:k] for ratio, k in zip(ratios, keep, strict=True)],
+            [q[r] for r in rows],
+            settings=settings,
+            edges=interpolator.edges,
+        )
+        self.centers_, self.counts_ = centers, found.counts_[used]
+        self.all_centers_, self.all_counts_ = found.cluster_centers_, found.counts_
+        self.labels_ = np.full(len(x), -1)
+        for k, r in enumerate(rows):
+            self.labels_[r] = k
+        self.cluster_means_ = np.array([q[r].mean(axis=0) for r in rows])
+        self.n_components_, self.explained_variance_ratio_ = n_components, ratios
+        self.interpolator_, self.radius_ = interpolator, found.radius_
+        return self
+
+    @classmethod
+    def from_arrays(
+        cls,
+        centers: ArrayLike,
+        directions: ArrayLike,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        *,
+        counts: ArrayLike = 0,
+        **parameters: Any,
+    ) -> Self:
+        """Make a map from what it consists of: one from a file, or an analytic one.
+
+        Parameters
+        ----------
+        centers : (P, 3) array
+            PCA points, m.
+        directions : (P, n) or (P, d, n) array
+            Z.
+        lower, upper : (P,) or (P, d) array
+            m and M, rad; ``lower <= upper``.
+        counts : int or (P,) array
+            Samples at each point.
+        **parameters
+            Of the constructor; `n_points` and `n_dof` are those of the arrays.
+
+        Raises
+        ------
+        InvalidInput, NotEnoughData
+            When shapes disagree, values are not finite, a range is negative, or 4 or
+            more points in space lie in a plane.
+        """
+        places, z, m, M = checked_map(centers, directions, lower, upper)
+        made = cls(**{**parameters, "n_points": len(places), "n_dof": z.shape[1]})
+        made.n_features_in_ = places.shape[1]
+        made.centers_, made.directions_, made.lower_, made.upper_ = places, z, m, M
+        made.counts_ = np.full(len(places), counts, dtype=np.int64)
+        made.interpolator_ = between(places, made.outside)
+        return made
+
+    def control_signal(self, q: ArrayLike, x: ArrayLike) -> Any:
+        """Return the control signal c, not clipped.
+
+        Parameters
+        ----------
+        q : (..., n) array
+            Joint vectors, rad.
+        x : (..., 3) array
+            Hand positions in the thorax frame, m.
+
+        Returns
+        -------
+        (...) array, or (..., d) for ``n_dof > 1``
+            0 at m, 1 at M. NaN where `q` or `x` is not finite, where the range is zero,
+            and outside the hull with ``outside="nan"``.
+        """
+        weights = self._weights(x)
+        angles = checked_rows(q, self.directions_.shape[2], "joint vectors")
+        local = np.tensordot(angles, self.directions_, axes=(-1, -1)) - self.lower_
+        above = np.einsum("...p,...pd->...d", weights, local)
+        width = np.broadcast_to(weights @ (self.upper_ - self.lower_), above.shape)
+        c = np.full(above.shape, np.nan)
+        np.divide(above, width, out=c, where=width > 0)
+        return c[..., 0] if self.directions_.shape[1] == 1 else c
+
+    def directions(self, x: ArrayLike) -> Floats:
+        """Interpolated directions Z^ at hand positions (..., 3), (..., d, n)."""
+        return np.tensordot(self._weights(x), self.directions_, axes=1)
+
+    def range(self, x: ArrayLike) -> tuple[Floats, Floats]:
+        """Interpolated ends m^ and M^ at hand positions (..., 3), each (..., d) rad."""
+        weights = self._weights(x)
+        return weights @ self.lower_, weights @ self.upper_
+
+    def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
+        """Whether hand positions (..., 3) lie in the hull of the points, (...)."""
+        check_is_fitted(self)
+        places = checked_rows(x, self.n_features_in_, "hand positions")
+        return self.interpolator_.inside(places)
+
+    def _weights(self, x: ArrayLike) -> Floats:
+        check_is_fitted(self)
+        places = checked_rows(x, self.n_features_in_, "hand positions")
+        return self.interpolator_.weights(places)

@@ -1,0 +1,105 @@
+"""The gate: which samples of a motion show the null space."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import NotEnoughData
+from ikns.motion.motion import Motion
+
+__all__ = ["null_space_samples", "still"]
+
+
+def still(
+    motion: Motion,
+    chain: str = "right_arm",
+    *,
+    max_hand_speed: float = 0.05,
+    min_duration: float = 0.0,
+) -> NDArray[np.bool_]:
+    """Which samples have the chain's hands at rest while everything is known.
+
+    Parameters
+    ----------
+    motion : Motion
+    chain : str
+        See :data:`ikns.body.chains.CHAINS`.
+    max_hand_speed : float
+        Hands slower than this, seen from the thorax, count as still, m/s. The default
+        is that of Lisini Baldi et al. (arXiv 2012.03600), who let the task decide.
+    min_duration : float
+        Shorter rests are left out, s. Hands that roam are slow wherever they turn back,
+        for some 0.2 s, which shows no null space; 0.5 removes these and keeps every
+        hand that is held. The default of 0 keeps all, as the paper does.
+
+    Returns
+    -------
+    (T,) boolean array
+        False where hand position, speed, joint angles or joint velocities are missing.
+    """
+    values = (
+        motion.place(chain),
+        motion.chain_angles(chain),
+        motion.chain_velocities(chain),
+    )
+    gate = np.isfinite(np.hstack(values)).all(axis=1)
+    gate &= motion.hand_speed(chain) < max_hand_speed
+    ends = np.flatnonzero(np.diff(np.r_[False, gate, False]))
+    for first, after in ends.reshape(-1, 2):
+        # The last sample may miss the duration by the rounding of its time.
+        if motion.time[after - 1] - motion.time[first] < min_duration - 1e-9:
+            gate[first:after] = False
+    return gate
+
+
+def null_space_samples(
+    motion: Motion,
+    chain: str = "right_arm",
+    *,
+    max_hand_speed: float = 0.05,
+    min_duration: float = 0.0,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Hand positions and joint vectors of the samples whose hands are still.
+
+    The matching velocities, for ``NullSpaceMap(domain="velocity")``, are
+    ``motion.chain_velocities(chain)[still(motion, chain)]``.
+
+    Parameters
+    ----------
+    motion : Motion
+    chain : str
+        See :data:`ikns.body.chains.CHAINS`.
+    max_hand_speed, min_duration : float
+        See :func:`still`, m/s and s.
+
+    Returns
+    -------
+    x : (N, 3) array
+        Hand positions (of both hands: their midpoint) in the thorax frame, m.
+    q : (N, n) array
+        Joint vectors in chain order, rad.
+
+    Raises
+    ------
+    NotEnoughData
+        When no sample passes.
+    """
+    gate = still(
+        motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration
+    )
+    if not gate.any():
+        speed = motion.hand_speed(chain)
+        speed = speed[np.isfinite(speed)]
+        slow = np.count_nonzero(speed < max_hand_speed)
+        found = "none has a known hand speed"
+        if slow:
+            found = f"the {slow} slower ones are too short a rest or miss joints"
+        elif speed.size:
+            found = f"the slowest has {speed.min():.3g} m/s"
+        raise NotEnoughData(
+            f"expected samples with the hand of {chain} slower than "
+            f"{max_hand_speed:g} m/s for {min_duration:g} s and every joint known, but "
+            f"of {len(gate)} samples {found}."
+        )
+    return motion.place(chain)[gate], motion.chain_angles(chain)[gate]

@@ -1,0 +1,1 @@
+"""Recordings: markers over time, and the files that hold them."""

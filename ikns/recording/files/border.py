@@ -1,0 +1,189 @@
+"""What every marker file must pass before it becomes a recording.
+
+Files speak in millimeters, empty cells and zeros; inside there are meters and NaN. The
+readers share the translation and its refusals here, so a user meets the same sentence
+whatever the format.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import FileError, InvalidInput
+from ikns.recording.recording import Recording
+
+__all__ = [
+    "checked_rate",
+    "existing_file",
+    "is_unlabeled",
+    "meters_per",
+    "shown",
+    "to_recording",
+]
+
+#: Meters in one unit, by the spellings that cameras' software writes.
+_METERS = {
+    **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre"), 1e-3),
+    **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetre"), 1e-2),
+    **dict.fromkeys(("m", "meter", "meters", "metre"), 1.0),
+}
+
+#: Nexus writes ``*12`` and Qualisys ``uname*12`` for a trajectory without a name.
+_UNLABELED = re.compile(r"(?:.*:)?(?:uname)?\*\d+", re.IGNORECASE)
+
+#: Frames per second that a marker system can have.
+_RATES = (0.1, 1e5)
+
+#: Meters. Cameras that see a person fill 2 cm (one hand) to 100 m (a hall). Data in
+#: meters labeled as mm span at most 2 cm of this range up to a volume of 20 m, and data
+#: in mm labeled as meters exceed it from an extent of 10 cm on.
+_EXTENT = (0.02, 100.0)
+
+#: The extent needs no more frames than these, evenly spaced over the recording.
+_GLANCES = 500
+
+
+def existing_file(path: Path) -> int:
+    """Return the size in bytes of a regular, readable, non-empty file.
+
+    Raises
+    ------
+    FileError
+        When there is no such file, it is a folder, or it is empty.
+    """
+    if "\0" in str(path):
+        raise FileError(f"{shown(str(path))}: this is not a file name.")
+    if path.is_dir():
+        raise FileError(f"{path}: expected a marker file, found a folder.")
+    if not path.is_file():
+        raise FileError(f"{path}: expected a marker file, found no file there.")
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+    except OSError as error:
+        raise FileError(f"{path}: the file cannot be read ({error}).") from None
+    if size == 0:
+        raise FileError(f"{path}: expected a marker file, found an empty file.")
+    return size
+
+
+def shown(text: str) -> str:
+    """Return text from a file, short and printable, for a message."""
+    text = "".join(c if c.isprintable() else "?" for c in text.strip())
+    return f"'{text[:37]}...'" if len(text) > 40 else f"'{text}'"
+
+
+def meters_per(path: Path, unit: str) -> float:
+    """Return how many meters one unit is.
+
+    Examples
+    --------
+    >>> meters_per(Path("walk.trc"), "MM")
+    0.001
+    """
+    try:
+        return _METERS[unit.strip().lower()]
+    except KeyError:
+        raise FileError(
+            f"{path}: expected positions in mm, cm or m, found unit {shown(unit)}."
+        ) from None
+
+
+def checked_rate(path: Path, rate: float) -> float:
+    """Return the frame rate in Hz, or refuse what no camera has."""
+    if not _RATES[0] <= rate <= _RATES[1]:
+        raise FileError(
+            f"{path}: expected a frame rate between {_RATES[0]:g} and {_RATES[1]:g} "
+            f"frames per second, found {rate:g}."
+        )
+    return float(rate)
+
+
+def is_unlabeled(label: str) -> bool:
+    """Tell whether the software gave this trajectory a number instead of a name.
+
+    Examples
+    --------
+    >>> is_unlabeled("*115"), is_unlabeled("ADL001:RSHO1")
+    (True, False)
+    """
+    return not label or _UNLABELED.fullmatch(label) is not None
+
+
+def to_recording(
+    path: Path,
+    time: NDArray[np.float64],
+    markers: NDArray[np.float64],
+    labels: Sequence[str],
+    *,
+    unit: str,
+) -> Recording:
+    """Return positions in meters as a recording, gaps as NaN.
+
+    Parameters
+    ----------
+    path : Path
+        Named in every message.
+    time : (T,) array
+        Seconds.
+    markers : (T, M, 3) array
+        Meters, changed in place. A point with a missing coordinate becomes NaN, and so
+        does one at exactly zero: that is how many systems write "not seen".
+    labels : sequence of M str
+        Names as the file has them.
+    unit : str
+        What the file called its unit, for the message when the size is not credible.
+
+    Raises
+    ------
+    FileError
+        When there are no frames or markers, nothing was ever seen, the extent is not
+        that of a person in a room, labels repeat, or time does not increase.
+    """
+    if not len(labels):
+        raise FileError(f"{path}: expected at least one named marker, found none.")
+    if not len(time):
+        raise FileError(f"{path}: expected at least one frame, found none.")
+    unreadable = [label for label in labels if not label.isprintable()]
+    if unreadable:
+        raise FileError(
+            f"{path}: expected printable marker labels, found {shown(unreadable[0])}, "
+            f"so the file is damaged."
+        )
+    gap = np.isnan(markers).any(axis=2) | (markers == 0).all(axis=2)
+    markers[gap] = np.nan
+    if gap.all():
+        raise FileError(
+            f"{path}: expected positions, but none of its {len(labels)} markers "
+            f"is seen in any of its {len(time)} frames."
+        )
+    try:
+        recording = Recording(time, markers, labels, str(path))
+    except InvalidInput as error:
+        raise FileError(str(error)) from None
+    _check_extent(path, recording, unit)
+    return recording
+
+
+def _check_extent(path: Path, recording: Recording, unit: str) -> None:
+    step = -(-len(recording.time) // _GLANCES)
+    points = recording.markers[::step].reshape(-1, 3)
+    points = points[~np.isnan(points[:, 0])]
+    if not len(points):
+        return
+    # The central nine tenths: one reflection on a window is not a wrong unit.
+    low, high = np.percentile(points, [5, 95], axis=0)
+    extent = float((high - low).max())
+    # Fewer than three markers say nothing about the size of a body.
+    if extent > _EXTENT[1] or (len(recording.labels) > 2 and extent < _EXTENT[0]):
+        raise FileError(
+            f"{path}: expected markers spread over {_EXTENT[0]:g} to {_EXTENT[1]:g} m, "
+            f"found {extent:.3g} m with positions read as {unit}, so the file's unit "
+            f"is probably not {unit}."
+        )

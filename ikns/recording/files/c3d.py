@@ -1,0 +1,157 @@
+"""C3D, the binary file of most camera systems: markers out of its points.
+
+A C3D point is not always a marker. Modelled angles, forces, moments and powers are
+stored as points too, named in parameter lists of their own; they are dropped, and so
+are trajectories without a name. Virtual points that *are* positions (joint centers,
+the center of mass) stay: whoever needs certain markers picks them by label.
+
+The bytes are read here rather than by ezc3d, which writes our files and checks this
+reader in its tests: version 1.7.2 ends the whole process on some damaged parameters,
+refuses parameter descriptions over 127 bytes, and drops all frames after 65535.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import FileError
+from ikns.recording.files.border import (
+    checked_rate,
+    is_unlabeled,
+    meters_per,
+    to_recording,
+)
+from ikns.recording.files.c3d_layout import Layout, floats, read_layout
+from ikns.recording.recording import Recording
+
+__all__ = ["read_c3d"]
+
+#: Parameter lists of the POINT group whose members are not positions.
+_NOT_POSITIONS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+
+#: Largest count a 16-bit word can hold; longer recordings say so elsewhere.
+_WORD = 0xFFFF
+
+
+def read_c3d(path: Path) -> Recording:
+    """Read the markers of a C3D file.
+
+    Frame 1 is at 0 s; a recording that was cut out of a longer one keeps the times it
+    had there. Positions without a unit are taken as mm, the unit C3D files are usually
+    in, and refused when that cannot be. Analog channels are ignored.
+
+    Raises
+    ------
+    FileError
+        When the file is not C3D, is cut off or damaged, or holds no marker.
+    """
+    layout = read_layout(path)
+    rate = checked_rate(path, layout.number("POINT:RATE", layout.rate) or layout.rate)
+    unit = next(iter(layout.texts("POINT:UNITS")), "") or "mm"
+    meters = meters_per(path, unit)
+    labels = layout.texts("POINT:LABELS")
+    not_positions = {
+        _bare(label)
+        for kind in _NOT_POSITIONS
+        for label in layout.texts(f"POINT:{kind}")
+    }
+    columns = [
+        column
+        for column, label in enumerate(labels[: layout.header[0]])
+        if not is_unlabeled(label) and _bare(label) not in not_positions
+    ]
+    if not columns:
+        raise FileError(
+            f"{path}: expected at least one named marker, found {layout.header[0]} "
+            f"points that are unnamed or model outputs."
+        )
+    points = _points(path, layout, rate)[:, columns]
+    with np.errstate(invalid="ignore"):  # a damaged value may be a signaling NaN
+        markers = points[..., :3].astype(np.float64) * meters
+        markers[points[..., 3] < 0] = np.nan
+    time = (_first_frame(layout) - 1 + np.arange(len(points))) / rate
+    return to_recording(path, time, markers, [labels[i] for i in columns], unit=unit)
+
+
+def _bare(label: str) -> str:
+    """Return a label without the subject's prefix, which lists may leave out."""
+    return label.rsplit(":", 1)[-1]
+
+
+def _points(path: Path, layout: Layout, rate: float) -> NDArray[np.float32]:
+    """Return x, y, z and residual (negative: not seen), (T, points, 4), scaled."""
+    n_points, n_analog, *_ = layout.header
+    used = layout.number("POINT:USED", n_points) % (_WORD + 1)
+    if used != n_points:
+        raise FileError(
+            f"{path}: expected as many points in the header of a C3D file as in "
+            f"POINT:USED, found {n_points} and {used:g}."
+        )
+    channels = layout.number("ANALOG:USED", 0) % (_WORD + 1)
+    analog_rate = layout.number("ANALOG:RATE", 0)
+    if channels and analog_rate and abs(channels * analog_rate / rate - n_analog) > 0.5:
+        raise FileError(
+            f"{path}: expected {n_analog} analog samples per frame as the header of a "
+            f"C3D file says, found {channels:g} channels at {analog_rate:g} Hz."
+        )
+    scale = layout.number("POINT:SCALE", layout.scale)
+    if not math.isfinite(scale) or scale == 0 or (scale < 0) != (layout.scale < 0):
+        raise FileError(
+            f"{path}: expected the same kind of scale in the header of a C3D file as "
+            f"in POINT:SCALE, found {layout.scale:g} and {scale:g}."
+        )
+    words = 4 * n_points + n_analog
+    frame_bytes = words * (4 if scale < 0 else 2)
+    available = layout.size - layout.data_start
+    n_frames = _frame_count(layout, available // frame_bytes)
+    if n_frames * frame_bytes > available:
+        raise FileError(
+            f"{path}: expected {n_frames} frames of {frame_bytes} bytes as its header "
+            f"says, found {available // frame_bytes}, so the file is cut off."
+        )
+    with path.open("rb") as file:
+        file.seek(layout.data_start)
+        raw = file.read(n_frames * frame_bytes)
+    if scale < 0:
+        frames = floats(raw, layout.machine).reshape(n_frames, words)
+        return frames[:, : 4 * n_points].reshape(n_frames, n_points, 4)
+    integers = np.frombuffer(raw, ">i2" if layout.machine == 86 else "<i2")
+    frames = integers.reshape(n_frames, words).astype(np.float32)
+    return frames[:, : 4 * n_points].reshape(n_frames, n_points, 4) * np.float32(scale)
+
+
+def _frame_count(layout: Layout, fitting: int) -> int:
+    """Return the number of frames, also where it does not fit into 16 bits.
+
+    Then Vicon writes first and last frame as pairs of words, others write a
+    floating-point count, and some nothing but the largest word: all that follows.
+    """
+    *_, first, last = layout.header
+    count = layout.number("POINT:FRAMES", last - first + 1)
+    if -_WORD <= count < 0:  # an unsigned word
+        count += _WORD + 1
+    if count == _WORD:
+        start = _long(layout, "TRIAL:ACTUAL_START_FIELD")
+        end = _long(layout, "TRIAL:ACTUAL_END_FIELD")
+        if start and end - start + 1 >= _WORD:
+            count = end - start + 1
+        else:
+            count = layout.number("POINT:LONG_FRAMES", max(fitting, _WORD))
+    return int(count) if math.isfinite(count) and count > 0 else 0
+
+
+def _first_frame(layout: Layout) -> int:
+    """Return the number of the first frame, counted from 1."""
+    return _long(layout, "TRIAL:ACTUAL_START_FIELD") or max(layout.header[2], 1)
+
+
+def _long(layout: Layout, name: str) -> int:
+    """Return a 32-bit number kept as two words, low word first; 0 when missing."""
+    value = layout.parameters.get(name)
+    if not isinstance(value, np.ndarray) or len(value) != 2:
+        return 0
+    return int(value[0]) % (_WORD + 1) + (_WORD + 1) * (int(value[1]) % (_WORD + 1))

@@ -1,0 +1,99 @@
+"""Numbers out of a text file: lines in, an array out, gaps as NaN."""
+
+from __future__ import annotations
+
+import codecs
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.errors import FileError
+from ikns.recording.files.border import existing_file, shown
+
+__all__ = ["number_table", "text_lines"]
+
+
+def text_lines(path: Path) -> list[str]:
+    """Return a text file's lines, whatever its byte-order mark and line ends."""
+    existing_file(path)
+    raw = path.read_bytes()
+    wide = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    text = raw.decode("utf-16" if wide else "utf-8-sig", errors="replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def number_table(
+    path: Path, rows: list[tuple[int, str]], n_columns: int, *, delimiter: str
+) -> NDArray[np.float64]:
+    """Return the rows' numbers; empty cells are NaN.
+
+    Parameters
+    ----------
+    path : Path
+        Named in every message.
+    rows : list of (int, str)
+        Line number in the file and the line itself, which may end early (the rest is
+        empty) or in empty cells beyond the last column.
+    n_columns : int
+        Columns that the file's header promises.
+    delimiter : str
+        What stands between two cells.
+
+    Returns
+    -------
+    (len(rows), n_columns) array
+
+    Raises
+    ------
+    FileError
+        When a cell is not a number or a row is longer than the header.
+    """
+    if not rows:
+        return np.empty((0, n_columns))
+    # A damaged header must not ask for more memory than the lines can fill.
+    if len(rows) * n_columns > 4 * sum(len(line) for _, line in rows) + 10_000:
+        raise FileError(
+            f"{path}: expected {n_columns} columns as in its header, but its "
+            f"{len(rows)} rows are far shorter, so the file is damaged."
+        )
+    lines = [_fitted(path, number, line, n_columns, delimiter) for number, line in rows]
+    text = "\n" + "\n".join(lines).replace(" ", "") + "\n"
+    # Twice, because neighboring gaps share a delimiter.
+    for _ in range(2):
+        text = text.replace(2 * delimiter, f"{delimiter}nan{delimiter}")
+    text = text.replace(f"\n{delimiter}", f"\nnan{delimiter}")
+    text = text.replace(f"{delimiter}\n", f"{delimiter}nan\n")
+    try:
+        return np.loadtxt(
+            text.split("\n")[1:-1], delimiter=delimiter, comments=None, ndmin=2
+        )
+    except ValueError:
+        _refuse_first_non_number(path, rows, delimiter)
+        raise FileError(f"{path}: its rows are not all numbers.") from None
+
+
+def _fitted(path: Path, number: int, line: str, n_columns: int, delimiter: str) -> str:
+    surplus = line.count(delimiter) + 1 - n_columns
+    if surplus <= 0:
+        return line + delimiter * -surplus
+    line, *beyond = line.rsplit(delimiter, surplus)
+    if any(cell.strip() for cell in beyond):
+        raise FileError(
+            f"{path}: expected {n_columns} columns as in its header, found "
+            f"{n_columns + surplus} in line {number}."
+        )
+    return line
+
+
+def _refuse_first_non_number(
+    path: Path, rows: list[tuple[int, str]], delimiter: str
+) -> None:
+    for number, line in rows:
+        for cell in line.split(delimiter):
+            try:
+                float(cell.replace(" ", "") or "nan")
+            except ValueError:
+                raise FileError(
+                    f"{path}: expected numbers in line {number}, found {shown(cell)}."
+                ) from None

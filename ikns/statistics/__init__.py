@@ -1,0 +1,92 @@
+"""Statistics of the two experiments: the paper's own, and beside them the right ones.
+
+`analysis` runs everything on a table of trials. Each test has a small frozen result
+with a ``sentence()`` in plain words, which never takes a difference that was not found
+for equality. `pairs` is what paired tests take; `paired_tests` repeats the paper;
+`equivalence`, `effects`, `mixed_model`, `within_subject_anova`, `success`, `times` and
+`learning` stand beside it; `power` and `sample_size` say how many participants;
+`published` examines the paper's printed numbers. scipy and statsmodels compute.
+"""
+
+from ikns.statistics.analysis import (
+    PickAnalysis,
+    TrackingAnalysis,
+    analyze_picking,
+    analyze_tracking,
+)
+from ikns.statistics.effects import (
+    Effect,
+    cohens_dz,
+    effect_sizes,
+    hedges_g_av,
+    hodges_lehmann,
+)
+from ikns.statistics.equivalence import Equivalence, equivalence
+from ikns.statistics.learning import LearningCurve, LearningCurves, learning_curves
+from ikns.statistics.mixed_model import Coefficient, MixedModel, mixed_model
+from ikns.statistics.paired_tests import (
+    Normality,
+    PairedT,
+    RankTest,
+    SignTest,
+    exact_sign,
+    normality,
+    pooled_t,
+    signed_rank,
+    subject_means_t,
+)
+from ikns.statistics.pairs import Pairs, pair_arrays, pair_trials
+from ikns.statistics.power import Design, Power, Spread, simulated_power
+from ikns.statistics.published import Finding, paper_reexamined
+from ikns.statistics.sample_size import SampleSize, sample_size
+from ikns.statistics.success import SuccessTest, success_pairs, success_test
+from ikns.statistics.times import TimeTest, restricted_mean, time_test
+from ikns.statistics.within_subject_anova import VarianceTable, within_subject_anova
+
+__all__ = [
+    "Coefficient",
+    "Design",
+    "Effect",
+    "Equivalence",
+    "Finding",
+    "LearningCurve",
+    "LearningCurves",
+    "MixedModel",
+    "Normality",
+    "PairedT",
+    "Pairs",
+    "PickAnalysis",
+    "Power",
+    "RankTest",
+    "SampleSize",
+    "SignTest",
+    "Spread",
+    "SuccessTest",
+    "TimeTest",
+    "TrackingAnalysis",
+    "VarianceTable",
+    "analyze_picking",
+    "analyze_tracking",
+    "cohens_dz",
+    "effect_sizes",
+    "equivalence",
+    "exact_sign",
+    "hedges_g_av",
+    "hodges_lehmann",
+    "learning_curves",
+    "mixed_model",
+    "normality",
+    "pair_arrays",
+    "pair_trials",
+    "paper_reexamined",
+    "pooled_t",
+    "restricted_mean",
+    "sample_size",
+    "signed_rank",
+    "simulated_power",
+    "subject_means_t",
+    "success_pairs",
+    "success_test",
+    "time_test",
+    "within_subject_anova",
+]
