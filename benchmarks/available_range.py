@@ -23,7 +23,7 @@ from ikns.body.chains import chain_joints
 from ikns.calibration import elbow_reference
 from ikns.errors import InvalidInput
 from ikns.nullspace.map import NullSpaceMap, null_space_samples
-from ikns.nullspace.map.samples import still
+from ikns.nullspace.map.samples import still_mask
 from ikns.simulation import simulate_protocol, virtual_subject
 from ikns.symbolic import HeldHand
 
@@ -49,7 +49,7 @@ def subject(seed: int, *, seconds: float, every: int) -> dict:
     )
     body, truth = person.skeleton, run.points.truth
     x, q = null_space_samples(truth, chain=CHAIN)
-    gate = np.flatnonzero(still(truth, CHAIN))
+    gate = np.flatnonzero(still_mask(truth, CHAIN))
     reference = elbow_reference(body, truth.q.mean(axis=0), CHAIN)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -107,7 +107,7 @@ def by_point(
     truth, chain = run.points.truth, f"{run.side}_arm"
     body = run.subject.skeleton  # the true one
     columns = body.columns(chain_joints(chain)) + 1
-    c = learned.control_signal(motion.chain_angles(chain), motion.place(chain))
+    c = learned.control_signal(motion.chain_angles(chain), motion.task_position(chain))
     rows = [np.flatnonzero(run.points.point == k) for k in range(len(run.places))]
     null = np.stack(
         [
@@ -186,7 +186,7 @@ def subject(seed: int, **options: object) -> dict[str, float]:
     length = {name: 1000 * abs(estimated[name] - true[name]) for name in true}
     joints = chain_joints(f"{run.side}_arm_clavicle")
     columns = [motion.joint_names.index(joint) for joint in joints]
-    seen = np.isfinite(motion.place(f"{run.side}_arm")).all(axis=1)
+    seen = np.isfinite(motion.task_position(f"{run.side}_arm")).all(axis=1)
     error = np.degrees(motion.angles - run.points.truth.angles)[seen][:, columns]
     rms = np.sqrt(np.mean(error**2, axis=0))
     shown = every_marker_shown(found.skeleton, run)[seen]

@@ -92,7 +92,7 @@ def of_subject(person: Person) -> dict[str, dict[str, float]]:
             session = getattr(person, kind)
             motion = session.motion
             if name == POSITION:
-                q, x = motion.chain_angles(CHAIN), motion.place(CHAIN)
+                q, x = motion.chain_angles(CHAIN), motion.task_position(CHAIN)
                 c = learned.control_signal(q, x)
             elif name == SWIVEL:
                 c = body.swivel(motion.q)[:, 0] / person.room
@@ -129,7 +129,7 @@ def of_arm(arm: RealArm) -> dict[str, list[float]]:
         made = controls(arm.skeleton, learned, arm.chain, others)
         for name in (POSITION, *made, SWIVEL):
             if name == POSITION:
-                q, x = motion.chain_angles(arm.chain), motion.place(arm.chain)
+                q, x = motion.chain_angles(arm.chain), motion.task_position(arm.chain)
                 c = learned.control_signal(q, x)
             elif name == SWIVEL:
                 c = arm.swivel(task) / np.radians(70.0)  # as far as it was explored
@@ -138,7 +138,7 @@ def of_arm(arm: RealArm) -> dict[str, list[float]]:
             rows.setdefault(name, []).extend(
                 np.abs(swings(motion.time, c, ends)).tolist()
             )
-        x = motion.place(arm.chain)
+        x = motion.task_position(arm.chain)
         rows.setdefault("way", []).extend(
             float(np.linalg.norm(x[b] - x[a])) for a, b in ends
         )
@@ -167,7 +167,7 @@ def us_per_step(person: Person) -> dict[str, float]:
     for name, body in (("learned", None), ("Jacobian", subject.skeleton)):
         control = RateControl(learned, body, CHAIN)
         q = motion.chain_angles(CHAIN) if body is None else motion.q
-        v, x = motion.chain_velocities(CHAIN), motion.place(CHAIN)
+        v, x = motion.chain_velocities(CHAIN), motion.task_position(CHAIN)
         speed, spent = motion.hand_speed(CHAIN), []
         for i in range(min(1000, len(q))):
             start = time.perf_counter()

@@ -11,7 +11,7 @@ from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate, elbow_reference, in_sight, track_chain
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
-from ikns.nullspace.map import still
+from ikns.nullspace.map import still_mask
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
 
@@ -19,9 +19,10 @@ from ikns.recording.recording import Recording
 def test_c_rises_with_the_elbow_at_every_point() -> None:
     subject, run = small_person.subject(), small_person.protocol()
     motion, learned = subject.motions[0], subject.null_space_map
-    gate = still(motion, subject.chain)
+    gate = still_mask(motion, subject.chain)
     c = learned.control_signal(
-        motion.chain_angles(subject.chain)[gate], motion.place(subject.chain)[gate]
+        motion.chain_angles(subject.chain)[gate],
+        motion.task_position(subject.chain)[gate],
     )
     for k in range(len(learned.centers_)):
         own = learned.labels_ == k
@@ -168,9 +169,9 @@ def test_with_two_arms_each_elbow_drives_its_own_signal() -> None:
         run.static.recording, [run.points.recording], chain="both_arms", n_dof=2
     )
     motion, learned = subject.motions[0], subject.null_space_map
-    gate = still(motion, "both_arms")
+    gate = still_mask(motion, "both_arms")
     c = learned.control_signal(
-        motion.chain_angles("both_arms")[gate], motion.place("both_arms")[gate]
+        motion.chain_angles("both_arms")[gate], motion.task_position("both_arms")[gate]
     )
     true = run.subject.skeleton
     heights = np.array(
@@ -223,7 +224,7 @@ def test_a_hidden_hand_is_not_a_still_hand() -> None:
     markers[20:40, arm] = np.nan
     hidden = Recording(recording.time, markers, recording.labels, "hidden")
     motion = track_chain(skeleton, hidden, "right_arm")
-    assert not still(motion, "right_arm")[20:40].any()
+    assert not still_mask(motion, "right_arm")[20:40].any()
 
 
 def test_a_recording_without_a_segment_is_refused_by_name() -> None:

@@ -101,7 +101,7 @@ def test_points_that_were_not_visited_are_left_out(learned):
     )
     found = compare_motion(learned, BODY, part, resamples=0)
     assert len(found.points) == 1
-    place = part.place("right_arm").mean(axis=0)
+    place = part.task_position("right_arm").mean(axis=0)
     # The point of the map that lies where the hand was held, half a meter from others.
     assert np.linalg.norm(learned.centers_[found.points[0]] - place) < 0.05
 
@@ -109,7 +109,9 @@ def test_points_that_were_not_visited_are_left_out(learned):
 def test_crosstalk_is_that_of_the_map_on_the_reaches(learned):
     free = small_person.protocol().points.truth
     found = motion_crosstalk(learned, free)
-    c = learned.control_signal(free.chain_angles("right_arm"), free.place("right_arm"))
+    c = learned.control_signal(
+        free.chain_angles("right_arm"), free.task_position("right_arm")
+    )
     before, after = found.reaches.T
     np.testing.assert_array_equal(found.change, c[after] - c[before])
     assert len(found.change) == 9  # between ten points

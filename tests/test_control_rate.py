@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.live.control import RateControl, carried, null_rate
+from ikns.live.control import RateControl, null_rate, reach_gain
 from ikns.live.control.local_map import LocalMap
 from ikns.live.control.null_rate import garrote
 from ikns.nullspace.map import NullSpaceMap
@@ -147,7 +147,7 @@ def test_task_motion_leaves_c_alone_wherever_the_arm_is(skeleton, task, weights)
     control.reset(0.3)
     inverse = np.ones(7) if weights is None else 1 / weights
     rng = np.random.default_rng(0)
-    for q, x in zip(motion.q, motion.place("right_arm"), strict=True):
+    for q, x in zip(motion.q, motion.task_position("right_arm"), strict=True):
         J = skeleton.chain_jacobian(q, "right_arm", task=task)
         v = inverse * (J.T @ rng.normal(size=len(J)))
         c = control.step(q, v, x, 0.01, hand_speed=0.0)
@@ -270,7 +270,7 @@ def test_a_motion_at_once_is_its_samples_one_by_one(skeleton, chain, n_dof, body
     q = motion.q if body else motion.chain_angles(chain)
     v, x, speed = (
         motion.chain_velocities(chain),
-        motion.place(chain),
+        motion.task_position(chain),
         motion.hand_speed(chain),
     )
     steps = np.r_[0.0, np.diff(motion.time)]
@@ -444,7 +444,7 @@ def test_what_is_carried_is_found_as_a_share_of_the_way(skeleton):
     moved = replaced(motion, v=v)
     assert (speed > 0.05).all()
     for quantile in (0.0, 0.5, 1.0):
-        found = carried(control, moved, quantile=quantile)[0]
+        found = reach_gain(control, moved, quantile=quantile)[0]
         share = speed[ratio <= found + 1e-9].sum() / speed.sum()
         # One sample more or less, of 120.
         assert abs(share - quantile) <= 2 * speed.max() / speed.sum()
@@ -492,6 +492,6 @@ def test_a_hand_that_never_travels_carries_nothing(skeleton):
     still = replaced(motion, hand_velocity_in_thorax=np.zeros((30, 2, 3)))
     control = RateControl(straight_map(np.eye(7)[0]))
     with pytest.raises(NotEnoughData, match="none of 30"):
-        carried(control, still)
+        reach_gain(control, still)
     with pytest.raises(InvalidInput, match="quantile"):
-        carried(control, motion, quantile=2.0)
+        reach_gain(control, motion, quantile=2.0)

@@ -277,7 +277,7 @@ def test_the_tracker_sees_the_hand_where_it_is():
     skeleton = run.subject.skeleton.with_markers(worn)
     tracker = HandTracker(skeleton, "right_arm", run.free.recording.labels)
     place = tracker.place(run.free.recording.markers[0])
-    truth = run.free.truth.place("right_arm")[0]
+    truth = run.free.truth.task_position("right_arm")[0]
     assert place is not None
     # Without noise the truth leaves no residual; the solver's last step, of at most
     # 1e-5 rad, moves a hand 0.7 m away by less than 1e-5 m.

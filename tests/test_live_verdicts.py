@@ -9,7 +9,7 @@ import small_person
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.live.calibration import Judge, Step, Verdict
-from ikns.nullspace.map import still
+from ikns.nullspace.map import still_mask
 from ikns.recording.recording import Recording
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
 
@@ -50,7 +50,7 @@ def at_point(recording: Recording, name: str = "point_01") -> Verdict:
 def test_steady_points_are_kept_and_their_figures_are_those_of_the_calibration():
     subject = small_person.subject()
     (motion,) = subject.motions
-    gate = still(motion)
+    gate = still_mask(motion)
     for k in range(0, 10, 2):
         verdict = at_point(piece(small_person.protocol(), k))
         assert verdict.keep, verdict.reason
@@ -62,7 +62,7 @@ def test_steady_points_are_kept_and_their_figures_are_those_of_the_calibration()
         assert verdict.place is not None
         # Hand drift of 4 mm per axis and 1 mm of marker noise: the means of two sets
         # of samples of the same stay differ by less than one standard deviation.
-        place = motion.place("right_arm")[gate & rows].mean(axis=0)
+        place = motion.task_position("right_arm")[gate & rows].mean(axis=0)
         assert np.linalg.norm(verdict.place - place) < 4e-3 * np.sqrt(3)
 
 

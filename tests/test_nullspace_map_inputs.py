@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from ikns.body.chains import CHAINS
 from ikns.errors import IknsError, InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
-from ikns.nullspace.map import MapWarning, NullSpaceMap, null_space_samples, still
+from ikns.nullspace.map import MapWarning, NullSpaceMap, null_space_samples, still_mask
 from ikns.nullspace.map.alignment import spanning_tree
 
 PLACES = np.array(list(np.ndindex(2, 2, 2)), dtype=float) * 0.3
@@ -260,20 +260,22 @@ def motion(speed, *, chain="right_arm", missing=()):
 
 def test_the_gate_keeps_slow_and_known_samples():
     moved = motion([0.01, 0.2, 0.049, 0.051, np.nan, 0.0], missing=[5])
-    assert still(moved).tolist() == [True, False, True, False, False, False]
+    assert still_mask(moved).tolist() == [True, False, True, False, False, False]
     x, q = null_space_samples(moved)
-    assert np.array_equal(x, moved.place("right_arm")[[0, 2]])
+    assert np.array_equal(x, moved.task_position("right_arm")[[0, 2]])
     assert np.array_equal(q, moved.chain_angles("right_arm")[[0, 2]])
-    assert still(moved, "left_arm").all()
-    assert still(moved, max_hand_speed=0.1).sum() == 3
+    assert still_mask(moved, "left_arm").all()
+    assert still_mask(moved, max_hand_speed=0.1).sum() == 3
 
 
 def test_rests_that_are_too_short_are_left_out():
     speed = np.ones(40)
     speed[2:10] = speed[20:31] = 0.0  # 0.07 s and 0.10 s from first to last sample
     moved = motion(speed)
-    assert np.flatnonzero(still(moved, min_duration=0.1)).tolist() == [*range(20, 31)]
-    assert still(moved, min_duration=0.07).sum() == 19
+    assert np.flatnonzero(still_mask(moved, min_duration=0.1)).tolist() == [
+        *range(20, 31)
+    ]
+    assert still_mask(moved, min_duration=0.07).sum() == 19
     with pytest.raises(NotEnoughData, match="for 0.2 s .* the 19 slower ones"):
         null_space_samples(moved, min_duration=0.2)
 

@@ -203,7 +203,7 @@ def test_the_page_knows_c_of_every_frame() -> None:
     kept = kept_frames(motion().time)
     learned = small_person.subject().null_space_map
     expected = learned.control_signal(
-        motion().chain_angles(CHAIN)[kept], motion().place(CHAIN)[kept]
+        motion().chain_angles(CHAIN)[kept], motion().task_position(CHAIN)[kept]
     )
     np.testing.assert_array_equal(scene().c, expected)
     assert np.isfinite(scene().c).any()

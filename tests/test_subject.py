@@ -33,7 +33,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 def test_a_loaded_subject_gives_the_same_control_signal(folder: Path) -> None:
     made, loaded = small_person.subject(), Subject.load(folder)
     motion = made.motions[0]
-    x, q = motion.place(made.chain), motion.chain_angles(made.chain)
+    x, q = motion.task_position(made.chain), motion.chain_angles(made.chain)
     # JSON prints floats so that they read back as the same bits.
     np.testing.assert_array_equal(
         loaded.null_space_map.control_signal(q, x),

@@ -20,7 +20,7 @@ from ikns.calibration import track_chain
 from ikns.calibration.scaling import scale
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
-from ikns.nullspace.map import still
+from ikns.nullspace.map import still_mask
 from ikns.recording.files import read
 
 
@@ -56,7 +56,7 @@ def test_a_design_splits_the_chain_at_the_mean_posture_of_the_whole_body(task) -
 def test_a_swivelling_elbow_varies_where_a_held_pose_does_not_see() -> None:
     """The simulated swivel keeps the pose, but for drift of the hand."""
     skeleton, motion = truth()
-    gate, points = still(motion), small_person.protocol().points.point
+    gate, points = still_mask(motion), small_person.protocol().points.point
     ratios = []
     for k in range(10):
         split = within_trial(skeleton, motion, gate & (points == k), task="pose")

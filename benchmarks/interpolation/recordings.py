@@ -16,7 +16,7 @@ from ikns.calibration import calibrate, elbow_reference
 from ikns.calibration.sight import track_chain
 from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
-from ikns.nullspace.map import NullSpaceMap, null_space_samples, still
+from ikns.nullspace.map import NullSpaceMap, null_space_samples, still_mask
 from ikns.simulation import Trial, Unsteadiness, simulate_protocol
 from ikns.simulation.exercise import visit
 from ikns.simulation.movement import carry_out
@@ -139,7 +139,7 @@ def sweep(
     except NotEnoughData:
         lost = ("stray", "own", "angle", "c", "c95", "components")
         return {"kept": 0.0, "found": 0.0} | dict.fromkeys(lost, np.nan)
-    gated = np.flatnonzero(still(recorded.motion, CHAIN, max_hand_speed=gate))
+    gated = np.flatnonzero(still_mask(recorded.motion, CHAIN, max_hand_speed=gate))
     at_point = recorded.points.point >= 0
     used = at_point[gated[learned.labels_ >= 0]]
     result = {
@@ -152,7 +152,7 @@ def sweep(
         learned.directions_[:, 0],
         np.array([recorded.visits[k][1].direction for k in apart.argmin(axis=1)]),
     )
-    x = recorded.test_motion.place(CHAIN)
+    x = recorded.test_motion.task_position(CHAIN)
     c = learned.control_signal(recorded.test_motion.chain_angles(CHAIN), x)
     angle, error = [], []
     for rows, one in recorded.test_visits:
@@ -178,7 +178,7 @@ def _fit(
     """Learn as `calibrate` does."""
     motion = recorded.motion
     x, q = null_space_samples(motion, CHAIN, max_hand_speed=gate)
-    middle = motion.angles[still(motion, CHAIN, max_hand_speed=gate)].mean(axis=0)
+    middle = motion.angles[still_mask(motion, CHAIN, max_hand_speed=gate)].mean(axis=0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of points left out: they are counted
         return NullSpaceMap(

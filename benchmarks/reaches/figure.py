@@ -28,7 +28,7 @@ def draw(folder: Path, person: Person) -> None:
             motion, known = session.motion, session.motion.time <= 30
             t = motion.time[known]
             position = learned.control_signal(
-                motion.chain_angles(CHAIN), motion.place(CHAIN)
+                motion.chain_angles(CHAIN), motion.task_position(CHAIN)
             )
             bare = made["rate, Jacobian, bare"]((0.0, 1.0)).track(motion)
             full = made[DEFAULT]((0.0, 1.0)).track(motion)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
-from ikns.live.control import RateControl, carried
+from ikns.live.control import RateControl, reach_gain
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 
@@ -48,7 +48,7 @@ def controls(
         if settings.pop("calibrated", False):
             # Of several motions the mean, so that each task counts alike.
             bare = RateControl(learned, skeleton, chain)
-            settings["carry"] = np.mean([carried(bare, m) for m in calm], axis=0)
+            settings["carry"] = np.mean([reach_gain(bare, m) for m in calm], axis=0)
         made[name] = lambda limits, s=skeleton, k=settings: RateControl(
             learned, s, chain, limits=limits, **k
         )

@@ -56,7 +56,7 @@ class RealArm:
         """First and last sample of each reach within the map's volume."""
         motion = self.trials[task]
         moving = motion.hand_speed(self.chain) >= _GATE
-        x, time = motion.place(self.chain), motion.time
+        x, time = motion.task_position(self.chain), motion.time
         inside = self.null_space_map.inside(x)
         ends = np.flatnonzero(np.diff(np.r_[False, moving, False]))
         return [
@@ -98,7 +98,7 @@ def real_arms(folder: Path, *, quick: bool) -> list[RealArm]:
 
 def _explored(skeleton: Skeleton, side: str, trials: dict[str, Motion]) -> NullSpaceMap:
     arm, chain = Arm(skeleton, side), f"{side}_arm"
-    x = np.concatenate([motion.place(chain) for motion in trials.values()])
+    x = np.concatenate([motion.task_position(chain) for motion in trials.values()])
     angles = np.concatenate([motion.angles for motion in trials.values()])
     centers = BoundingBoxKMeans(10).fit(x).cluster_centers_
     reference = elbow_reference(skeleton, angles.mean(axis=0), chain)[0]

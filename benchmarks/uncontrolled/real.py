@@ -19,7 +19,7 @@ from ikns.calibration.scaling import scale
 from ikns.errors import NotEnoughData
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
-from ikns.nullspace.map import still
+from ikns.nullspace.map import still_mask
 from ikns.numerics.subspace import null_projector
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
@@ -54,7 +54,7 @@ def self_motion_index(skeleton: Skeleton, motion: Motion, chain: str) -> dict:
 
 def longest_rest(motion: Motion, chain: str) -> np.ndarray:
     """Longest time with the hand at rest, as which samples."""
-    gate = still(motion, chain, min_duration=0.5)
+    gate = still_mask(motion, chain, min_duration=0.5)
     edges = np.flatnonzero(np.diff(np.r_[False, gate, False])).reshape(-1, 2)
     rows = np.zeros(len(gate), dtype=bool)
     if len(edges):

@@ -23,7 +23,7 @@ from ikns.calibration.scaling import ScalingReport, scale
 from ikns.calibration.sight import marker_fault, track_chain
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData, naming
-from ikns.nullspace.map import MapWarning, NullSpaceMap, still
+from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.recording.recording import Recording
 
 __all__ = ["calibrate"]
@@ -107,7 +107,9 @@ def calibrate(
         track_chain(skeleton, recording, chain, progress=progress)
         for recording in explorations
     )
-    gates = [still(motion, chain, max_hand_speed=max_hand_speed) for motion in motions]
+    gates = [
+        still_mask(motion, chain, max_hand_speed=max_hand_speed) for motion in motions
+    ]
     if not any(gate.any() for gate in gates):
         speeds = np.concatenate([motion.hand_speed(chain) for motion in motions])
         raise NotEnoughData(
@@ -115,7 +117,7 @@ def calibrate(
             f"m/s, found none below {np.nanmin(speeds, initial=np.inf):.3g} m/s."
         )
     pairs = list(zip(motions, gates, strict=True))
-    x = np.concatenate([motion.place(chain)[gate] for motion, gate in pairs])
+    x = np.concatenate([motion.task_position(chain)[gate] for motion, gate in pairs])
     q = np.concatenate([motion.chain_angles(chain)[gate] for motion, gate in pairs])
     posture = np.concatenate([motion.angles[gate] for motion, gate in pairs])
     enough = int(np.ceil(min_still * explorations[0].rate))

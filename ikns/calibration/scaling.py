@@ -218,7 +218,7 @@ def static_posture(
         )
     target = _mean_posture(static, worn)
     worn = replace(worn, held=worn.held + _absent_joints(static, worn, target))
-    return generic.wearing(worn), target, duration
+    return generic.with_nominal_markers(worn), target, duration
 
 
 def _mean_posture(static: Recording, worn: MarkerSet) -> Array:

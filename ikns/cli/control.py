@@ -87,7 +87,7 @@ def write_control(
     from ikns.live.control import RateControl
 
     learned, chain = subject.null_space_map, subject.chain
-    place = motion.place(chain)
+    place = motion.task_position(chain)
     if mode == "rate":
         raw = RateControl(learned, subject.skeleton, chain).track(motion)
     else:

@@ -123,14 +123,14 @@ def over_points(
 
     from ikns.analysis.ucm import confidence_interval, surrogate_test, within_trial
     from ikns.nullspace.clustering import nearest_center
-    from ikns.nullspace.map import still
+    from ikns.nullspace.map import still_mask
 
     (motion,), (source,) = motions, sources
     chain, learned = subject.chain, subject.null_space_map
-    gate = still(motion, chain, max_hand_speed=speed)
+    gate = still_mask(motion, chain, max_hand_speed=speed)
     near = np.full(len(gate), -1)
     if gate.any():
-        places = motion.place(chain)[gate]
+        places = motion.task_position(chain)[gate]
         near[gate] = nearest_center(places, learned.centers_, radius=learned.radius_)[0]
     n_points, n_joints = len(learned.centers_), learned.directions_.shape[-1]
     counts = np.bincount(near[near >= 0], minlength=n_points)

@@ -78,7 +78,7 @@ class Motion:
         """Joint velocities of a chain, (T, n) rad/s in chain order."""
         return self.v[:, -len(self.joint_names) :][:, self._columns(chain)]
 
-    def place(self, chain: str) -> NDArray[np.float64]:
+    def task_position(self, chain: str) -> NDArray[np.float64]:
         """Where the task happens: the hand, or the midpoint of both, (T, 3) m."""
         return self.hand_in_thorax[:, self._sides(chain)].mean(axis=1)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ikns.body.chains import SIDES, chain_joints
 from ikns.calibration.subject import Subject
 from ikns.motion.motion import Motion
-from ikns.nullspace.map import still
+from ikns.nullspace.map import still_mask
 from ikns.simulation import Protocol
 from ikns.view.figures import (
     arm_points,
@@ -62,8 +62,8 @@ class StillSamples(NamedTuple):
 def still_samples(subject: Subject, swivel: NDArray[np.float64]) -> StillSamples:
     """Collect the still samples of a calibration with one exploration."""
     motion, learned = subject.motions[0], subject.null_space_map
-    gate = still(motion, subject.chain)
-    x = motion.place(subject.chain)[gate]
+    gate = still_mask(motion, subject.chain)
+    x = motion.task_position(subject.chain)[gate]
     c = learned.control_signal(motion.chain_angles(subject.chain)[gate], x)
     true = swivel[gate]
     correlations = []
@@ -102,12 +102,14 @@ def write_demo_report(
     nothing = np.full(learned.directions_.shape[1:], np.nan).tolist()
     angles = [np.radians(row.get("angle_deg", [np.nan])[0]) for row in rows]
     posture = motion.q[np.argmin(np.abs(motion.time - motion.time.mean()))]
-    raw = learned.control_signal(reaching.chain_angles(chain), reaching.place(chain))
+    raw = learned.control_signal(
+        reaching.chain_angles(chain), reaching.task_position(chain)
+    )
     facets = getattr(learned.interpolator_, "hull_facets", None)
     worst = min(at_rest.correlations, key=abs)
     picture = {
         "workspace": workspace_figure(
-            motion.place(chain),
+            motion.task_position(chain),
             at_rest.hand,
             at_rest.labels,
             learned.centers_,
@@ -137,7 +139,7 @@ def write_demo_report(
             reaching.time,
             raw,
             reaching.hand_speed(chain),
-            learned.inside(reaching.place(chain)),
+            learned.inside(reaching.task_position(chain)),
             gate=0.05,
             simulated=True,
         ),

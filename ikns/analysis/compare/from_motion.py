@@ -20,7 +20,7 @@ from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
-from ikns.nullspace.map import NullSpaceMap, still
+from ikns.nullspace.map import NullSpaceMap, still_mask
 
 __all__ = ["compare_motion", "compare_robot", "motion_crosstalk"]
 
@@ -65,7 +65,7 @@ def compare_motion(
         ``"internal"`` directions are learned again too; rotation vectors start from the
         mean posture of all samples.
     max_hand_speed, min_duration : float
-        See :func:`ikns.nullspace.map.still`, m/s and s.
+        See :func:`ikns.nullspace.map.still_mask`, m/s and s.
     **options
         Of :func:`ikns.analysis.compare.compare_samples`.
 
@@ -94,11 +94,11 @@ def compare_motion(
             f"expected a map of {chain} with {len(chain_joints(chain))} joints, found "
             f"one of {learned.directions_.shape[2]}."
         )
-    gate = still(
+    gate = still_mask(
         motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration
     )
     gate &= np.isfinite(motion.chain_angles(whole)).all(axis=1)
-    x, angles = motion.place(chain)[gate], motion.angles[gate]
+    x, angles = motion.task_position(chain)[gate], motion.angles[gate]
     q = motion.chain_angles(whole)[gate]
     if not len(x):
         raise NotEnoughData(
@@ -236,11 +236,11 @@ def motion_crosstalk(
     **options
         Of :func:`ikns.analysis.compare.crosstalk`.
     """
-    c = learned.control_signal(motion.chain_angles(chain), motion.place(chain))
+    c = learned.control_signal(motion.chain_angles(chain), motion.task_position(chain))
     return crosstalk(
         c if c.ndim == 1 else c[:, 0],
         motion.hand_speed(chain),
-        motion.place(chain),
+        motion.task_position(chain),
         max_hand_speed=max_hand_speed,
         **options,
     )

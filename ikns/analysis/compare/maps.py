@@ -13,7 +13,7 @@ from ikns.body.chains import SIDES, chain_sides
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
-from ikns.nullspace.map import NullSpaceMap, null_space_samples, still
+from ikns.nullspace.map import NullSpaceMap, null_space_samples, still_mask
 from ikns.numerics.bootstrap import length_interval
 from ikns.numerics.subspace import principal_angles
 
@@ -117,7 +117,7 @@ def compare(
             f"{analytic.directions_.shape}."
         )
     x, q = null_space_samples(motion, chain, max_hand_speed=max_hand_speed)
-    gate = still(motion, chain, max_hand_speed=max_hand_speed)
+    gate = still_mask(motion, chain, max_hand_speed=max_hand_speed)
     side = SIDES.index(chain_sides(chain)[0])
     rotation = motion.hand_rotation_in_thorax[gate][:, side]
     radius = getattr(learned, "radius_", None)

@@ -84,7 +84,7 @@ def within_trial(
     skeleton : Skeleton
     motion : Motion
     where : (T,) boolean array
-        Which samples, as from :func:`ikns.nullspace.map.still`.
+        Which samples, as from :func:`ikns.nullspace.map.still_mask`.
     chain, task
         See :func:`across_trials`.
     min_samples : int, optional

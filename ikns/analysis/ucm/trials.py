@@ -172,7 +172,7 @@ def aligned_angles(
     for motion in motions:
         cut = movement(motion.time, motion.hand_speed(chain), threshold=threshold)
         angles = np.array(motion.angles[cut])
-        angles[np.isnan(motion.place(chain)[cut, 0])] = np.nan
+        angles[np.isnan(motion.task_position(chain)[cut, 0])] = np.nan
         time = motion.time[cut]
         trials.append(normalize_time(angles, time, samples=samples, kind=kind))
     if not trials:

@@ -178,7 +178,7 @@ class Skeleton:
         """Return the same body wearing these markers where the set says."""
         return Skeleton(self.urdf, marker_set)
 
-    def wearing(self, marker_set: MarkerSet) -> Skeleton:
+    def with_nominal_markers(self, marker_set: MarkerSet) -> Skeleton:
         """Return the same body with markers at the nominal places for its size.
 
         A shipped set's places are those on the generic body; along a longer limb they

@@ -22,7 +22,7 @@ from ikns.live.calibration.measures import (
     tracking_fault,
 )
 from ikns.live.calibration.verdict import ONE_PLACE, Verdict
-from ikns.nullspace.map import MapWarning, NullSpaceMap, still
+from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.recording.recording import Recording
 
 __all__ = ["judge_point"]
@@ -74,7 +74,7 @@ def judge_point(
         motion = track_chain(skeleton, recording, chain)
     except IknsError as error:
         return Verdict(False, False, str(error), values)
-    gate = still(motion, chain, max_hand_speed=max_hand_speed)
+    gate = still_mask(motion, chain, max_hand_speed=max_hand_speed)
     known = np.isfinite(motion.hand_speed(chain))
     steady = gate.sum() / max(1, known.sum())
     values |= {
@@ -96,7 +96,7 @@ def judge_point(
             f"{speed:.2f} m/s.",
             values,
         )
-    x, q = motion.place(chain)[gate], motion.chain_angles(chain)[gate]
+    x, q = motion.task_position(chain)[gate], motion.chain_angles(chain)[gate]
     place = x.mean(axis=0)
     learned = NullSpaceMap(
         1,

@@ -49,7 +49,7 @@ def check_labels(
     worn = MarkerSet.load(marker_set).without_static()
     needed = sorted(
         column
-        for own, _ in sight_needs(generic.wearing(worn), chain).values()
+        for own, _ in sight_needs(generic.with_nominal_markers(worn), chain).values()
         for column in own
     )
     columns = worn.columns(source.labels)

@@ -176,7 +176,7 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
         motion = track_chain(skeleton, recording, chain)
     except IknsError as error:
         return Verdict(False, False, str(error), values)
-    places = motion.place(chain)
+    places = motion.task_position(chain)
     known = np.all(np.isfinite(places), axis=1)
     explored = places[known]
     values["hand_seen_percent"] = percent(known)

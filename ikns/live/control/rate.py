@@ -265,7 +265,7 @@ def samples_of(control: RateControl, motion: Motion) -> tuple[Array, Array, Arra
     """Return what :meth:`RateControl.step` takes as q, v and x, a row a sample."""
     chain = control.chain
     q = motion.chain_angles(chain) if control.skeleton is None else motion.q
-    return q, motion.chain_velocities(chain), motion.place(chain)
+    return q, motion.chain_velocities(chain), motion.task_position(chain)
 
 
 def _null_space(J: Array) -> Array:

@@ -9,10 +9,10 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.live.control.rate import RateControl, samples_of
 from ikns.motion.motion import Motion
 
-__all__ = ["carried"]
+__all__ = ["reach_gain"]
 
 
-def carried(
+def reach_gain(
     control: RateControl, motion: Motion, *, quantile: float = 0.9
 ) -> NDArray[np.float64]:
     """How much c the reaches of a motion carry along, per m of the hand's way.

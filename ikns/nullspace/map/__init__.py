@@ -7,6 +7,12 @@ The method is in `estimator`, read top to bottom; the signs that it needs in
 from ikns.nullspace.map.analytic import analytic_map
 from ikns.nullspace.map.checks import MapWarning
 from ikns.nullspace.map.estimator import NullSpaceMap
-from ikns.nullspace.map.samples import null_space_samples, still
+from ikns.nullspace.map.samples import null_space_samples, still_mask
 
-__all__ = ["MapWarning", "NullSpaceMap", "analytic_map", "null_space_samples", "still"]
+__all__ = [
+    "MapWarning",
+    "NullSpaceMap",
+    "analytic_map",
+    "null_space_samples",
+    "still_mask",
+]

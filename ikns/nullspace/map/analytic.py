@@ -14,7 +14,7 @@ from ikns.nullspace.map.assembly import assemble
 from ikns.nullspace.map.checks import at, checked_settings
 from ikns.nullspace.map.estimator import NullSpaceMap
 from ikns.nullspace.map.interpolator import between
-from ikns.nullspace.map.samples import null_space_samples, still
+from ikns.nullspace.map.samples import null_space_samples, still_mask
 from ikns.numerics.subspace import mean_null_direction
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def analytic_map(
     task : {"pose", "position"}
         What is held: hand position and orientation, or position alone.
     max_hand_speed, min_duration : float
-        See :func:`ikns.nullspace.map.still`, m/s and s.
+        See :func:`ikns.nullspace.map.still_mask`, m/s and s.
     radius : float, optional
         Samples farther from their center are left out, m; the ``radius_`` of a learned
         map to use its samples. Default as in
@@ -84,7 +84,7 @@ def analytic_map(
         raise InvalidInput(f"expected finite centers (P, 3), found {places.shape}.")
     gate = {"max_hand_speed": max_hand_speed, "min_duration": min_duration}
     x, q = null_space_samples(motion, chain, **gate)
-    visited = motion.q[still(motion, chain, **gate)]
+    visited = motion.q[still_mask(motion, chain, **gate)]
     made = NullSpaceMap(len(places), **parameters)
     settings = checked_settings(made, q.shape)
     labels, _ = nearest_center(x, places, radius=radius)

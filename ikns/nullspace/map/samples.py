@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
 
-__all__ = ["null_space_samples", "still"]
+__all__ = ["null_space_samples", "still_mask"]
 
 
-def still(
+def still_mask(
     motion: Motion,
     chain: str = "right_arm",
     *,
@@ -39,7 +39,7 @@ def still(
         False where hand position, speed, joint angles or joint velocities are missing.
     """
     values = (
-        motion.place(chain),
+        motion.task_position(chain),
         motion.chain_angles(chain),
         motion.chain_velocities(chain),
     )
@@ -63,7 +63,7 @@ def null_space_samples(
     """Hand positions and joint vectors of the samples whose hands are still.
 
     The matching velocities, for ``NullSpaceMap(domain="velocity")``, are
-    ``motion.chain_velocities(chain)[still(motion, chain)]``.
+    ``motion.chain_velocities(chain)[still_mask(motion, chain)]``.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def null_space_samples(
     NotEnoughData
         When no sample passes.
     """
-    gate = still(
+    gate = still_mask(
         motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration
     )
     if not gate.any():
@@ -102,4 +102,4 @@ def null_space_samples(
             f"{max_hand_speed:g} m/s for {min_duration:g} s and every joint known, but "
             f"of {len(gate)} samples {found}."
         )
-    return motion.place(chain)[gate], motion.chain_angles(chain)[gate]
+    return motion.task_position(chain)[gate], motion.chain_angles(chain)[gate]

@@ -21,7 +21,7 @@ from ikns.view.scene.scene import Layer, Scene, camera_and_target
 from ikns.view.scene.swivel import Swivel, swivel_commands, swivel_tracks
 from ikns.view.style import INK, VOLUME, point_color
 
-__all__ = ["hidden", "map_commands", "map_layers", "map_scene", "chosen_point"]
+__all__ = ["chosen_point", "hidden", "map_commands", "map_layers", "map_scene"]
 
 #: Legend of things in many colors.
 _MANY = "conic-gradient({} 33%, {} 0 67%, {} 0)".format(

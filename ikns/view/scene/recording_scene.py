@@ -92,7 +92,7 @@ def recording_scene(
     if not known.any():
         raise NotEnoughData(f"{recording.source}: no frame shows a posture to draw.")
     chosen = chosen_point(learned, point)
-    place = motion.place(chain)
+    place = motion.task_position(chain)
     distance = np.linalg.norm(place - learned.centers_[chosen], axis=1)
     near = int(np.argmin(np.where(known & np.isfinite(distance), distance, np.inf)))
     if not known[near]:  # the hand was never in sight
