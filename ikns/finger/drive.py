@@ -8,9 +8,9 @@ import threading
 import time
 
 from ikns.finger.bus import Bus, NoAnswer, Refused, Unplugged
+from ikns.finger.configuration import ANSWER_ALL, ServoConfiguration
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard
-from ikns.finger.plan import ANSWER_ALL, Plan
 from ikns.finger.state import FingerState
 
 __all__ = ["Drive"]
@@ -31,7 +31,7 @@ class Drive:
     ----------
     bus : Bus
         Used by one thread at a time.
-    plan : Plan
+    configuration : ServoConfiguration
     guard : Guard
     lock : lock
         Held while guard or results are touched, never while the bus is in use.
@@ -45,9 +45,18 @@ class Drive:
     """
 
     def __init__(
-        self, bus: Bus, plan: Plan, guard: Guard, lock: threading.RLock
+        self,
+        bus: Bus,
+        configuration: ServoConfiguration,
+        guard: Guard,
+        lock: threading.RLock,
     ) -> None:
-        self._bus, self._plan, self._guard, self._lock = bus, plan, guard, lock
+        self._bus, self._configuration, self._guard, self._lock = (
+            bus,
+            configuration,
+            guard,
+            lock,
+        )
         self.known = FingerState()
         self.alert = ""
         self._torque = False  # as far as is known
@@ -57,7 +66,8 @@ class Drive:
 
     def set_up(self) -> None:
         """Write limits, with torque off; permanent memory only where it differs."""
-        bus, model, plan = self._bus, self._bus.model, self._plan
+        bus, model = self._bus, self._bus.model
+        configuration = self._configuration
         with contextlib.suppress(NoAnswer):  # it may be set up to say nothing
             if bus.read("status_return_level") != ANSWER_ALL:
                 bus.write("status_return_level", ANSWER_ALL)
@@ -69,7 +79,10 @@ class Drive:
         self._no_torque()
         if "bus_watchdog" in model:
             bus.write("bus_watchdog", 0)
-        for values in (plan.kept(model), plan.volatile(model)):
+        for values in (
+            configuration.eeprom_registers(model),
+            configuration.ram_registers(model),
+        ):
             for name, value in values.items():
                 if bus.read(name) != value:
                     bus.write(name, value)
@@ -88,15 +101,15 @@ class Drive:
         self._switch_on()
         bus.read("torque_enable")
 
-    def turn(self) -> None:
+    def cycle(self) -> None:
         """Say and ask once; whatever goes wrong becomes the guard's decision."""
         now = time.monotonic()
         with self._lock:
             self._guard.tick(now)
             torque, goal = self._guard.torque, self._guard.goal
         try:
-            self._say(torque, goal)
-            self._ask()
+            self._write_goal(torque, goal)
+            self._read_state()
         except Unplugged as error:
             self._fail(str(error))
             self._reopen()
@@ -125,7 +138,7 @@ class Drive:
             if time.monotonic() > give_up:
                 return False
 
-    def _say(self, torque: bool, goal: float) -> None:
+    def _write_goal(self, torque: bool, goal: float) -> None:
         if not torque:
             if self._torque:
                 self._switch_off()
@@ -136,7 +149,7 @@ class Drive:
                 self._guard.hold_at(time.monotonic(), values.flexion)
             self._switch_on()
             return
-        ticks = self._plan.ticks(goal)
+        ticks = self._configuration.ticks(goal)
         if ticks != self._told:
             self._tell(ticks)
 
@@ -147,7 +160,9 @@ class Drive:
             if not self._watchdog_tripped():
                 raise
             self._torque = False  # it stands still; taken up again from there
-            self._fail(f"the servo heard nothing for {self._plan.watchdog:g} s")
+            self._fail(
+                f"the servo heard nothing for {self._configuration.watchdog:g} s"
+            )
             return
         self._told = ticks
 
@@ -165,15 +180,15 @@ class Drive:
             return
         watchdog = "bus_watchdog" in bus.model
         self._switch_off()
-        for name, value in self._plan.volatile(bus.model).items():
+        for name, value in self._configuration.ram_registers(bus.model).items():
             bus.write(name, value)
         # A goal alone switches an AX-12 on, so it comes last but for torque itself.
         self._torque = True
-        self._told = self._plan.ticks(goal)
+        self._told = self._configuration.ticks(goal)
         bus.write("goal_position", self._told)
         bus.write("torque_enable", 1)
         if watchdog:
-            steps = math.ceil(self._plan.watchdog / _WATCHDOG_UNIT)
+            steps = math.ceil(self._configuration.watchdog / _WATCHDOG_UNIT)
             bus.write("bus_watchdog", steps)
 
     def _switch_off(self) -> None:
@@ -195,7 +210,7 @@ class Drive:
         if bus.read_many("torque_enable", "led")["torque_enable"]:
             raise FingerError(f"{bus.port}: servo {bus.id} does not let go of torque.")
 
-    def _ask(self) -> None:
+    def _read_state(self) -> None:
         values = self._measure()
         now = time.monotonic()
         with self._lock:
@@ -210,13 +225,15 @@ class Drive:
             # An AX-12 that starts again takes up torque with the next goal, but has
             # forgotten how fast it may go.
             name = "profile_velocity"
-            speed = self._plan.volatile(self._bus.model)[name]
+            speed = self._configuration.ram_registers(self._bus.model)[name]
             if not self._bus.read("torque_enable") or self._bus.read(name) != speed:
                 with self._lock:
                     self._guard.fail("the servo has lost its torque", limp=True)
             elif self._watchdog_tripped():
                 self._torque = False
-                self._fail(f"the servo heard nothing for {self._plan.watchdog:g} s")
+                self._fail(
+                    f"the servo heard nothing for {self._configuration.watchdog:g} s"
+                )
 
     def _measure(self) -> FingerState:
         """Read everything that the servo measures, at once.
@@ -232,14 +249,14 @@ class Drive:
             self._beginning = (self._beginning + 1) % len(_BEGINNINGS[model.protocol])
             raise
         now = self._answered = time.monotonic()
-        towards = math.copysign(1.0, self._plan.span)
+        towards = math.copysign(1.0, self._configuration.span)
         current = values.get("present_current", math.nan) * model.current_unit
         load = values.get("present_load", math.nan) / 1000
         if not math.isnan(current):
             load = current / (model["current_limit"].upper * model.current_unit)
         known = FingerState(
             time=now,
-            flexion=self._plan.flexion(values["present_position"]),
+            flexion=self._configuration.flexion(values["present_position"]),
             current=towards * current,
             load=towards * load,
             temperature=float(values["present_temperature"]),

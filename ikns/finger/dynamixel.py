@@ -10,11 +10,11 @@ from typing import Self
 
 from ikns.errors import InvalidInput
 from ikns.finger.bus import Bus
+from ikns.finger.configuration import ServoConfiguration
 from ikns.finger.drive import Drive
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.models import model_named
-from ikns.finger.plan import Plan
 from ikns.finger.relax_at_exit import forget, relax_at_exit
 from ikns.finger.state import FingerState
 
@@ -106,12 +106,14 @@ class DynamixelFinger:
             )
         self.safety = Safety() if safety is None else safety
         self.resolution = 1.0 / abs(span[1] - span[0])
-        self._plan = Plan(*span, effort, watchdog, self.safety.limits)
+        self._configuration = ServoConfiguration(
+            *span, effort, watchdog, self.safety.limits
+        )
         self._bus = Bus(port, id=id, baud=baud, model=self._model)
         self._period = 1.0 / rate
         self._lock = threading.RLock()
         self._guard = Guard(self.safety)
-        self._drive = Drive(self._bus, self._plan, self._guard, self._lock)
+        self._drive = Drive(self._bus, self._configuration, self._guard, self._lock)
         self._thread: threading.Thread | None = None
         self._held = False
         self._stop = threading.Event()
@@ -157,7 +159,9 @@ class DynamixelFinger:
     def command(self, flexion: float) -> float:
         """Ask for a flexion; return what is sent, NaN if nothing is."""
         with self._lock:
-            return self._plan.sent(self._guard.command(time.monotonic(), flexion))
+            return self._configuration.sent(
+                self._guard.command(time.monotonic(), flexion)
+            )
 
     def state(self) -> FingerState:
         """Return the last that is known."""
@@ -167,7 +171,7 @@ class DynamixelFinger:
                 known,
                 age=time.monotonic() - known.time,
                 mode=guard.mode,
-                sent=self._plan.sent(guard.goal),
+                sent=self._configuration.sent(guard.goal),
                 stalled=guard.stalled,
                 alert=guard.reason or self._drive.alert,
             )
@@ -231,7 +235,7 @@ class DynamixelFinger:
         due = time.monotonic()
         try:
             while not self._stop.is_set():
-                self._drive.turn()
+                self._drive.cycle()
                 due = max(due + self._period, time.monotonic())
                 self._stop.wait(max(due - time.monotonic(), 0.0))
         except BaseException as error:  # the servo's watchdog now stops it

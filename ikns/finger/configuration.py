@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ikns.finger.limiter import Limits
 from ikns.finger.models import Model
 
-__all__ = ["ANSWER_ALL", "Plan"]
+__all__ = ["ANSWER_ALL", "ServoConfiguration"]
 
 #: The servo's own profile stays out of the way of the limiter's by this factor.
 _PROFILE_MARGIN = 1.5
@@ -18,7 +18,7 @@ ANSWER_ALL = 2
 
 
 @dataclass(frozen=True)
-class Plan:
+class ServoConfiguration:
     """How flexion becomes ticks, and how hard and fast the servo may push.
 
     Parameters
@@ -54,7 +54,7 @@ class Plan:
         """Flexion as the servo is told, in whole ticks; NaN stays NaN."""
         return flexion if math.isnan(flexion) else self.flexion(self.ticks(flexion))
 
-    def kept(self, model: Model) -> dict[str, int]:
+    def eeprom_registers(self, model: Model) -> dict[str, int]:
         """Return what has to be in the servo's permanent memory.
 
         With current-based position control a servo limits its current, but heeds no
@@ -75,7 +75,7 @@ class Plan:
         values["shutdown"] = model["shutdown"].initial
         return values
 
-    def volatile(self, model: Model) -> dict[str, int]:
+    def ram_registers(self, model: Model) -> dict[str, int]:
         """Return what has to be in its memory while it runs."""
         speed = self.limits.rate * abs(self.span) * _PROFILE_MARGIN
         values = {
