@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.live.control.frame import ControlFrame, FrameSolver
-from ikns.live.control.refusal import explains, refusal
+from ikns.live.control.rejection import fits_markers, rejection_reason
 from ikns.live.control.safety import Changes, SafetyMachine, State
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.live.control.smoothing import OneEuro
 
 __all__ = ["Controller", "Decision"]
@@ -35,7 +35,7 @@ class Decision(NamedTuple):
     ----------
     solved : ControlFrame
         Pose and raw control signal.
-    refused : str
+    rejection : str
         Why the frame does not count, in words; empty if it does.
     flexion : float
         What the finger is asked, 0 to 1; NaN before the first pose.
@@ -46,7 +46,7 @@ class Decision(NamedTuple):
     """
 
     solved: ControlFrame
-    refused: str
+    rejection: str
     flexion: float
     state: State
     changes: Changes
@@ -54,7 +54,7 @@ class Decision(NamedTuple):
     @property
     def valid(self) -> bool:
         """Whether the frame counts."""
-        return not self.refused
+        return not self.rejection
 
 
 class Controller:
@@ -64,7 +64,7 @@ class Controller:
     ----------
     solver : FrameSolver
         Markers to pose and control signal; the first degree of freedom drives.
-    settings : Settings, optional
+    settings : ControlSettings, optional
 
     Attributes
     ----------
@@ -76,9 +76,11 @@ class Controller:
         Of the control signal at the last frame, s.
     """
 
-    def __init__(self, solver: FrameSolver, settings: Settings | None = None) -> None:
+    def __init__(
+        self, solver: FrameSolver, settings: ControlSettings | None = None
+    ) -> None:
         self.solver = solver
-        self.settings = s = Settings() if settings is None else settings
+        self.settings = s = ControlSettings() if settings is None else settings
         self.machine = SafetyMachine(hold_after=s.hold_after, safe_after=s.safe_after)
         self.flexion = math.nan
         self._smooth = OneEuro(cutoff=s.cutoff, beta=s.beta)
@@ -120,14 +122,16 @@ class Controller:
         else:
             self._device_time, self._markers = device_time, seen
         solved = self.solver.solve(markers)
-        refused = refusal(self.solver, self.settings, markers, solved, new=new)
+        rejection = rejection_reason(
+            self.solver, self.settings, markers, solved, new=new
+        )
         machine = self.machine
-        if refused:
-            self._why = refused
-            changes = machine.check(receive_time, refused)
+        if rejection:
+            self._why = rejection
+            changes = machine.check(receive_time, rejection)
             # Its pose may be wrong and no place to start the next from; nor is one of
             # long ago.
-            if not explains(solved, self.settings):
+            if not fits_markers(solved, self.settings):
                 at, q = self._counted
                 recent = receive_time - at < self.settings.safe_after
                 self.solver.reset(q if recent else None)
@@ -136,7 +140,7 @@ class Controller:
             self._why = _SILENCE
             self._counted = receive_time, solved.q
             self._follow(float(solved.c[0]), solved.hand_in_thorax, dt)
-        return Decision(solved, refused, self.flexion, machine.state, changes)
+        return Decision(solved, rejection, self.flexion, machine.state, changes)
 
     def check(self, now: float) -> Changes:
         """Ask the watchdog while no frame comes."""

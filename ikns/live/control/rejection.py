@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from ikns.calibration import say_apart, segment_pairs, sight_needs
 from ikns.live.control.frame import ControlFrame, FrameSolver
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 
-__all__ = ["explains", "refusal"]
+__all__ = ["fits_markers", "rejection_reason"]
 
 
-def explains(solved: ControlFrame, settings: Settings) -> bool:
+def fits_markers(solved: ControlFrame, settings: ControlSettings) -> bool:
     """Whether a pose explains the markers; without a number nothing is explained."""
     return (
         solved.residual <= settings.max_residual
@@ -21,9 +21,9 @@ def explains(solved: ControlFrame, settings: Settings) -> bool:
     )
 
 
-def refusal(
+def rejection_reason(
     solver: FrameSolver,
-    settings: Settings,
+    settings: ControlSettings,
     markers: NDArray[np.float64],
     solved: ControlFrame,
     *,
@@ -35,7 +35,7 @@ def refusal(
     ----------
     solver : FrameSolver
         What solved it.
-    settings : Settings
+    settings : ControlSettings
     markers : (M, 3) array
         What was seen, m in the world.
     solved : ControlFrame

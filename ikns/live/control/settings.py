@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Settings"]
+__all__ = ["ControlSettings"]
 
 
 @dataclass(frozen=True)
-class Settings:
+class ControlSettings:
     """How the control signal becomes a flexion.
 
     Parameters

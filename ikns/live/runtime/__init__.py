@@ -3,6 +3,6 @@
 from ikns.live.runtime.loop import run
 from ikns.live.runtime.priority import check_realtime
 from ikns.live.runtime.replay import Replayed, replay_run
-from ikns.live.runtime.report import Report, Status
+from ikns.live.runtime.report import LoopStatus, Report
 
-__all__ = ["Replayed", "Report", "Status", "check_realtime", "replay_run", "run"]
+__all__ = ["Replayed", "Report", "LoopStatus", "check_realtime", "replay_run", "run"]

@@ -22,9 +22,9 @@ from ikns.finger import Finger
 from ikns.live.control.controller import Controller, Decision
 from ikns.live.control.frame import FrameSolver
 from ikns.live.control.safety import Changes
-from ikns.live.control.settings import Settings
-from ikns.live.runtime.priority import first_in_line
-from ikns.live.runtime.report import Report, Status
+from ikns.live.control.settings import ControlSettings
+from ikns.live.runtime.priority import realtime_priority
+from ikns.live.runtime.report import LoopStatus, Report
 from ikns.live.session import RunWriter, micro
 from ikns.live.session.channels import STATES
 from ikns.live.stream import Frame, Source
@@ -32,10 +32,10 @@ from ikns.live.stream import Frame, Source
 __all__ = ["run"]
 
 #: The finger and the watchdog are looked after this often while no frame comes, s.
-_BEAT = 0.02
+_KEEP_ALIVE = 0.02
 #: How long before a frame is due the last one is worked through once more, s. While a
 #: thread sleeps, code and data leave the processor's caches: the same frame then takes
-#: four times as long (benchmarks/live_loop.py). A rehearsal takes a third of this.
+#: four times as long (benchmarks/live_loop.py). Warming up takes a third of this.
 _AHEAD = 1.5e-3
 #: What is sent when nothing may be: the finger stays where it is.
 _NOTHING = math.nan
@@ -46,11 +46,11 @@ def run(
     subject: Subject,
     finger: Finger | None = None,
     *,
-    settings: Settings | None = None,
+    settings: ControlSettings | None = None,
     session: RunWriter | None = None,
     duration: float = math.inf,
     stop: threading.Event | None = None,
-    on_status: Callable[[Status], None] | None = None,
+    on_status: Callable[[LoopStatus], None] | None = None,
     status_every: float = 0.2,
     on_decision: Callable[[float, float, Decision], None] | None = None,
     realtime: bool = False,
@@ -65,7 +65,7 @@ def run(
         Calibrated.
     finger : Finger, optional
         Not connected yet; without one everything runs but nothing moves.
-    settings : Settings, optional
+    settings : ControlSettings, optional
         Smoothing, dead band, watchdog.
     session : RunWriter, optional
         From :func:`ikns.live.session.open_run` with the labels of the subject's marker
@@ -75,7 +75,7 @@ def run(
     stop : threading.Event, optional
         Set it to stop: the finger is relaxed.
     on_status : callable, optional
-        Called with a :class:`Status` from the loop, so it must not wait.
+        Called with a :class:`LoopStatus` from the loop, so it must not wait.
     status_every : float
         How often, s.
     on_decision : callable, optional
@@ -116,14 +116,14 @@ def run(
     solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     solver.reset()
     stopped = threading.Event() if stop is None else stop
-    with first_in_line(realtime=realtime), _hands_on(finger):
+    with realtime_priority(realtime=realtime), connected(finger):
         loop.begin()
         try:
             while not (stopped.is_set() or source.ended or loop.elapsed() >= duration):
-                frame = source.read(loop.patience())
+                frame = source.read(loop.read_timeout())
                 if frame is None:
-                    if not loop.rehearse():
-                        loop.beat()
+                    if not loop.warm_caches():
+                        loop.keep_alive()
                 else:
                     decision = loop.take(frame)
                     if on_decision:
@@ -154,8 +154,8 @@ class _Loop:
         pace = source.rate * source.speed
         self._period = 1 / pace if pace else math.inf
         # Faster sources leave no time for it, and keep the caches warm themselves.
-        self._rehearses = 4 * _AHEAD <= self._period < math.inf
-        self._rehearsal: tuple[float, NDArray[np.float64], float] | None = None
+        self._warms_caches = 4 * _AHEAD <= self._period < math.inf
+        self._next_warm_up: tuple[float, NDArray[np.float64], float] | None = None
         self._nowhere = np.full(len(controller.solver.skeleton.neutral()), np.nan)
         self._measured = math.nan
         self._first = math.nan
@@ -197,8 +197,8 @@ class _Loop:
         report.stages["command"].add(done - decided)
         report.stages["total"].add(done - received)
         self._last = decision
-        if self._rehearses:
-            self._rehearsal = (received + self._period, seen, device_time)
+        if self._warms_caches:
+            self._next_warm_up = (received + self._period, seen, device_time)
         if self._session:
             self._write(
                 frame.number,
@@ -212,29 +212,29 @@ class _Loop:
         report.stages["loop"].add(time.monotonic() - began)
         return decision
 
-    def patience(self) -> float:
+    def read_timeout(self) -> float:
         """How long to wait for a frame before something else is to be done, s."""
         left = self._controller.machine.deadline - self.elapsed()
-        if self._rehearsal is not None:
-            left = min(left, self._rehearsal[0] - _AHEAD - time.monotonic())
-        return min(max(left, 0.0), _BEAT)
+        if self._next_warm_up is not None:
+            left = min(left, self._next_warm_up[0] - _AHEAD - time.monotonic())
+        return min(max(left, 0.0), _KEEP_ALIVE)
 
-    def rehearse(self) -> bool:
+    def warm_caches(self) -> bool:
         """Shortly before a frame is due, let a twin go through the one before."""
-        if self._rehearsal is None:
+        if self._next_warm_up is None:
             return False
-        due, seen, device_time = self._rehearsal
+        due, seen, device_time = self._next_warm_up
         now = time.monotonic()
         if now < due - _AHEAD:
             return False
-        self._rehearsal = None
+        self._next_warm_up = None
         if now > due - _AHEAD / 2:  # too late: it would stand in the frame's way
             return False
         self._twin.frame(micro(seen), device_time, now)
-        self.report.rehearsals += 1
+        self.report.warm_ups += 1
         return True
 
-    def beat(self) -> None:
+    def keep_alive(self) -> None:
         """No frame came: ask the watchdog, and let the finger hear from us."""
         now = time.monotonic() - self._start
         self._tell(self._controller.check(now))
@@ -254,12 +254,12 @@ class _Loop:
         """Whether it is time to show how it goes."""
         return self.elapsed() - self._shown >= every
 
-    def status(self) -> Status:
+    def status(self) -> LoopStatus:
         """How it goes."""
         now, report, last = self.elapsed(), self.report, self._last
         self._rate = (report.frames - self._shown_frames) / max(now - self._shown, 1e-9)
         self._shown, self._shown_frames = now, report.frames
-        return Status(
+        return LoopStatus(
             time=now,
             rate=self._rate,
             frames=report.frames,
@@ -267,7 +267,7 @@ class _Loop:
             latency=report.stages["total"].percentile(99),
             residual=math.nan if last is None else last.solved.residual,
             worst_residual=math.nan if last is None else last.solved.worst_residual,
-            refused="" if last is None else last.refused,
+            rejection="" if last is None else last.rejection,
             inside=last is not None and last.solved.inside,
             c=math.nan if last is None else float(last.solved.c[0]),
             flexion=self._controller.flexion,
@@ -341,7 +341,7 @@ class _Loop:
 
 
 @contextmanager
-def _hands_on(finger: Finger | None) -> Iterator[None]:
+def connected(finger: Finger | None) -> Iterator[None]:
     if finger is None:
         yield
         return

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 from ikns.errors import InvalidInput
 
-__all__ = ["check_realtime", "first_in_line"]
+__all__ = ["check_realtime", "realtime_priority"]
 
 #: For which other threads may keep the interpreter while the loop waits for it, s:
 #: what a frame takes; Python's own 5 ms are ten times as long (a busy thread beside
@@ -22,7 +22,7 @@ _PRIORITY = 1
 
 
 @contextmanager
-def first_in_line(*, realtime: bool = False) -> Iterator[None]:
+def realtime_priority(*, realtime: bool = False) -> Iterator[None]:
     """Let nobody keep this thread waiting for long.
 
     Python's collector of cycles may take milliseconds; the loop makes no cycles, so

@@ -11,7 +11,7 @@ from ikns.calibration.subject import Subject
 from ikns.errors import FileError
 from ikns.live.control.controller import Controller
 from ikns.live.control.frame import FrameSolver
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.live.session import Run
 from ikns.live.session.channels import STATES
 
@@ -63,7 +63,7 @@ def replay_run(run: Run) -> Replayed:
     """
     subject = Subject.load(run.subject_folder)
     try:
-        settings = Settings(**run.configuration["settings"])
+        settings = ControlSettings(**run.configuration["settings"])
     except (LookupError, TypeError) as error:
         raise FileError(
             f"{run.session}: the configuration of run {run.number} has no settings: "

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ikns.live.control.safety import Transition
 from ikns.live.stream.delays import Delays
 
-__all__ = ["Report", "Status"]
+__all__ = ["Report", "LoopStatus"]
 
 
 @dataclass(frozen=True)
-class Status:
+class LoopStatus:
     """How it goes, for a line on a screen.
 
     Parameters
@@ -30,7 +30,7 @@ class Status:
         99th percentile from receipt to command, s.
     residual, worst_residual : float
         Of the last pose: all markers, and the farthest of the chain, m.
-    refused : str
+    rejection : str
         Why the last frame did not count; empty if it did.
     inside : bool
         Whether the hand is within the points of the map.
@@ -48,7 +48,7 @@ class Status:
     latency: float
     residual: float
     worst_residual: float
-    refused: str
+    rejection: str
     inside: bool
     c: float
     flexion: float
@@ -66,7 +66,7 @@ class Report:
     frames, misses : int
         Frames taken; those that took longer than a frame's time from receipt to
         command.
-    rehearsals : int
+    warm_ups : int
         Times that the caches were warmed before a frame was due.
     seconds : float
     stages : dict of Delays
@@ -84,7 +84,7 @@ class Report:
 
     frames: int = 0
     misses: int = 0
-    rehearsals: int = 0
+    warm_ups: int = 0
     seconds: float = 0.0
     stages: dict[str, Delays] = field(
         default_factory=lambda: {

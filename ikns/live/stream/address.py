@@ -23,7 +23,7 @@ def open_source(
     address: str,
     *,
     needs: MarkerSet | None = None,
-    patience: float = 10.0,
+    read_timeout: float = 10.0,
     late_after: float | None = None,
 ) -> Source:
     """Open a live source.
@@ -37,7 +37,7 @@ def open_source(
         ``?timeout=SECONDS``; options are joined by ``&``.
     needs : MarkerSet, optional
         Every marker of it that is worn in motion must be among the labels.
-    patience : float
+    read_timeout : float
         Seconds without a frame after which iterating gives up.
     late_after : float, optional
         Seconds from which a frame counts as late; one frame period by default.
@@ -78,7 +78,7 @@ def open_source(
         if str(error).startswith(tuple(filter(None, (f"{scheme}:", place)))):
             raise
         raise type(error)(f"{address}: {error}") from None
-    source = Source(feed, patience=patience, late_after=late_after)
+    source = Source(feed, read_timeout=read_timeout, late_after=late_after)
     try:
         if needs is not None:
             _check_labels(source, needs.without_static())

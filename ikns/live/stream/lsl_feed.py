@@ -11,7 +11,7 @@ from typing import Any
 
 from ikns.errors import StreamError
 from ikns.live.stream.frame import Event, Frame
-from ikns.live.stream.lsl_layout import Layout, read_layout
+from ikns.live.stream.lsl_layout import LslLayout, read_layout
 from ikns.live.stream.lsl_library import lsl
 from ikns.live.stream.lsl_numbers import Numbers
 
@@ -33,7 +33,7 @@ _SIGN_OF_LIFE = 2.0
 @dataclass(frozen=True, eq=False)
 class _Open:
     inlet: Any
-    layout: Layout
+    layout: LslLayout
     rate: float
     clock_offset: float
     search: str

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ikns.errors import StreamError
 
-__all__ = ["Layout", "marker_channels", "read_layout"]
+__all__ = ["LslLayout", "marker_channels", "read_layout"]
 
 _UNITS = {
     **dict.fromkeys(["", "m", "meter", "meters", "metre", "metres"], 1.0),
@@ -26,7 +26,7 @@ _UNITS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class LslLayout:
     """Where each marker's coordinates are.
 
     Parameters
@@ -59,7 +59,7 @@ def marker_channels(labels: Iterable[str]) -> Iterator[dict[str, str]]:
             }
 
 
-def read_layout(xml: str, source: str) -> Layout:
+def read_layout(xml: str, source: str) -> LslLayout:
     """Read a stream's description.
 
     Parameters
@@ -110,4 +110,4 @@ def read_layout(xml: str, source: str) -> Layout:
                 f"{marker}, found only {', '.join(sorted(axes))}."
             )
     table = np.array([[axes[axis] for axis in "xyz"] for axes in places.values()])
-    return Layout(tuple(places), table[..., 0].astype(np.int64), table[..., 1])
+    return LslLayout(tuple(places), table[..., 0].astype(np.int64), table[..., 1])

@@ -21,7 +21,7 @@ class Source:
     ----------
     feed : Feed
         Where frames come from.
-    patience : float
+    read_timeout : float
         Seconds without a frame after which iterating gives up.
     late_after : float, optional
         See :class:`Continuity`.
@@ -31,11 +31,11 @@ class Source:
         self,
         feed: Feed,
         *,
-        patience: float = 10.0,
+        read_timeout: float = 10.0,
         late_after: float | None = None,
     ) -> None:
         self._feed = feed
-        self._patience = patience
+        self._read_timeout = read_timeout
         self.continuity = Continuity(feed.rate, speed=feed.speed, late_after=late_after)
         period = 1 / (feed.rate * feed.speed) if feed.speed else 0.0
         self._silence = max(1.0, 10 * period)
@@ -111,15 +111,17 @@ class Source:
         Raises
         ------
         StreamError
-            When none comes for the source's patience.
+            When none comes for the source's read_timeout.
         """
-        give_up = time.monotonic() + self._patience
+        give_up = time.monotonic() + self._read_timeout
         while not self.ended:
             frame = self.read(max(0.0, min(0.5, give_up - time.monotonic())))
             if frame is not None:
                 return frame
             if time.monotonic() >= give_up:
-                raise StreamError(f"{self.name}: no frame for {self._patience:g} s.")
+                raise StreamError(
+                    f"{self.name}: no frame for {self._read_timeout:g} s."
+                )
         raise StopIteration
 
     def close(self) -> None:
