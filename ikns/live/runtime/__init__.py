@@ -1,4 +1,4 @@
-"""The live loop: source, pose, signal, finger, session; and again from disk."""
+"""The live loop from a source of frames to a finger, and its replay."""
 
 from ikns.live.runtime.loop import run
 from ikns.live.runtime.priority import check_realtime
