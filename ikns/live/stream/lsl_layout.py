@@ -1,6 +1,6 @@
-"""Which channels of an LSL stream are markers.
+"""Find the marker channels of an LSL stream.
 
-The convention is the MoCap meta-data of XDF (https://github.com/sccn/xdf/wiki), as
+The convention is the MoCap metadata of XDF (https://github.com/sccn/xdf/wiki), as
 written by the vendors' LSL apps: channels of type PositionX, PositionY and PositionZ
 that name their marker, in meters. Channels that name an object are rigid bodies.
 """
@@ -27,7 +27,7 @@ _UNITS = {
 
 @dataclass(frozen=True, eq=False)
 class LslLayout:
-    """Where each marker's coordinates are.
+    """Channels of each marker's coordinates.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def read_layout(xml: str, source: str) -> LslLayout:
     Raises
     ------
     StreamError
-        When there are no markers, or one lacks a coordinate or has a strange unit.
+        When there are no markers, or one lacks a coordinate or has an unknown unit.
     """
     places: dict[str, dict[str, tuple[int, float]]] = {}
     types = []
