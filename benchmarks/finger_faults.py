@@ -106,7 +106,7 @@ def trial(fault: str, rng: np.random.Generator, link: Path) -> tuple[float, int,
             command(target)
             time.sleep(0.01)
         count = out_of_range(servo) + command.too_fast + len(servo.goals) - told
-        wire.mend()
+        wire.clear_faults()
         wait(lambda: wire.plugged)
         finger.relax()
         if fault == "unplug":

@@ -21,13 +21,13 @@ from ikns import MarkerIK, Skeleton, read, scale
 from ikns.calibration import calibrate, in_sight, sight_needs
 from ikns.calibration.subject import Subject
 from ikns.live.control import ControlFrame, FrameSolver
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 DISTANCES = (0.03, 0.05, 0.08, 0.10, 0.12, 0.15, 0.20, 0.25, 0.30, 0.40, 0.50)
-CHECKS = Settings()
+CHECKS = ControlSettings()
 #: Landmarks on the skin of an arm and a trunk, by segment, without a static trial.
 LANDMARKS = {
     "box_lift/markers_analogs.c3d": (

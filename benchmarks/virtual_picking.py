@@ -37,7 +37,7 @@ import numpy as np
 
 from ikns.experiments.picking import OBJECT_IDS, load_objects, pick_schedule
 from ikns.experiments.picking.virtual import VIRTUAL_CONDITIONS, virtual_pick_step
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.simulation.operator import draw_participant
 
 #: Time of the successes, mean and standard deviation, s; successes of 100, as printed.
@@ -46,7 +46,7 @@ PLANTED = (0.2, 0.4, 0.6)
 WAYS = {
     "finger": {},
     "signal": {"sees": "signal"},
-    "held while fast": {"settings": Settings(hold_speed=0.2)},
+    "held while fast": {"settings": ControlSettings(hold_speed=0.2)},
     **{f"planted {fall:g}": {"planted": fall} for fall in PLANTED},
 }
 

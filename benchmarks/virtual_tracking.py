@@ -35,7 +35,7 @@ from ikns.experiments.tracking import (
     virtual_step,
     virtual_trial,
 )
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.simulation.operator import Delay, Operator, draw_participant, typical
 
 #: Means and standard deviations over ten people, as the paper prints them.
@@ -84,7 +84,7 @@ def of_participant(number: int, *, seed: int, repeats: int, rate: float) -> dict
             ways = {
                 "direct": partial(play, person, step, direct=True),
                 "whole chain": partial(play, person, step),
-                "smoothed": partial(play, person, step, settings=Settings()),
+                "smoothed": partial(play, person, step, settings=ControlSettings()),
             }
         for row, way in ways.items():
             began = time.process_time()

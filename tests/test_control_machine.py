@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from ikns.errors import InvalidInput
 from ikns.live.control.safety import SafetyMachine
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.live.control.smoothing import OneEuro
 
 # --- the state machine ---------------------------------------------------------------
@@ -211,7 +211,7 @@ def test_delay_is_how_far_a_ramp_is_behind():
 
 
 def test_what_the_live_defaults_cost_is_what_their_docstring_says():
-    dt, cutoff, beta = 0.01, Settings().cutoff, Settings().beta
+    dt, cutoff, beta = 0.01, ControlSettings().cutoff, ControlSettings().beta
     resting = OneEuro(cutoff=cutoff, beta=0.0)
     rng = np.random.default_rng(0)
     noise = np.array([resting.step(x, dt) for x in rng.normal(size=20_000)])

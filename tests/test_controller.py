@@ -13,7 +13,7 @@ from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.live.control import FrameSolver
 from ikns.live.control.controller import Controller
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def exploring():
 
 def controller(subject, **settings):
     solver = FrameSolver(subject.skeleton, subject.null_space_map, subject.chain)
-    made = Controller(solver, Settings(**settings))
+    made = Controller(solver, ControlSettings(**settings))
     made.machine.arm(0.0)
     return made
 
@@ -124,26 +124,26 @@ def test_a_marker_that_leaves_its_segment_is_named(subject, exploring, data):
     decision = made.frame(markers, 0.02, 0.02)
     assert not decision.valid
     label = subject.skeleton.marker_set.labels[which]
-    assert label in decision.refused
-    assert "farther apart than at calibration" in decision.refused
+    assert label in decision.rejection
+    assert "farther apart than at calibration" in decision.rejection
 
 
-def test_a_refusal_says_what_to_look_after(subject, exploring):
+def test_a_rejection_says_what_to_look_after(subject, exploring):
     seen = frames(subject, exploring)
     labels = subject.skeleton.marker_set.labels
     made = controller(subject)
-    assert made.frame(seen[0], 0.0, 0.0).refused == ""
-    assert made.frame(seen[0], 0.02, 0.02).refused == "the same picture again"
+    assert made.frame(seen[0], 0.0, 0.0).rejection == ""
+    assert made.frame(seen[0], 0.02, 0.02).rejection == "the same picture again"
     hidden = seen[1].copy()
     hidden[of_chain(subject)[-1]] = np.nan
-    assert "right hand is not in sight" in made.frame(hidden, 0.04, 0.04).refused
+    assert "right hand is not in sight" in made.frame(hidden, 0.04, 0.04).rejection
     alone = next(own for own in of_chain(subject) if len(own) == 1)[0]
     astray = seen[2].copy()
     astray[alone] += 1.0
-    told = made.frame(astray, 0.06, 0.06).refused
+    told = made.frame(astray, 0.06, 0.06).rejection
     assert told.startswith(f"{labels[alone]} is ")
     anywhere = seen[3] + np.random.default_rng(0).normal(0, 0.5, seen[3].shape)
-    assert "than at calibration" in made.frame(anywhere, 0.08, 0.08).refused
+    assert "than at calibration" in made.frame(anywhere, 0.08, 0.08).rejection
 
 
 @given(data=st.data())
@@ -231,4 +231,4 @@ def test_flexion_holds_while_the_hand_travels(subject):
 )
 def test_settings_that_make_no_sense_are_refused(bad):
     with pytest.raises(InvalidInput, match=next(iter(bad)).replace("_", ".")):
-        Settings(**bad)
+        ControlSettings(**bad)

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from ikns.finger import DynamixelFinger, FingerError, Safety, check_finger, open_finger
-from ikns.finger.check import LAWS
 from ikns.finger.emulator import Servo, Wire
+from ikns.finger.laws import LAWS
 
 #: Longer than anything here takes, seconds.
 PATIENCE = 10.0
@@ -64,7 +64,7 @@ def test_it_keeps_the_laws(model):
     with Wire(Servo(model, baud=1_000_000)) as wire:
         # A busy machine must not look like a caller that hangs.
         report = check_finger(lambda: finger_on(wire, watchdog=1.0))
-    assert report.kept == LAWS
+    assert report.kept == tuple(LAWS)
 
 
 def test_it_moves_the_servo_and_leaves_it_without_torque(servo, wire):
@@ -146,7 +146,7 @@ def test_commands_do_not_wait_for_a_silent_bus(servo, wire):
             finger.state()
             longest = max(longest, time.monotonic() - began)
             time.sleep(0.005)
-        wire.mend()
+        wire.clear_faults()
     # A question without an answer blocks 35 ms and four of them 140; nothing but the
     # scheduler is waited for here.
     assert longest < 0.1
@@ -200,7 +200,7 @@ def test_every_fault_at_any_instant_ends_in_the_safe_state(fault, tmp_path):
             assert len(servo.goals) == len(goals) >= before
             assert servo.motor.position == pytest.approx(stood, abs=0.01)
             assert finger.state().alert != ""
-            wire.mend()
+            wire.clear_faults()
             if fault == "unplug":
                 with pytest.raises(FingerError, match=r"did not confirm|no such port"):
                     raise_unless_gone(finger, wire)
@@ -257,7 +257,7 @@ def test_a_port_that_comes_back_without_answers_is_told_to_let_go(servo, wire):
         wait_for(lambda: not servo.torque)
         assert not servo.watchdog_error
         assert finger.state().mode == "safe"
-        wire.mend()
+        wire.clear_faults()
 
 
 def test_connecting_again_in_vain_leaves_it_doing_nothing(servo, wire):
@@ -269,7 +269,7 @@ def test_connecting_again_in_vain_leaves_it_doing_nothing(servo, wire):
         assert finger.state().mode == "relaxed"
         assert math.isnan(finger.command(1.0))
         assert servo.torque  # still, as far as anybody knows
-        wire.mend()
+        wire.clear_faults()
     assert not servo.torque
 
 

@@ -14,16 +14,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from ikns.errors import FileError, InvalidInput
 from ikns.live.calibration import (
-    Guide,
     LiveProtocol,
     RecordingsFolder,
+    TargetPoints,
     Verdict,
-    in_words,
+    direction_in_words,
     paper_steps,
 )
-from ikns.live.calibration.assemble import take_recording
 from ikns.live.calibration.clock import DeviceClock
-from ikns.live.calibration.guide import HandTracker
+from ikns.live.calibration.frames import recording_from_frames
+from ikns.live.calibration.targets import HandTracker
 from ikns.live.stream import Frame
 from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
@@ -216,12 +216,15 @@ def test_every_frame_goes_to_its_number(first, came, late, twice):
     """Lost frames are NaN, late ones find their place, repeated ones count once."""
     numbers = [first + k for k, here in enumerate(came) if here]
     if len(numbers) < 2:
-        assert take_recording([frame(k) for k in numbers], ["C7"], RATE, "t") is None
+        assert (
+            recording_from_frames([frame(k) for k in numbers], ["C7"], RATE, "t")
+            is None
+        )
         return
     # Each is held up by a few frames at most; sorting by arrival shuffles them.
     order = sorted(range(len(numbers)), key=lambda i: numbers[i] + late[i])
     frames = [frame(numbers[i]) for i in order for _ in range(1 + twice[i])]
-    recording = take_recording(frames, ["C7"], RATE, "t")
+    recording = recording_from_frames(frames, ["C7"], RATE, "t")
     assert recording is not None
     expected = np.full(numbers[-1] - numbers[0] + 1, np.nan)
     for number in numbers:
@@ -232,7 +235,7 @@ def test_every_frame_goes_to_its_number(first, came, late, twice):
 
 def test_a_device_that_counts_anew_goes_on():
     numbers = [9000, 9001, 0, 1, 3]
-    recording = take_recording([frame(k) for k in numbers], ["C7"], RATE, "t")
+    recording = recording_from_frames([frame(k) for k in numbers], ["C7"], RATE, "t")
     assert recording is not None
     assert_array_equal(recording.markers[:, 0, 0], [9000, 9001, 0, 1, np.nan, 3])
 
@@ -244,21 +247,23 @@ def test_suggested_places_are_the_corners_of_a_box_that_was_explored_whole():
     half = np.array([0.1, 0.2, 0.15])
     line = np.linspace(-1, 1, 5)
     grid = np.stack(np.meshgrid(line, line, line), axis=-1).reshape(-1, 3) * half
-    guide = Guide(grid + [0.3, 0.0, 0.2], 10)
+    guide = TargetPoints(grid + [0.3, 0.0, 0.2], 10)
     offsets = (guide.places - [0.3, 0.0, 0.2]) / half
     assert_allclose(np.sort(np.abs(offsets[:8]), axis=None), 1.0)
     assert len(np.unique(offsets[:8].round(6), axis=0)) == 8
     # Then the middles of the upper and the lower face.
     assert_allclose(offsets[8:], [[0, 1, 0], [0, -1, 0]], atol=1e-12)
     assert guide.words(8) == "up"
-    assert all(guide.words(k) == in_words(offsets[k] * half) for k in range(8))
+    assert all(
+        guide.words(k) == direction_in_words(offsets[k] * half) for k in range(8)
+    )
 
 
 @settings(max_examples=10)
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 12))
 def test_no_suggested_place_is_out_of_reach(seed, n):
     explored = np.random.default_rng(seed).normal(size=(50, 3)) * [0.1, 0.2, 0.1]
-    for place in Guide(explored, n).places:
+    for place in TargetPoints(explored, n).places:
         assert (explored == place).all(axis=1).any()
 
 

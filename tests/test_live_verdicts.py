@@ -8,7 +8,7 @@ import small_person
 
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.live.calibration import Judge, Step, Verdict
+from ikns.live.calibration import Judge, ProtocolStep, Verdict
 from ikns.nullspace.map import still_mask
 from ikns.recording.recording import Recording
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
@@ -38,13 +38,13 @@ def unsteady():
 @cache
 def judge() -> Judge:
     made = Judge(Skeleton.load())
-    static = Step("static", "static", 1.2)
+    static = ProtocolStep("static", "static", 1.2)
     made.accept(static, made.judge(static, small_person.protocol().static.recording))
     return made
 
 
 def at_point(recording: Recording, name: str = "point_01") -> Verdict:
-    return judge().judge(Step(name, "point", 1.5), recording)
+    return judge().judge(ProtocolStep(name, "point", 1.5), recording)
 
 
 def test_steady_points_are_kept_and_their_figures_are_those_of_the_calibration():
@@ -78,9 +78,9 @@ def test_the_same_place_again_is_told():
     recording = piece(small_person.protocol(), 3)
     again = Judge(Skeleton.load())
     again.skeleton = judge().skeleton
-    step = Step("point_01", "point", 1.5)
+    step = ProtocolStep("point_01", "point", 1.5)
     again.accept(step, again.judge(step, recording))
-    verdict = again.judge(Step("point_02", "point", 1.5), recording)
+    verdict = again.judge(ProtocolStep("point_02", "point", 1.5), recording)
     assert not verdict.keep
     assert verdict.usable
     assert verdict.values["nearest"] == "point_01"
@@ -151,7 +151,7 @@ def test_a_marker_that_was_put_elsewhere_is_told(change):
 
 def test_a_marker_that_the_static_trial_never_shows_is_told():
     static = small_person.protocol().static.recording
-    step = Step("static", "static", 1.2)
+    step = ProtocolStep("static", "static", 1.2)
     hidden = static.markers.copy()
     hidden[:, static.labels.index("RUPA")] = np.nan
     verdict = judge().judge(
@@ -175,7 +175,7 @@ def test_a_person_who_moves_in_the_static_trial_is_told_the_marker():
     moving = static.markers.copy()
     column = static.labels.index("RFIN")
     moving[:, column, 0] += np.linspace(0, 0.1, len(moving))
-    step = Step("static", "static", 1.2)
+    step = ProtocolStep("static", "static", 1.2)
     verdict = judge().judge(
         step, Recording(static.time, moving, static.labels, "static")
     )

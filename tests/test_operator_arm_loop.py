@@ -14,7 +14,7 @@ from ikns.experiments.tracking import (
     virtual_step,
     virtual_trial,
 )
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
 from ikns.simulation.operator import (
     Copyist,
@@ -104,7 +104,7 @@ def test_latency_is_in_whole_frames(person):
 
 
 def test_the_operator_sees_the_flexion_when_the_controller_smooths(person):
-    raw, smooth = loop(person), loop(person, settings=Settings())
+    raw, smooth = loop(person), loop(person, settings=ControlSettings())
     limb = np.full(90, 0.5)
     one, two = (np.array([arm.step(x) for x in limb]) for arm in (raw, smooth))
     assert np.isfinite(two).all()

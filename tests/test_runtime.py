@@ -13,7 +13,7 @@ import small_person
 from ikns.calibration.subject import FILES, Subject
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.finger import SimulatedFinger
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.live.runtime import replay_run, run
 from ikns.live.session import check_session, create_session, open_run, read_run
 from ikns.live.session.channels import STATES
@@ -40,7 +40,7 @@ def session_for(subject, folder, tmp_path, settings=None):
     subject.save(tmp_path / "person")
     texts = {name: (tmp_path / "person" / name).read_text() for name in FILES}
     labels = subject.skeleton.marker_set.labels
-    chosen = Settings() if settings is None else settings
+    chosen = ControlSettings() if settings is None else settings
     return open_run(
         create_session(folder),
         labels=labels,
@@ -110,7 +110,7 @@ def states(report):
 
 def test_a_short_silence_holds_and_goes_on(subject, exploring):
     # Long enough for a machine that is busy: its own pauses must not make it safe.
-    settings = Settings(hold_after=0.2, safe_after=10.0)
+    settings = ControlSettings(hold_after=0.2, safe_after=10.0)
     with Source(Stuttering(exploring, after=50, silence=0.5)) as stream:
         report = run(stream, subject, SimulatedFinger(), settings=settings)
     assert states(report)[:2] == ["armed", "active"]
@@ -311,14 +311,14 @@ def test_every_decision_is_handed_on_with_its_time(subject, exploring, tmp_path)
     np.testing.assert_array_equal([d.flexion for d in decisions], flexion)
 
 
-def test_rehearsals_change_nothing(subject, exploring, tmp_path):
+def test_warming_caches_changes_nothing(subject, exploring, tmp_path):
     found = []
-    for speed in (1, 0):  # with a pace there are pauses to rehearse in, without none
+    for speed in (1, 0):  # with a pace there are pauses to warm caches in, without none
         folder = tmp_path / str(speed)
         folder.mkdir()
         with session_for(subject, folder / "session", folder) as writer:
             report = run(source(exploring, speed=speed), subject, session=writer)
-        found.append((report.rehearsals, read_run(folder / "session")))
+        found.append((report.warm_ups, read_run(folder / "session")))
     (some, paced), (none, fast) = found
     assert some > 0
     assert none == 0

@@ -143,7 +143,7 @@ def test_a_wrong_rate_hears_nothing(wire):
 def test_the_sdk_sees_the_faults(client, wire, fault, result):
     wire.inject(fault, value=9)
     assert client.ping()[1] == result
-    wire.mend()
+    wire.clear_faults()
     assert until_answered(client.ping)[1] == sdk.COMM_SUCCESS
 
 

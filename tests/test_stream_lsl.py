@@ -315,7 +315,7 @@ def test_a_stream_that_pauses_but_answers_is_kept(
 def test_silence_is_told_and_iterating_gives_up(name: str) -> None:
     there = recording(5)
     with LslOutlet(there.labels, there.rate, name=name) as outlet:
-        with opened(name, patience=1.2) as source:
+        with opened(name, read_timeout=1.2) as source:
             with pytest.raises(StreamError, match=r"no frame for 1.2 s\."):
                 next(source)
             assert any("no frame for 1" in event.text for event in source.events)

@@ -95,7 +95,7 @@ def test_other_markers_after_a_break_are_not_read() -> None:
 def test_a_reader_that_sleeps_loses_the_oldest_and_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("ikns.live.stream.qualisys._INBOX", 10)
+    monkeypatch.setattr("ikns.live.stream.client_thread._INBOX", 10)
     with QtmServer(LABELS) as server, opened(server) as source:
         for k in range(1, 40):
             server.send(100 + k, 5_000_000 + 10_000 * k, MARKERS[k])

@@ -10,7 +10,7 @@ import small_person
 from ikns.errors import InvalidInput
 from ikns.experiments.picking import PickStep, load_objects
 from ikns.experiments.picking.virtual import virtual_pick, virtual_pick_step
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.simulation import Unsteadiness
 from ikns.simulation.grasp import (
     CarriedArm,
@@ -273,7 +273,7 @@ def test_a_button_knows_no_crosstalk(person):
 def test_a_hand_that_holds_the_signal_while_it_travels_feels_no_crosstalk(person):
     step = PickStep("trial", "ikns", "F")
     held, _ = virtual_pick(
-        person, step, practised=3, rate=RATE, settings=Settings(hold_speed=0.15)
+        person, step, practised=3, rate=RATE, settings=ControlSettings(hold_speed=0.15)
     )
     fast = held.carried & (held.trace[:, 5] > 0.3) & (held.trace[:, 5] < 0.7)
     told = held.trace[fast, 1]

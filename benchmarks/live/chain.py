@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 from ikns.calibration.subject import FILES, Subject
 from ikns.errors import FileError
 from ikns.finger import Finger, FingerState, Limits
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.live.runtime import replay_run
 from ikns.live.session import (
     RunWriter,
@@ -248,7 +248,7 @@ def session_for(
         joint_names=subject.skeleton.joint_names,
         rate=recording.rate,
         n_dof=subject.null_space_map.n_dof,
-        configuration={"settings": dataclasses.asdict(Settings())},
+        configuration={"settings": dataclasses.asdict(ControlSettings())},
         subject={name: (person / name).read_text("utf-8") for name in FILES},
         **more,
     )

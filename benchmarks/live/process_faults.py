@@ -19,7 +19,7 @@ import numpy as np
 from ikns.errors import IknsError
 from ikns.finger import DynamixelFinger, SimulatedFinger
 from ikns.finger.emulator import Servo, Wire
-from ikns.live.runtime import Status, run
+from ikns.live.runtime import LoopStatus, run
 from ikns.live.session import mend_session, read_run
 from ikns.live.stream import Source
 from ikns.live.stream.replay import Replay
@@ -59,7 +59,7 @@ def _exception(seed: int, folder: Path) -> Outcome:
     subject, recording = person.load(folder)
     after, raised = rng.uniform(0.3, 1.0), math.nan
 
-    def explode(status: Status) -> None:
+    def explode(status: LoopStatus) -> None:
         nonlocal raised
         if status.time > after:
             raised = time.monotonic()
@@ -241,7 +241,7 @@ def _drive(folder: Path, session: Path, port: str, tell: Connection) -> None:
     subject, recording = person.load(folder)
     told = False
 
-    def note(status: Status) -> None:
+    def note(status: LoopStatus) -> None:
         nonlocal told
         if not told:
             told = True

@@ -16,7 +16,13 @@ import ikns
 from ikns.errors import InvalidInput, NotEnoughData
 
 if TYPE_CHECKING:
-    from ikns.live.calibration import Change, Key, Status, Step, Verdict
+    from ikns.live.calibration import (
+        CalibrationStatus,
+        Change,
+        Key,
+        ProtocolStep,
+        Verdict,
+    )
 
 __all__ = ["LiveOptions", "record_live"]
 
@@ -78,10 +84,10 @@ def record_live(
         LiveProtocol,
         RecordingsFolder,
         accepted_recordings,
-        carry_out,
         check_labels,
         paper_steps,
-        recall,
+        restore,
+        run_protocol,
     )
     from ikns.live.stream import open_source
 
@@ -118,7 +124,7 @@ def record_live(
         settings = {"marker_set": marker_set, "chain": chain, "rate": source.rate}
         folder = RecordingsFolder(options.recordings, settings, resume=options.resume)
         ikns.warm_up()
-        recall(judge, folder, steps)
+        restore(judge, folder, steps)
         pending = folder.pending(steps)
         protocol = LiveProtocol(
             steps,
@@ -130,7 +136,7 @@ def record_live(
         )
         screen = _Screen(steps, auto=options.auto)
         with _keys(listen=not options.auto) as keys:
-            carry_out(
+            run_protocol(
                 source,
                 protocol,
                 judge,
@@ -152,7 +158,7 @@ def record_live(
 class _Screen:
     """Lines on stderr: one for each change, and on a terminal one that is rewritten."""
 
-    def __init__(self, steps: Sequence[Step], *, auto: bool) -> None:
+    def __init__(self, steps: Sequence[ProtocolStep], *, auto: bool) -> None:
         self._auto = auto
         self._points = [step for step in steps if step.kind == "point"]
         self._live = sys.stderr.isatty()
@@ -181,7 +187,7 @@ class _Screen:
         elif what in ("accepted", "redo", "skipped", "stopped"):
             self._say(f"{step.name}: {what}.")
 
-    def status(self, status: Status) -> None:
+    def status(self, status: CalibrationStatus) -> None:
         """Rewrite the last line."""
         parts = [f"{status.step.name} {status.state}"]
         if status.state in ("countdown", "recording"):
@@ -196,7 +202,7 @@ class _Screen:
         sys.stderr.write(f"\r\x1b[K{'  '.join(parts)}")
         sys.stderr.flush()
 
-    def _prompt(self, step: Step, where: str) -> str:
+    def _prompt(self, step: ProtocolStep, where: str) -> str:
         words = _PROMPTS[step.kind].format(where=f" {where}" if where else " still")
         if step.kind == "point":
             number = self._points.index(step) + 1

@@ -21,7 +21,7 @@ from ikns.cli.simulated import is_simulated
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.live.runtime import Report, Status
+    from ikns.live.runtime import LoopStatus, Report
 
 __all__ = ["run"]
 
@@ -79,7 +79,7 @@ def run(
     Research software, not a medical device.
     """
     from ikns.finger import Safety, open_finger
-    from ikns.live.control.settings import Settings
+    from ikns.live.control.settings import ControlSettings
     from ikns.live.runtime import check_realtime
     from ikns.live.runtime import run as drive
     from ikns.live.stream import open_source
@@ -90,7 +90,7 @@ def run(
         raise InvalidInput("--resume needs the --session to go on with.")
     if realtime:
         check_realtime()
-    settings = Settings(hold_speed=hold_speed)
+    settings = ControlSettings(hold_speed=hold_speed)
     calibrated = ikns.Subject.load(subject)
     device = open_finger(finger, safety=Safety(safe_state=safe_state))
     with ExitStack() as stack:
@@ -160,14 +160,14 @@ def run(
 
 
 @contextmanager
-def _status_line() -> Iterator[list[Callable[[Status], None]]]:
+def _status_line() -> Iterator[list[Callable[[LoopStatus], None]]]:
     """Write one line over and over, while stderr is a terminal."""
     if not sys.stderr.isatty():
         yield []
         return
     last = -math.inf
 
-    def write(status: Status) -> None:
+    def write(status: LoopStatus) -> None:
         nonlocal last
         if status.time - last >= _LINE_EVERY:
             last = status.time
@@ -180,20 +180,20 @@ def _status_line() -> Iterator[list[Callable[[Status], None]]]:
     sys.stderr.write("\n")
 
 
-def _each(shown: list[Callable[[Status], None]]) -> Callable[[Status], None]:
-    def show(status: Status) -> None:
+def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], None]:
+    def show(status: LoopStatus) -> None:
         for one in shown:
             one(status)
 
     return show
 
 
-def _line(s: Status) -> str:
+def _line(s: LoopStatus) -> str:
     """Say how it goes, what matters most first: a narrow terminal cuts the rest."""
     drive = f"{s.state:<7} c {s.c:5.2f} flexion {s.flexion:4.2f} ({s.measured:4.2f})"
     pace = f"{s.rate:4.0f}/s p99 {1e3 * s.latency:4.2f} ms"
-    if s.refused:
-        return f"{drive} {s.refused} {pace} misses {s.misses}"
+    if s.rejection:
+        return f"{drive} {s.rejection} {pace} misses {s.misses}"
     place = "inside" if s.inside else "OUTSIDE"
     return (
         f"{drive} {pace} {place:<7} residual {1e3 * s.residual:4.1f} mm "

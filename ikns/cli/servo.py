@@ -96,7 +96,7 @@ def servo(
             if pressed == "q":
                 break
             if pressed == "r":
-                wire.mend()
+                wire.clear_faults()
             elif pressed in _KEYS:
                 lasts = _AWAY if pressed == "u" else math.inf
                 wire.inject(_KEYS[pressed], lasts)

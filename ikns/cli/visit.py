@@ -30,7 +30,7 @@ from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Conductor, Desk, Driver
-    from ikns.live.runtime import Status
+    from ikns.live.runtime import LoopStatus
 
 __all__ = ["Whose", "chosen", "conduct", "names", "whose"]
 
@@ -179,7 +179,7 @@ def conduct(
     session = arm.session or who.folder / "session"
     with ExitStack() as stack:
         stop = stack.enter_context(stopped_by_signals())
-        shown: list[Callable[[Status], None]] = []
+        shown: list[Callable[[LoopStatus], None]] = []
         address = ""
         if subject is not None:
             # Sources that do not answer are told before anything is written.

@@ -17,7 +17,7 @@ from ikns.errors import InvalidInput
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Driver
     from ikns.finger import Finger
-    from ikns.live.runtime import Status
+    from ikns.live.runtime import LoopStatus
     from ikns.live.session import RunWriter
     from ikns.live.stream import Source
 
@@ -136,13 +136,13 @@ def arm_driver(
     subject: ikns.Subject,
     session: Path,
     participant: str,
-    shown: Sequence[Callable[[Status], None]],
+    shown: Sequence[Callable[[LoopStatus], None]],
 ) -> AbstractContextManager[Driver]:
     """Make the live loop drive, with a session of its own; every status is shown."""
     from ikns.experiments.conduct.live import live_driver
-    from ikns.live.control.settings import Settings
+    from ikns.live.control.settings import ControlSettings
 
-    settings = Settings(hold_speed=arm.hold_speed)
+    settings = ControlSettings(hold_speed=arm.hold_speed)
 
     def open_session(source: Source) -> AbstractContextManager[RunWriter]:
         assert arm.subject is not None
@@ -163,7 +163,7 @@ def arm_driver(
             resume=(session / "dataset_description.json").exists(),
         )
 
-    def tell(status: Status) -> None:
+    def tell(status: LoopStatus) -> None:
         for one in shown:
             one(status)
 

@@ -1,8 +1,8 @@
-"""Wearable fingers: simulated and real, safe below any controller.
+"""Wearable robotic fingers, simulated and real, safe below any controller.
 
-Research software, not a medical device. Limits, time-outs and safe states of every
-finger: :class:`Safety`; what every finger promises: :class:`Finger`, tested by
-:func:`check_finger`.
+Research software, not a medical device. :class:`Safety` holds the limits, timeouts and
+safe state of a finger, :class:`Finger` is the interface of every finger, and
+:func:`check_finger` tests an implementation of it.
 """
 
 from ikns.finger.check import FingerReport, check_finger

@@ -1,4 +1,4 @@
-"""A finger whose tendon is pulled by a Dynamixel servo."""
+"""A finger whose tendon is driven by a Dynamixel servo."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import Self
 
 from ikns.errors import InvalidInput
 from ikns.finger.bus import Bus
+from ikns.finger.configuration import ServoConfiguration
 from ikns.finger.drive import Drive
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.models import model_named
-from ikns.finger.plan import Plan
 from ikns.finger.relax_at_exit import forget, relax_at_exit
 from ikns.finger.state import FingerState
 
 __all__ = ["DynamixelFinger"]
 
-#: Time that a servo has for giving up its torque, seconds; then relaxing fails.
+#: Timeout for switching the torque off, s.
 _RELAX_TIMEOUT = 1.0
-#: How often to say the same while connecting: noise may spoil a packet, not five.
+#: Attempts per instruction while connecting: noise may damage a packet, but not five.
 _TRIES = 5
 
 
@@ -30,10 +30,10 @@ class DynamixelFinger:
     """A finger driven by one Dynamixel servo in position control.
 
     A thread of its own talks to the servo, so that a silent bus (35 ms for every
-    question without answer) never holds up the caller. It goes on telling the servo the
-    last goal; the servo stops by itself when it hears nothing for `watchdog` seconds
+    instruction without a response) never blocks the caller. It keeps sending the last
+    goal, and the servo stops by itself when it receives nothing for `watchdog` seconds
     (models with Protocol 2.0; an AX-12 has no watchdog and keeps its last goal, which
-    is never further away than one step of the limiter).
+    is never farther away than one step of the limiter).
 
     Parameters
     ----------
@@ -43,17 +43,17 @@ class DynamixelFinger:
     model : str
         One of :data:`ikns.finger.models.MODELS`.
     open_ticks, closed_ticks : int, optional
-        Positions of the servo at flexion 0 and 1; a quarter turn before and after the
-        middle by default. Either may be the larger.
+        Positions of the servo at flexion 0 and 1, in either order; by default a quarter
+        turn before and after the center.
     effort : float
-        Share of the servo's full current (of its full voltage where it measures no
-        current) that it may push with.
+        Share of the servo's full current that it may use, or of its full voltage where
+        it measures no current.
     safety : Safety, optional
-        Limits, time-outs and the safe state.
+        Limits, timeouts and the safe state.
     watchdog : float
-        Seconds; in steps of 0.02 up to 2.54.
+        Seconds, in steps of 0.02 up to 2.54.
     rate : float
-        Times per second to talk to the servo, at most.
+        Most cycles per second of writing the goal and reading the state.
 
     Examples
     --------
@@ -63,7 +63,7 @@ class DynamixelFinger:
     ...     for _ in range(100):
     ...         sent = finger.command(1.0)
     ...         time.sleep(0.01)
-    >>> sent  # half a second more than limits need from the middle
+    >>> sent  # the limits need half a second from the center
     1.0
     """
 
@@ -106,44 +106,46 @@ class DynamixelFinger:
             )
         self.safety = Safety() if safety is None else safety
         self.resolution = 1.0 / abs(span[1] - span[0])
-        self._plan = Plan(*span, effort, watchdog, self.safety.limits)
+        self._configuration = ServoConfiguration(
+            *span, effort, watchdog, self.safety.limits
+        )
         self._bus = Bus(port, id=id, baud=baud, model=self._model)
         self._period = 1.0 / rate
         self._lock = threading.RLock()
         self._guard = Guard(self.safety)
-        self._drive = Drive(self._bus, self._plan, self._guard, self._lock)
+        self._drive = Drive(self._bus, self._configuration, self._guard, self._lock)
         self._thread: threading.Thread | None = None
-        self._held = False
+        self._connected = False
         self._stop = threading.Event()
 
     def connect(self) -> None:
-        """Take hold of the servo, from where it is; also leave the safe state.
+        """Connect and follow commands from the present position; leave the safe state.
 
-        Checks who is there, writes limits into the servo, and only then switches its
-        torque on, with its present position as its goal.
+        Checks the model, writes the limits into the servo, and only then switches the
+        torque on, with the present position as the goal.
 
         Raises
         ------
         FingerError
-            When the port is absent or busy, or the servo does not answer, is another
-            one, or complains of something.
+            When the port is missing or busy, or the servo does not respond, is another
+            model, or reports an alert.
         """
-        self._halt()
+        self._stop_thread()
         with self._lock:
             self._guard.relax()
         self._bus.close()
         self._bus.open()
-        self._bus.tries = _TRIES  # nothing depends on time yet
+        self._bus.tries = _TRIES  # nothing is time-critical yet
         checked = False
         try:
-            self._bus.check()  # whoever else is there stays untouched
-            checked = self._held = True
+            self._bus.check()  # another servo stays untouched
+            checked = self._connected = True
             relax_at_exit(self)
             self._drive.set_up()
             self._drive.arm()
         except BaseException:
             if checked:
-                self._let_go()
+                self._release()
             self._bus.close()
             raise
         finally:
@@ -155,41 +157,43 @@ class DynamixelFinger:
         self._thread.start()
 
     def command(self, flexion: float) -> float:
-        """Ask for a flexion; return what is sent, NaN if nothing is."""
+        """Request a flexion; return the one sent, NaN if none is."""
         with self._lock:
-            return self._plan.sent(self._guard.command(time.monotonic(), flexion))
+            return self._configuration.sent(
+                self._guard.command(time.monotonic(), flexion)
+            )
 
     def state(self) -> FingerState:
-        """Return the last that is known."""
+        """Return the latest known state."""
         with self._lock:
             known, guard = self._drive.known, self._guard
             return replace(
                 known,
                 age=time.monotonic() - known.time,
                 mode=guard.mode,
-                sent=self._plan.sent(guard.goal),
+                sent=self._configuration.sent(guard.goal),
                 stalled=guard.stalled,
                 alert=guard.reason or self._drive.alert,
             )
 
     def make_safe(self, reason: str) -> None:
-        """Go to the safe state and stay there until connected again."""
+        """Go to the safe state and stay in it until connected again."""
         with self._lock:
             self._guard.fail(reason)
 
     def relax(self) -> None:
-        """Switch the torque off, see that it is off, and close the port.
+        """Switch the torque off, read back that it is off, and close the port.
 
         Raises
         ------
         FingerError
-            When the servo does not confirm that its torque is off. The port is closed
-            all the same.
+            When the servo does not confirm that its torque is off; the port is closed
+            even then.
         """
-        if not self._held:
+        if not self._connected:
             return
-        self._halt()
-        if not self._let_go():
+        self._stop_thread()
+        if not self._release():
             watchdog = "bus_watchdog" in self._model
             raise FingerError(
                 f"{self._bus.port}: servo {self._bus.id} did not confirm that its "
@@ -203,7 +207,7 @@ class DynamixelFinger:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Relax; an exception on its way is not hidden by one from here."""
+        """Relax; a failure is added as a note to an exception already raised."""
         try:
             self.relax()
         except FingerError as error:
@@ -211,16 +215,16 @@ class DynamixelFinger:
                 raise
             exception[1].add_note(str(error))
 
-    def _let_go(self) -> bool:
-        """Torque off and port closed; one that is interrupted is repeated at exit."""
-        confirmed = self._drive.let_go(_RELAX_TIMEOUT)
+    def _release(self) -> bool:
+        """Switch torque off and close the port; repeated at exit if interrupted."""
+        confirmed = self._drive.release(_RELAX_TIMEOUT)
         self._bus.close()
-        self._held = False
+        self._connected = False
         forget(self)
         return confirmed
 
-    def _halt(self) -> None:
-        """End the thread; the bus is then free for the caller."""
+    def _stop_thread(self) -> None:
+        """Stop the thread, so that the caller may use the bus."""
         thread = self._thread
         if thread is not None:
             self._stop.set()
@@ -231,9 +235,9 @@ class DynamixelFinger:
         due = time.monotonic()
         try:
             while not self._stop.is_set():
-                self._drive.turn()
+                self._drive.cycle()
                 due = max(due + self._period, time.monotonic())
                 self._stop.wait(max(due - time.monotonic(), 0.0))
-        except BaseException as error:  # the servo's watchdog now stops it
+        except BaseException as error:  # the servo's watchdog then stops the motor
             self.make_safe(f"talking to the servo ended with {error!r}")
             raise

@@ -1,7 +1,7 @@
-r"""The simulated finger's shape: six modules that a tendon flexes alike.
+r"""Geometry of the simulated finger: six modules that a tendon flexes equally.
 
-It lies over a flat palm, base at the wrist, and curls down towards it. How far the tip
-is above the palm is the width of what fits under it:
+The finger lies over a flat palm, with its base at the wrist, and curls towards the
+palm. The distance of its tip from the palm is its opening:
 
 .. math:: w(f) = h - l \sum_{i=1}^{6} \sin(i f \theta)
 
@@ -9,9 +9,9 @@ with module length :math:`l`, full flexion :math:`\theta` of a module, and the b
 height :math:`h` such that the tip touches the palm at f = 1. Beyond 20.5 degrees the
 tip would rise again, so :math:`\theta` = 20 degrees.
 
-All dimensions are assumptions (the paper gives none): together as long as the four
-modules of about 40 mm of the fingers that it builds on, opening to 117 mm, so that the
-paper's objects of 50 to 97 mm fit.
+All dimensions are assumptions, as the paper gives none. The modules together are as
+long as the four modules of about 40 mm of the fingers that the paper builds on, and the
+finger opens to 117 mm, so that the paper's objects of 50 to 97 mm fit.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ FULL_FLEXION = math.radians(20)  # of each module
 
 
 def _drop(flexion: float) -> float:
-    """How far the tip is below the base, m."""
+    """Distance of the tip below the base, m."""
     angle = flexion * FULL_FLEXION
     return MODULE_LENGTH * sum(math.sin(i * angle) for i in range(1, MODULES + 1))
 
 
-#: Height of the base over the palm and width of the open finger, m.
+#: Height of the base above the palm, and opening at flexion 0, m.
 WIDEST = _drop(1.0)
 
 
@@ -55,7 +55,7 @@ def joint_angles(flexion: float) -> tuple[float, ...]:
 
 
 def opening(flexion: float) -> float:
-    """Width between tip and palm, m.
+    """Distance between tip and palm, m.
 
     >>> round(opening(0.0), 3), round(opening(1.0), 3)
     (0.117, 0.0)
@@ -82,7 +82,9 @@ def flexion_at(width: float) -> float:
             f"{1000 * WIDEST:.0f} mm."
         )
     low, high = 0.0, 1.0
-    for _ in range(60):  # halves down to rounding; the opening only ever shrinks
+    for _ in range(
+        60
+    ):  # bisection down to rounding; the opening decreases monotonically
         middle = (low + high) / 2
         low, high = (middle, high) if opening(middle) > width else (low, middle)
     return low

@@ -1,4 +1,4 @@
-"""The safety of a finger, without device and without clock: what it may be told now."""
+"""Safety logic of a finger, without a device or a clock."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ __all__ = ["Guard", "Safety"]
 
 @dataclass(frozen=True)
 class Safety:
-    """What a finger does when something is wrong, and what counts as wrong.
+    """What counts as a fault, and what a finger does about it.
 
     Parameters
     ----------
     limits : Limits
         Range, rate and acceleration.
     safe_state : {"limp", "hold", "open"}
-        Which is right depends on the device and the task: letting go of a held object
-        may itself be the hazard.
+        Which one is right depends on the device and the task: letting go of a held
+        object may itself be the hazard.
     command_timeout : float
         Seconds without a command after which the finger goes to its safe state.
     silence_timeout : float
-        Seconds without an answer from the device, likewise.
+        Seconds without a response from the device, likewise.
     stall_timeout : float
-        Seconds that the finger may push against something.
+        Seconds that the finger may push against an obstacle.
     stall_tolerance : float
-        Flexion that it must be away from its goal to be pushing, and must move by to
-        be moving.
+        The finger counts as pushing when it is farther than this from its goal, and as
+        moving when it moves by more than this; flexion.
     grip : float
-        Flexion beyond the obstacle that it is left to push with after that.
+        After a stall its goal is this far beyond the obstacle, flexion.
     """
 
     limits: Limits = field(default_factory=Limits)
@@ -45,7 +45,7 @@ class Safety:
     grip: float = 0.03
 
     def __post_init__(self) -> None:
-        """Refuse what would never come into force."""
+        """Reject settings that could never take effect."""
         if self.safe_state not in SAFE_STATES:
             raise InvalidInput(
                 f"the safe state must be hold, open or limp, not '{self.safe_state}'."
@@ -63,7 +63,7 @@ class Safety:
 
 
 class Guard:
-    """Decides what a finger is told.
+    """Decides which goal a finger gets.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Guard:
     ----------
     mode : {"relaxed", "active", "safe"}
     reason : str
-        Why it is safe; empty otherwise.
+        Why it is in its safe state; empty otherwise.
     stalled : bool
 
     Examples
@@ -82,7 +82,7 @@ class Guard:
     >>> guard.start(0.0, 0.3)
     >>> guard.command(0.01, 1.0) > 0.3
     True
-    >>> guard.tick(2.0)  # nobody has said anything for two seconds
+    >>> guard.tick(2.0)  # two seconds without a command
     >>> guard.mode, guard.reason
     ('safe', 'no command for 0.5 s')
     """
@@ -100,23 +100,23 @@ class Guard:
 
     @property
     def torque(self) -> bool:
-        """Whether the device should push at all."""
+        """Whether the torque should be on."""
         return self._torque
 
     @property
     def goal(self) -> float:
-        """The flexion that the device should be told; NaN with torque off."""
+        """Flexion to send to the device; NaN with torque off."""
         return self._limiter.position if self._torque else math.nan
 
     def start(self, now: float, flexion: float) -> None:
-        """Begin to follow commands, from the measured flexion and from rest."""
+        """Follow commands from now on, starting at the measured flexion and at rest."""
         self._limiter.restart(flexion)
         self.mode, self.reason, self._torque = "active", "", True
         self._unblock(now, flexion)
         self._stepped_at = self._commanded_at = now
 
     def command(self, now: float, flexion: float) -> float:
-        """Take one step towards a flexion; return the goal."""
+        """Move the goal by one step towards a flexion; return it."""
         self.tick(now)
         if self.mode != "active":
             return self.goal
@@ -129,21 +129,21 @@ class Guard:
         return self.goal
 
     def tick(self, now: float) -> None:
-        """Let time pass: notice silence, and go on opening where that is safe."""
+        """Let time pass: check the command timeout, and proceed in the safe state."""
         timeout = self.safety.command_timeout
         if self.mode == "active" and now - self._commanded_at > timeout:
             self.fail(f"no command for {timeout:g} s")
         if self.mode == "safe" and self._torque:
             if self.safety.safe_state == "open":
                 self._step(now, max(self.safety.limits.lower, self._floor))
-            elif self.stalled:  # holding, but not that hard
+            elif self.stalled:  # hold with a lighter grip
                 held = min(max(self._limiter.position, self._floor), self._ceiling)
                 self._step(now, held)
             else:
                 self._step(now, math.nan)
 
     def measured(self, now: float, flexion: float) -> None:
-        """Take in where the finger is; after a long push, push less."""
+        """Take the measured flexion; after a stall, push less."""
         safety = self.safety
         if not math.isfinite(flexion) or not self._torque:
             return
@@ -161,7 +161,7 @@ class Guard:
                 self._floor = flexion - safety.grip
 
     def fail(self, reason: str, *, limp: bool = False) -> None:
-        """Go to the safe state, or lose all torque; the first reason stays."""
+        """Go to the safe state, or switch the torque off; the first reason is kept."""
         if self.mode == "relaxed":
             return
         if self.mode == "active":
@@ -170,13 +170,13 @@ class Guard:
             self._torque = False
 
     def hold_at(self, now: float, flexion: float) -> None:
-        """Stand still where the device was found after it had stopped by itself."""
+        """Restart at the measured flexion after the device had stopped by itself."""
         self._limiter.restart(flexion)
         self._unblock(now, flexion)
         self._stepped_at = now
 
     def relax(self) -> None:
-        """No torque, and no more commands."""
+        """Switch the torque off and ignore further commands."""
         self.mode, self.reason, self._torque = "relaxed", "", False
         self.stalled = False
 

@@ -1,7 +1,7 @@
-"""Other ways to say how far to flex: keyboard, ring button, gamepad.
+"""Other sources of the control signal: keyboard, ring button, gamepad.
 
-Each is called like the map: it returns the time and a control signal c from 0 to 1, at
-once, with the last that is known. They are the control conditions of experiments.
+Calling one returns the time and the latest control signal c, from 0 to 1, without
+waiting. They are the control conditions of experiments.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _FULL = 32767
 
 
 class _Ramp:
-    """A signal that moves towards closed or open at a rate while it is asked to."""
+    """A signal that moves towards 1 or 0 at a constant rate."""
 
     def __init__(self, rate: float, clock: Callable[[], float]) -> None:
         if not 0 < rate < float("inf"):
@@ -47,12 +47,12 @@ class _Ramp:
 
 
 class RingButton:
-    """A push button: every press changes between closing and opening.
+    """A push button: every press switches between closing and opening.
 
     Parameters
     ----------
     rate : float
-        How fast the signal goes from one end to the other, 1/s.
+        Rate of the signal, 1/s.
     clock : callable
         Seconds, monotonic.
 
@@ -77,7 +77,7 @@ class RingButton:
         self._direction = -1.0
 
     def press(self) -> None:
-        """Turn round. Call it from whatever hears the button."""
+        """Reverse the direction; to be called when the button is pressed."""
         self._ramp.move(self._direction)
         self._direction = -self._direction
 
@@ -87,7 +87,7 @@ class RingButton:
 
 
 class Keyboard:
-    """Keys of the terminal: up or + closes by a step, down or - opens, space reverses.
+    """Keys of the terminal: up or + closes by a step, down or - opens, space toggles.
 
     Parameters
     ----------
@@ -132,38 +132,37 @@ class Keyboard:
         return self._clock(), self._value
 
     def close(self) -> None:
-        """Give the terminal back as it was; harmless when repeated."""
+        """Restore the terminal; harmless when repeated."""
         termios.tcsetattr(self._number, termios.TCSADRAIN, self._before)
 
     def __enter__(self) -> Self:
         """Return itself."""
         return self
 
-    def __exit__(self, *exception: object) -> None:
-        """Give the terminal back."""
+    def __exit__(self, *_: object) -> None:
+        """Restore the terminal."""
         self.close()
 
 
 class Gamepad:
-    """One axis of a joystick as Linux shows it (``/dev/input/js0``).
+    """One axis of a joystick of Linux (``/dev/input/js0``).
 
     Parameters
     ----------
     path : path
     axis : int
-        Which axis; its middle is 0 and its positive end 1. A trigger, which rests at
-        its negative end, is `whole`.
+        Number of the axis; its center is 0 and its positive end 1.
     whole : bool
-        Whether the negative end is 0 instead.
+        Whether its negative end is 0 instead, as for a trigger, which rests there.
     reverse : bool
-        Whether the axis counts the other way (up is negative on most sticks).
+        Whether to reverse the axis (up is negative on most sticks).
     clock : callable
         Seconds, monotonic.
 
     Raises
     ------
     FingerError
-        When it is not there or not to be read.
+        When it is missing or cannot be read.
     """
 
     def __init__(
@@ -193,7 +192,7 @@ class Gamepad:
         return self._clock(), float("nan") if self._lost else self._value
 
     def close(self) -> None:
-        """Let go of it; harmless when repeated."""
+        """Disconnect; harmless when repeated."""
         if self._thread.is_alive() or self._number >= 0:
             os.close(self._ends[1])
             self._thread.join()
@@ -205,8 +204,8 @@ class Gamepad:
         """Return itself."""
         return self
 
-    def __exit__(self, *exception: object) -> None:
-        """Let go of it."""
+    def __exit__(self, *_: object) -> None:
+        """Disconnect."""
         self.close()
 
     def _run(self) -> None:

@@ -1,4 +1,4 @@
-"""Range, rate and acceleration limits that hold whatever is asked, whenever."""
+"""Range, rate and acceleration limits, for any command at any time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Limiter", "Limits", "approach"]
 
 @dataclass(frozen=True)
 class Limits:
-    """How far and how fast a finger may be told to move.
+    """How far and how fast a finger may move.
 
     Parameters
     ----------
@@ -23,8 +23,8 @@ class Limits:
     acceleration : float
         Flexion per second squared.
     longest_step : float
-        Seconds. After a longer silence the finger stands still, so motion begins again
-        from rest, as if only this much time had passed.
+        Seconds. After a longer pause motion starts from rest, as if only this much time
+        had passed.
     """
 
     lower: float = 0.0
@@ -34,7 +34,7 @@ class Limits:
     longest_step: float = 0.1
 
     def __post_init__(self) -> None:
-        """Refuse limits that do not limit."""
+        """Reject limits that do not limit."""
         if not 0.0 <= self.lower <= self.upper <= 1.0:
             raise InvalidInput(
                 "the range of flexion must lie within 0 to 1, "
@@ -50,19 +50,19 @@ class Limits:
 def approach(
     distance: float, velocity: float, dt: float, *, rate: float, acceleration: float
 ) -> float:
-    r"""Velocity for the next step on the fastest way to a target without passing it.
+    r"""Velocity of the next step of the fastest approach that does not overshoot.
 
     The velocity :math:`v` of the step changes by at most :math:`a\,dt`, does not
     exceed the rate, and leaves room to brake before the target,
-    :math:`v\,dt + v^2/(2a) \le d`; where the last is out of reach, it brakes hardest.
-    If there was room to brake before, there is room after, for any sequence of steps:
-    braking by :math:`a\,dt` and then moving uses up :math:`a\,dt^2/2` less room than
-    there was.
+    :math:`v\,dt + v^2/(2a) \le d`; where that is impossible, it brakes as hard as it
+    may. If there was room to brake before a step, there is room after it, for any
+    sequence of steps: braking by :math:`a\,dt` and then moving needs
+    :math:`a\,dt^2/2` less room than there was.
 
     Parameters
     ----------
     distance : float
-        From here to the target, signed.
+        Signed distance to the target.
     velocity : float
         Of the last step.
     dt : float
@@ -107,7 +107,7 @@ class Limiter:
     >>> limiter = Limiter(Limits(rate=1.0, acceleration=100.0), 0.0)
     >>> [round(limiter.step(1.0, 0.01), 3) for _ in range(3)]
     [0.01, 0.02, 0.03]
-    >>> limiter.step(float("nan"), 0.01) <= 0.03  # holds: nothing was asked
+    >>> limiter.step(float("nan"), 0.01) <= 0.03  # not finite: it brakes
     True
     """
 
@@ -116,7 +116,7 @@ class Limiter:
         self.restart(position)
 
     def restart(self, position: float) -> None:
-        """Stand still at a flexion; one that is out of range counts as its end."""
+        """Restart from rest at a flexion, clipped to the range."""
         if not math.isfinite(position):
             raise InvalidInput(f"a finite flexion to start from, not {position}.")
         self.position = min(max(position, self.limits.lower), self.limits.upper)
@@ -128,10 +128,10 @@ class Limiter:
         Parameters
         ----------
         target : float
-            Flexion; clipped to the range. What is not finite is no target: the
-            limiter then brakes to rest.
+            Flexion, clipped to the range. If it is not finite, the limiter brakes to
+            rest.
         dt : float
-            Seconds since the last step. Without time nothing moves.
+            Seconds since the last step; without a positive time nothing moves.
 
         Returns
         -------
@@ -156,6 +156,6 @@ class Limiter:
             slower = max(abs(self.velocity) - limits.acceleration * dt, 0.0)
             self.velocity = math.copysign(slower, self.velocity)
         position = self.position + self.velocity * dt
-        # Only rounding can lie outside.
+        # Only rounding can exceed the range.
         self.position = min(max(position, limits.lower), limits.upper)
         return self.position

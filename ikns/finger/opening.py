@@ -1,4 +1,4 @@
-"""A finger by its address."""
+"""Fingers by address."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ _DYNAMIXEL: dict[str, Callable[[str], Any]] = {
 
 
 def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
-    """Make a finger; it is connected by :meth:`Finger.connect` or ``with``.
+    """Make a finger, not connected yet: use ``with`` or :meth:`Finger.connect`.
 
     Parameters
     ----------
     address : str
-        ``sim:`` or ``sim:width=60`` (what it may hold, mm; also ``effort``), or
+        ``sim:`` or ``sim:width=60`` (width of an object, mm; also ``effort``), or
         ``dynamixel:PORT?id=1&baud=57600&model=xl430`` (also ``open`` and ``closed``,
-        ticks, ``effort``, and ``watchdog``, s). Both take ``safe=limp``, ``hold`` or
-        ``open``, which wins over `safety`.
+        ticks; ``effort``; ``watchdog``, s). Both take ``safe=limp``, ``safe=hold`` or
+        ``safe=open``, which takes precedence over `safety`.
     safety : Safety, optional
 
     Returns

@@ -1,4 +1,4 @@
-"""A simulated finger: for work without hardware, and for tests of everything above."""
+"""A simulated finger, for work and tests without hardware."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from ikns.finger.state import FingerState
 
 __all__ = ["FOLLOW", "SPEED", "SPIN", "YIELD", "SimulatedFinger"]
 
-# A servo that closes the finger with half a turn, ours, after an XL430-W250 (57 rev/min
-# and 1.3 A at 11.1 V): flexion per second, amperes at a standstill, seconds to follow
-# and to change speed, flexion of error at which it pushes as hard as it may.
+# Assumed: a servo that closes the finger in half a turn, modeled on an XL430-W250 (57
+# rev/min and 1.3 A at 11.1 V). Flexion per second, stall current in A, seconds to
+# follow and to change speed, and the error in flexion at which effort is full.
 SPEED, _STALL_CURRENT = 1.9, 1.3
 FOLLOW, SPIN, YIELD = 0.03, 0.01, 0.1
-_FRICTION = 0.1  # share of full effort that moving costs
+_FRICTION = 0.1  # share of full effort needed to move at full speed
 _STEP = 1e-3
-#: A finger slower than this is said to rest, flexion per second.
+#: A finger slower than this is reported as not moving, flexion per second.
 _RESTING = 0.01
 
 
 class SimulatedFinger:
     """A simulated tendon-driven finger, deterministic for a given clock.
 
-    Six modules bend alike (:mod:`ikns.finger.geometry`); the motor is of second order,
-    with limited speed and effort; an object stops the closing finger, and the current
-    rises. Temperature and voltage are not simulated. Time passes for it whenever it is
-    called.
+    Six modules bend equally (:mod:`ikns.finger.geometry`). The motor is a second-order
+    system with limited speed and effort; an object stops the closing finger, and the
+    current rises. Temperature and voltage are not simulated. Simulated time advances to
+    the clock's time at every call.
 
     Parameters
     ----------
     object_width : float, optional
-        What lies between finger and palm, m; None for nothing.
+        Width of an object between finger and palm, m; None for no object.
     effort : float
-        Share of its full effort that the motor may push with.
+        Share of full effort that the motor may use.
     safety : Safety, optional
     flexion : float
-        Where it starts.
+        Initial flexion.
     clock : callable
         Seconds, monotonic.
 
@@ -87,7 +87,7 @@ class SimulatedFinger:
 
     @property
     def object_width(self) -> float | None:
-        """What lies between finger and palm, m; may be changed at any time."""
+        """Width of the object between finger and palm, m; may be set at any time."""
         return self._width
 
     @object_width.setter
@@ -102,23 +102,23 @@ class SimulatedFinger:
 
     @property
     def opening(self) -> float:
-        """Width between tip and palm, m."""
+        """Distance between tip and palm, m."""
         return opening(self._flexion)
 
     def connect(self) -> None:
-        """Begin to follow commands, from where it is; also leave the safe state."""
+        """Follow commands from the present flexion; leave the safe state."""
         self._advance()
         self._guard.start(self._now, self._flexion)
         self._connected = True
         relax_at_exit(self)
 
     def command(self, flexion: float) -> float:
-        """Ask for a flexion; return what is sent, NaN if nothing is."""
+        """Request a flexion; return the one sent, NaN if none is."""
         self._advance()
         return self._guard.command(self._now, flexion)
 
     def state(self) -> FingerState:
-        """Return what it measures now."""
+        """Return the present state."""
         self._advance()
         return FingerState(
             time=self._now,
@@ -134,7 +134,7 @@ class SimulatedFinger:
         )
 
     def make_safe(self, reason: str) -> None:
-        """Go to the safe state and stay there until connected again."""
+        """Go to the safe state and stay in it until connected again."""
         self._advance()
         self._guard.fail(reason)
 
@@ -151,18 +151,18 @@ class SimulatedFinger:
         self.connect()
         return self
 
-    def __exit__(self, *exception: object) -> None:
+    def __exit__(self, *_: object) -> None:
         """Relax."""
         self.relax()
 
     def _advance(self) -> None:
-        """Let the clock's time pass, in steps of a millisecond."""
+        """Advance to the clock's time, in steps of a millisecond."""
         now = self._clock()
         if now < self._now:
             raise FingerError("the clock of a simulated finger went backwards.")
         while (left := now - self._now) > 0:
             if self._at_rest() and left > _STEP:
-                # Nothing moves until the guard's next time-out can have passed.
+                # Nothing moves before the guard's next timeout.
                 step = min(left, 0.01)
                 self._now = now if left <= step else self._now + step
             else:
@@ -179,7 +179,7 @@ class SimulatedFinger:
 
     def _move(self, dt: float) -> None:
         goal = self._guard.goal
-        if math.isnan(goal):  # the gear brakes it
+        if math.isnan(goal):  # no torque: the gear holds it
             self._velocity = self._effort = 0.0
             return
         limit = self._effort_limit
@@ -189,8 +189,8 @@ class SimulatedFinger:
         if abs(error) < 1e-9 and abs(self._velocity) < 1e-6:
             self._velocity = 0.0
         flexion = self._flexion + self._velocity * dt
-        # The object stops a closing finger; one that was put where the finger already
-        # is does not push it open.
+        # The object stops a closing finger, but one placed where the finger already is
+        # does not push it open.
         contact = max(self._contact, self._flexion)
         if flexion > contact:
             flexion, self._velocity = contact, 0.0

@@ -1,4 +1,4 @@
-"""What a finger tells of itself, and what every finger does."""
+"""The state of a finger, and the interface of every finger."""
 
 from __future__ import annotations
 
@@ -11,42 +11,42 @@ __all__ = ["MODES", "SAFE_STATES", "Finger", "FingerState", "Mode", "SafeState"]
 Mode = Literal["relaxed", "active", "safe"]
 SafeState = Literal["hold", "open", "limp"]
 
-#: What a finger is doing: nothing (no torque), what it is told, or its safe state.
+#: Modes of a finger: no torque, following commands, or in its safe state.
 MODES: tuple[Mode, ...] = ("relaxed", "active", "safe")
-#: What a finger may do when something fails: stay, open slowly, or lose all torque.
+#: What a finger may do when something fails: hold its place, open, or go limp.
 SAFE_STATES: tuple[SafeState, ...] = ("hold", "open", "limp")
 
 
 @dataclass(frozen=True)
 class FingerState:
-    """The last that is known of a finger; NaN where the device does not tell.
+    """Latest known state of a finger; NaN where the device does not report a value.
 
     Parameters
     ----------
     time : float
-        When it was measured, seconds of the finger's clock (monotonic).
+        When it was measured, s on the finger's monotonic clock.
     age : float
-        Seconds from then until it was asked for.
+        Time since then when the state was read, s.
     mode : {"relaxed", "active", "safe"}
-        What it is doing.
+        See :data:`MODES`.
     flexion : float
         Measured, 0 open to 1 closed.
     sent : float
-        Flexion that the device was last told; NaN with torque off.
+        Flexion last sent to the device; NaN with torque off.
     current : float
-        Amperes, positive when flexing.
+        A, positive when flexing.
     load : float
         Share of the actuator's full effort, positive when flexing.
     temperature : float
         Degrees Celsius.
     voltage : float
-        Volts.
+        V.
     moving : bool
-        Whether the device says that it moves.
+        Whether the device reports that it moves.
     stalled : bool
-        Whether something is in its way; its effort has then been reduced.
+        Whether an obstacle stops it; its effort is then reduced.
     alert : str
-        Why it is in its safe state, or what the device complains of; empty if nothing.
+        Why it is in its safe state, or an alert of the device; empty if there is none.
     """
 
     time: float = math.nan
@@ -66,36 +66,36 @@ class FingerState:
 class Finger(Protocol):
     """A wearable finger with one degree of freedom, its flexion.
 
-    Safety sits in here, below any controller: range, rate and acceleration limits,
-    stall, silence of the caller and of the device, and no torque after any exit.
+    It is safe below any controller: it limits range, rate and acceleration, handles
+    stall and the silence of caller and device, and leaves no torque after any exit.
     :func:`ikns.finger.check_finger` tests an implementation.
     """
 
-    #: Smallest step of flexion that the device can be told; 0 where there is none.
+    #: Smallest step of flexion that can be sent; 0 if there is no such limit.
     resolution: float
 
     def connect(self) -> None:
-        """Take hold of the device, from where it is; also leave the safe state."""
+        """Connect, follow commands from the present flexion, leave the safe state."""
 
     def command(self, flexion: float) -> float:
-        """Ask for a flexion; return what was truly sent, NaN if nothing was.
+        """Request a flexion; return the one sent to the device, NaN if none was.
 
-        To be called again and again: the finger moves only as far as its limits
-        allow for the time since the last call, and goes to its safe state when it is
-        not called for a while. Never blocks, never raises.
+        Call it periodically: each call moves the finger only as far as its limits
+        allow for the time since the last one, and without calls the finger goes to its
+        safe state. Never blocks, never raises.
         """
 
     def state(self) -> FingerState:
-        """Return the last that is known. Never blocks, never raises."""
+        """Return the latest known state. Never blocks, never raises."""
 
     def make_safe(self, reason: str) -> None:
-        """Go to the configured safe state and stay there until connected again."""
+        """Go to the configured safe state and stay in it until connected again."""
 
     def relax(self) -> None:
-        """Switch the torque off and let go of the device; harmless when repeated."""
+        """Switch the torque off and disconnect; harmless when repeated."""
 
     def __enter__(self) -> Self:
         """Connect."""
 
-    def __exit__(self, *exception: object) -> None:
+    def __exit__(self, *_: object) -> None:
         """Relax."""

@@ -1,1 +1,1 @@
-"""Live: markers stream in, a signal drives the finger, and a session is kept."""
+"""Live control: streams of markers, the control loop, sessions, calibration."""

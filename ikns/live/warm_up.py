@@ -1,4 +1,4 @@
-"""Compile everything, or load it from disk, before it is needed."""
+"""Compile all kernels, or load them from disk, before they are needed."""
 
 from __future__ import annotations
 
@@ -23,46 +23,52 @@ _CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)
 
 
 def compiled_before() -> bool:
-    """Whether the kernels only have to be loaded."""
+    """Whether the kernels are compiled already and only have to be loaded."""
     return on_disk("body.control_frame")
 
 
 def warm_up(progress: Callable[[str, int, int], None] | None = None) -> float:
     """Run every kernel once, so that none is compiled while a robot waits.
 
-    The first time on a machine, and after an update, this compiles, half of it in a
-    process of its own; later it loads.
+    The first call on a machine, and after an update, compiles for about a minute, half
+    of it in a second process; later calls load the compiled kernels.
 
     Parameters
     ----------
     progress : callable, optional
-        Called with ("compiling", steps done, steps in all).
+        Called with ("compiling", steps done, steps in total).
 
     Returns
     -------
     float
-        How long it took, s.
+        Time that it took, s.
+
+    Examples
+    --------
+    >>> seconds = warm_up()
+    >>> seconds > 0
+    True
     """
     start = time.perf_counter()
-    steps = (*_OF_BODIES, *_OF_PLACES, _frame)
-    beside = None
+    steps = (*_BODY_STEPS, *_MAP_STEPS, _frame)
+    process = None
     if not compiled_before():
-        script = "from ikns.live.warm_up import run_places; run_places()"
-        beside = subprocess.Popen([sys.executable, "-c", script])
+        script = "from ikns.live.warm_up import run_map_kernels; run_map_kernels()"
+        process = subprocess.Popen([sys.executable, "-c", script])
     for done, step in enumerate(steps):
         if progress is not None:
             progress("compiling", done, len(steps))
-        if beside is not None and step is _OF_PLACES[0]:
-            beside.wait()  # what it compiled is loaded now; what it could not, compiled
+        if process is not None and step is _MAP_STEPS[0]:
+            process.wait()  # from here on its results are loaded from disk
         step()
     if progress is not None:
         progress("compiling", len(steps), len(steps))
     return time.perf_counter() - start
 
 
-def run_places() -> None:
-    """Run the kernels that have to do with places between points."""
-    for step in _OF_PLACES:
+def run_map_kernels() -> None:
+    """Run the kernels of interpolation and null spaces."""
+    for step in _MAP_STEPS:
         step()
 
 
@@ -102,5 +108,5 @@ def _frame() -> None:
     FrameSolver(body, _map(), "right_arm").solve(markers)
 
 
-_OF_BODIES: Sequence[Callable[[], None]] = (_markers, _hands)
-_OF_PLACES: Sequence[Callable[[], None]] = (_neighbors, _null_spaces)
+_BODY_STEPS: Sequence[Callable[[], None]] = (_markers, _hands)
+_MAP_STEPS: Sequence[Callable[[], None]] = (_neighbors, _null_spaces)

@@ -14,8 +14,8 @@ from ikns.errors import IknsError
 from ikns.experiments.conduct.inputs import Sample, Samples
 from ikns.finger import Finger
 from ikns.live.control.controller import Decision
-from ikns.live.control.settings import Settings
-from ikns.live.runtime import Report, Status, run
+from ikns.live.control.settings import ControlSettings
+from ikns.live.runtime import LoopStatus, Report, run
 from ikns.live.session import RunWriter
 from ikns.live.stream import Source
 
@@ -55,14 +55,14 @@ class LiveDriver:
         writer: RunWriter | None,
         *,
         smooth: bool = False,
-        on_status: Callable[[Status], None] | None = None,
+        on_status: Callable[[LoopStatus], None] | None = None,
     ) -> None:
         self.fault = ""
         self.report: Report | None = None
         self._finger, self._writer, self._smooth = finger, writer, smooth
         self._on_status = on_status
         self._samples = Samples()
-        self._status: Status | None = None
+        self._status: LoopStatus | None = None
         self._finger_is = ""
         self._start = math.nan
         self._events: list[tuple[str, str, float]] = []
@@ -74,7 +74,7 @@ class LiveDriver:
         self,
         source: Source,
         subject: Subject,
-        settings: Settings,
+        settings: ControlSettings,
         *,
         realtime: bool = False,
     ) -> None:
@@ -137,7 +137,7 @@ class LiveDriver:
             "misses": status.misses,
             "residual": status.residual,
             "worst_residual": status.worst_residual,
-            "refused": status.refused,
+            "refused": status.rejection,
             "inside": status.inside,
         }
 
@@ -154,7 +154,7 @@ class LiveDriver:
         c = flexion if self._smooth else float(decision.solved.c[0])
         self._samples.put(Sample(received, c if decision.valid else math.nan))
 
-    def _told(self, status: Status) -> None:
+    def _told(self, status: LoopStatus) -> None:
         now = time.monotonic()
         if math.isnan(self._start):
             self._start = now - status.time
@@ -179,9 +179,9 @@ def live_driver(
     *,
     finger: Callable[[], Finger] | None = None,
     open_session: Callable[[Source], AbstractContextManager[RunWriter]] | None = None,
-    settings: Settings | None = None,
+    settings: ControlSettings | None = None,
     smooth: bool = False,
-    on_status: Callable[[Status], None] | None = None,
+    on_status: Callable[[LoopStatus], None] | None = None,
     realtime: bool = False,
 ) -> Iterator[LiveDriver]:
     """Run the live loop for a while.
@@ -195,7 +195,7 @@ def live_driver(
         Makes the finger; without one nothing moves.
     open_session : callable, optional
         Opens the next run of a session for a source.
-    settings : Settings, optional
+    settings : ControlSettings, optional
         Of the controller.
     smooth : bool
         See :class:`LiveDriver`.
@@ -211,6 +211,6 @@ def live_driver(
             finger() if finger else None, writer, smooth=smooth, on_status=on_status
         )
         stack.callback(driver.end)
-        chosen = Settings() if settings is None else settings
+        chosen = ControlSettings() if settings is None else settings
         driver.begin(source, subject, chosen, realtime=realtime)
         yield driver

@@ -13,7 +13,7 @@ from ikns.body.chains import chain_joints
 from ikns.errors import InvalidInput
 from ikns.experiments.picking.objects import PickObject, load_objects
 from ikns.experiments.picking.schedule import PickStep
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.simulation.grasp import (
     CarriedArm,
     Elbow,
@@ -121,7 +121,7 @@ def virtual_pick(
     practised: int,
     rate: float = 100.0,
     latency: float = 0.05,
-    settings: Settings | None = None,
+    settings: ControlSettings | None = None,
     unsteadiness: Unsteadiness | None = None,
     sees: Literal["finger", "signal"] = "finger",
     squeeze: float | None = None,
@@ -142,7 +142,7 @@ def virtual_pick(
     practised : int
     rate, latency : float
         See :func:`virtual_pick_step`.
-    settings : Settings, optional
+    settings : ControlSettings, optional
         Of the controller.
     unsteadiness : Unsteadiness, optional
         How straight the hand keeps to its way.

@@ -166,9 +166,9 @@ def _attempts(
 def _tracking(
     person: Participant, design: TrackingDesign, seed: int, parameters: Parameters
 ) -> Iterator[dict[str, Any]]:
-    from ikns.live.control.settings import Settings
+    from ikns.live.control.settings import ControlSettings
 
-    settings = Settings() if parameters.smoothing else None
+    settings = ControlSettings() if parameters.smoothing else None
     trials = _trials(design.steps(person.number, seed=seed))
     for number, (step, practised) in enumerate(trials, start=1):
         record = virtual_step(

@@ -1,4 +1,4 @@
-"""A simulated Dynamixel servo: instructions in, true bytes out, no port, no thread."""
+"""A simulated Dynamixel servo: instruction bytes in, status bytes out, no port."""
 
 from __future__ import annotations
 
@@ -6,38 +6,29 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
-from ikns.finger.emulator.memory import Memory, Trouble
+from ikns.finger.control_table import Register
+from ikns.finger.emulator.baud import baud_code, baud_rate
+from ikns.finger.emulator.instructions import (
+    ReadRequest,
+    bulk_read,
+    bulk_writes,
+    sync_read,
+    sync_writes,
+)
+from ikns.finger.emulator.memory import Memory, StatusError
 from ikns.finger.emulator.motor import Motor
-from ikns.finger.emulator.packet import BROADCAST, STATUS, Packet, Parser, encode
-from ikns.finger.models import Register, alert_text, model_named
+from ikns.finger.emulator.packet import BROADCAST, Packet, Parser
+from ikns.finger.emulator.reply import Reply, expects_reply, make_reply
+from ikns.finger.models import alert_text, model_named
 
-__all__ = ["Reply", "Servo"]
+__all__ = ["Servo"]
 
-_BAUD_CODES = (9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000)
 _WATCHDOG_UNIT = 0.02
 _BOOT = 0.2
 _GOALS = ("goal_pwm", "goal_current", "goal_velocity", "goal_position")
 _OVERHEATING, _SHOCK, _OVERLOAD = 2, 4, 5
-#: Status errors of Protocol 1.0 for the error numbers of Protocol 2.0.
-_ERRORS_1 = {1: 64, 2: 64, 3: 16, 4: 8, 5: 8, 6: 2, 7: 8}
-
-
-@dataclass(frozen=True)
-class Reply:
-    """Bytes that a servo sends.
-
-    Parameters
-    ----------
-    due : float
-        When they are complete on the wire, seconds of the servo's clock.
-    data : bytes
-    """
-
-    due: float
-    data: bytes
 
 
 class Servo:
@@ -49,9 +40,9 @@ class Servo:
         One of :data:`ikns.finger.models.MODELS`.
     id : int
     baud : int
-        Bits per second; sets how long answers take on the wire.
+        Bits per second; determines how long responses take on the wire.
     position : float, optional
-        Where the horn is, ticks; the middle by default.
+        Position of the horn, ticks; the center by default.
     clock : callable
         Seconds, monotonic.
 
@@ -61,9 +52,9 @@ class Servo:
     memory : Memory
         Control table.
     events : deque of (float, str)
-        What happened, latest last.
+        Events with their times, latest last.
     goals : deque of (float, int)
-        Goal positions that it was told and took, latest last.
+        Goal positions that it accepted, with their times, latest last.
 
     Examples
     --------
@@ -90,18 +81,18 @@ class Servo:
                 f"a servo's id must be {number.lower} to {number.upper}, not {id}."
             )
         self.memory["id"] = id
-        self.memory["baud_rate"] = self._baud_code(baud)
+        self.memory["baud_rate"] = baud_code(self.model, baud)
         middle = (self.model.highest + 1) / 2
         self.motor = Motor(self.model, middle if position is None else float(position))
         self.events: deque[tuple[float, str]] = deque(maxlen=10_000)
         self.goals: deque[tuple[float, int]] = deque(maxlen=1_000_000)
         self._clock = clock
         self._parser = Parser(self.model.protocol)
-        self._now = self._heard = clock()
+        self._now = self._received = clock()
         self._silent_until = -math.inf
-        self._waiting: bytes | None = None
+        self._registered: bytes | None = None
         self.memory["goal_position"] = round(self.motor.position)
-        self._show()
+        self._update_registers()
 
     @property
     def id(self) -> int:
@@ -110,9 +101,8 @@ class Servo:
 
     @property
     def baud(self) -> float:
-        """Bits per second that it listens at."""
-        code = self.memory["baud_rate"]
-        return _BAUD_CODES[code] if self.model.protocol == 2 else 2_000_000 / (code + 1)
+        """Its bit rate, bits per second."""
+        return baud_rate(self.model, self.memory["baud_rate"])
 
     @property
     def torque(self) -> bool:
@@ -121,31 +111,41 @@ class Servo:
 
     @property
     def watchdog_error(self) -> bool:
-        """Whether it has stopped because nobody spoke to it."""
+        """Whether the bus watchdog has stopped it."""
         return "bus_watchdog" in self.model and self.memory["bus_watchdog"] == -1
 
     def receive(self, data: bytes) -> list[Reply]:
-        """Take in bytes from the wire; return the answers."""
+        """Receive bytes from the wire; return the responses."""
         self.advance()
         if self._now < self._silent_until:
             return []
         replies = []
         for packet in self._parser.feed(data):
-            self._heard = self._now
-            statuses = self._obey(packet)
-            if self._wanted(packet) or packet.instruction in (0x01, 0x82, 0x92):
-                for turn, error, content in statuses:
-                    replies.append(self._reply(packet, turn, error, content))
-        self._show()
+            self._received = self._now
+            statuses = self._execute(packet)
+            if expects_reply(packet, self.memory["status_return_level"]):
+                replies += [
+                    make_reply(
+                        self.model,
+                        self.memory,
+                        packet,
+                        turn=turn,
+                        error=error,
+                        content=content,
+                        now=self._now,
+                    )
+                    for turn, error, content in statuses
+                ]
+        self._update_registers()
         return replies
 
     def advance(self) -> None:
-        """Let the clock's time pass."""
+        """Advance to the clock's time."""
         now = self._clock()
         duration, self._now = now - self._now, now
         if duration <= 0:
             return
-        self._watch()
+        self._check_watchdog()
         memory, model = self.memory, self.model
         speed = memory["profile_velocity"] * model.velocity_unit or math.inf
         acceleration = math.inf
@@ -162,13 +162,13 @@ class Servo:
             max_effort=self._max_effort(),
         )
         if self.motor.overloaded:
-            self.complain(_OVERLOAD)
+            self.raise_alert(_OVERLOAD)
         if self.motor.temperature > memory["temperature_limit"]:
-            self.complain(_OVERHEATING)
-        self._show()
+            self.raise_alert(_OVERHEATING)
+        self._update_registers()
 
-    def complain(self, bit: int) -> None:
-        """Raise a hardware alert; one that is set up so switches the motor off."""
+    def raise_alert(self, bit: int) -> None:
+        """Raise a hardware alert; depending on ``shutdown`` it switches torque off."""
         if self.memory.alert >> bit & 1:
             return
         self.memory.alert |= 1 << bit
@@ -177,35 +177,24 @@ class Servo:
             self._torque_off()
 
     def shock(self) -> None:
-        """Raise an electrical shock alert, or an overload where that is unknown."""
-        self.complain(_SHOCK if self.model.protocol == 2 else _OVERLOAD)
+        """Raise an electrical shock alert, or an overload alert if there is none."""
+        self.raise_alert(_SHOCK if self.model.protocol == 2 else _OVERLOAD)
 
     def overheat(self) -> None:
-        """Get hotter than allowed."""
+        """Exceed the temperature limit."""
         self.motor.temperature = self.memory["temperature_limit"] + 5.0
-        self.complain(_OVERHEATING)
+        self.raise_alert(_OVERHEATING)
 
     def restart(self) -> None:
-        """Start again as after a loss of power: RAM forgotten, torque off, no alert."""
-        self.memory.forget()
+        """Restart as after a loss of power: RAM reset, torque off, no alert."""
+        self.memory.reset_ram()
         self.memory["goal_position"] = round(self.motor.position)
         self.motor.stop()
-        self._waiting = None
-        self._parser.forget()
+        self._registered = None
+        self._parser.reset()
         self._silent_until = self._now + _BOOT
         self._note("started again")
-        self._show()
-
-    def _baud_code(self, baud: int) -> int:
-        if self.model.protocol == 1:
-            if 7843 <= baud <= 1_000_000:
-                return round(2_000_000 / baud) - 1
-        elif baud in _BAUD_CODES:
-            return _BAUD_CODES.index(baud)
-        known = "7843 to 1000000"
-        if self.model.protocol == 2:
-            known = ", ".join(map(str, _BAUD_CODES))
-        raise InvalidInput(f"the {self.model.name} has no rate {baud}, only {known}.")
+        self._update_registers()
 
     def _max_effort(self) -> float:
         memory, model = self.memory, self.model
@@ -215,13 +204,13 @@ class Servo:
             shares.append(abs(memory["goal_current"]) / model["current_limit"].upper)
         return min(shares)
 
-    def _watch(self) -> None:
-        """Stop if nobody has spoken for too long."""
+    def _check_watchdog(self) -> None:
+        """Stop when nothing was received for too long."""
         if "bus_watchdog" not in self.model or not self.torque:
-            self._heard = self._now
+            self._received = self._now
             return
         limit = self.memory["bus_watchdog"] * _WATCHDOG_UNIT
-        if limit > 0 and self._now - self._heard > limit:
+        if limit > 0 and self._now - self._received > limit:
             self.memory["bus_watchdog"] = -1
             self.motor.stop()
             self._note(f"bus watchdog: nothing heard for {limit:g} s, stopped")
@@ -232,145 +221,100 @@ class Servo:
             self.motor.stop()
             self._note("torque off")
 
-    def _show(self) -> None:
-        """Write what it measures into its memory."""
-        motor, model = self.motor, self.model
-        effort = motor.effort
-        values = {
-            "present_position": motor.position,
-            "present_velocity": motor.velocity / model.velocity_unit,
-            "present_load": 1000 * effort,
-            "present_current": effort * model.stall_current / model.current_unit,
-            "present_pwm": effort * model["pwm_limit"].upper,
-            "present_temperature": motor.temperature,
-            "present_input_voltage": 120 - 10 * abs(effort),
-            "moving": abs(motor.velocity) > 10 * model.velocity_unit,
-            "position_trajectory": motor.profile,
+    def _update_registers(self) -> None:
+        """Write the measurements into the control table."""
+        values = self.motor.measurements() | {
             "realtime_tick": 1000 * self._now % 32768,
             "hardware_error_status": self.memory.alert,
-            "registered_instruction": self._waiting is not None,
+            "registered_instruction": self._registered is not None,
         }
         for name, value in values.items():
-            if name in model:
+            if name in self.model:
                 self.memory[name] = int(value)
 
     def _note(self, text: str) -> None:
         self.events.append((self._now, text))
 
-    def _wanted(self, packet: Packet) -> bool:
-        """Whether a status goes back to the sender."""
-        if packet.id == BROADCAST:
-            return False
-        level = self.memory["status_return_level"]
-        return level == 2 or (level == 1 and packet.instruction == 0x02)
-
-    def _reply(self, packet: Packet, turn: int, error: int, content: bytes) -> Reply:
-        if self.model.protocol == 1:
-            error = _ERRORS_1.get(error, 0) | (self.memory.alert & 0x25)
-        elif self.memory.alert:
-            error |= 0x80
-        data = encode(Packet(self.id, STATUS, content, error), self.model.protocol)
-        # Ten bits a byte; the instruction took its time as well.
-        asked = len(packet.data) + 10
-        on_wire = (asked + (turn + 1) * len(data)) * 10 / self.baud
-        delay = self.memory["return_delay_time"] * 2e-6
-        return Reply(self._now + delay + on_wire, data)
-
-    def _obey(self, packet: Packet) -> list[tuple[int, int, bytes]]:
-        """Do what a packet says: (turn, error, content) of the answers."""
+    def _execute(self, packet: Packet) -> list[tuple[int, int, bytes]]:
+        """Execute a packet; return (turn, error, content) of each response."""
         if packet.id not in (self.id, BROADCAST):
             return []
         if not packet.intact:
-            return [(0, Trouble.CRC, b"")]
+            return [(0, StatusError.CRC, b"")]
         try:
             return self._instruction(packet)
-        except Trouble as trouble:
-            return [(0, trouble.number, b"")]
+        except StatusError as error:
+            return [(0, error.number, b"")]
 
     def _instruction(self, packet: Packet) -> list[tuple[int, int, bytes]]:
-        data, wide = packet.data, self.model.protocol == 2
-        size = 2 if wide else 1  # of an address or a length
+        data, protocol = packet.data, self.model.protocol
+        wide = protocol == 2
+        size = protocol  # bytes of an address or a length
 
         def number(at: int) -> int:
             return int.from_bytes(data[at : at + size], "little")
 
+        def read(request: ReadRequest | None) -> list[tuple[int, int, bytes]]:
+            if request is None:
+                return []
+            turn, address, count = request
+            return [(turn, 0, self.memory.read(address, count))]
+
         match packet.instruction:
-            case 0x01:
+            case 0x01:  # ping
                 about = self.memory.read(0, 2) + self.memory.read(6, 1) if wide else b""
                 return [(0 if packet.id == self.id else self.id, 0, about)]
-            case 0x02 if len(data) == 2 * size:
+            case 0x02 if len(data) == 2 * size:  # read
                 return [(0, 0, self.memory.read(number(0), number(size)))]
-            case 0x03 if len(data) > size:
+            case 0x03 if len(data) > size:  # write
                 self._write(number(0), data[size:])
                 return [(0, 0, b"")]
-            case 0x04 if len(data) > size:
+            case 0x04 if len(data) > size:  # reg write
                 self.memory.check(number(0), data[size:])
-                self._waiting = data
+                self._registered = data
                 return [(0, 0, b"")]
-            case 0x05 if self._waiting is not None:
-                waiting, self._waiting = self._waiting, None
-                self._write(int.from_bytes(waiting[:size], "little"), waiting[size:])
+            case 0x05 if self._registered is not None:  # action
+                registered, self._registered = self._registered, None
+                self._write(
+                    int.from_bytes(registered[:size], "little"), registered[size:]
+                )
                 return [(0, 0, b"")]
-            case 0x08 if wide:
+            case 0x08 if wide:  # reboot
                 self.restart()
                 return [(0, 0, b"")]
-            case 0x10 if wide and data == b"\x01DXL\x22":
+            case 0x10 if wide and data == b"\x01DXL\x22":  # clear multi-turn position
                 if self.motor.velocity:
-                    raise Trouble(Trouble.FAILED)
+                    raise StatusError(StatusError.FAILED)
                 self.motor.position %= self.model.ticks_per_turn
                 self.motor.stop()
                 return [(0, 0, b"")]
-            case 0x83:
-                count = number(size)
-                for at in range(2 * size, len(data), count + 1):
-                    if data[at] == self.id:
-                        self._write(number(0), data[at + 1 : at + 1 + count])
+            case 0x83:  # sync write
+                for address, content in sync_writes(data, protocol, self.id):
+                    self._write(address, content)
                 return []
-            case 0x93 if wide:
-                at = 0
-                while at + 5 <= len(data):
-                    count = number(at + 3)
-                    if data[at] == self.id:
-                        self._write(number(at + 1), data[at + 5 : at + 5 + count])
-                    at += 5 + count
+            case 0x93 if wide:  # bulk write
+                for address, content in bulk_writes(data, self.id):
+                    self._write(address, content)
                 return []
-            case 0x82 if wide and self.id in data[4:]:
-                turn = data[4:].index(self.id)
-                return [(turn, 0, self.memory.read(number(0), number(2)))]
-            case 0x82 if wide:
-                return []
-            case 0x92:
-                return self._bulk_read(data, wide=wide)
-        # Factory reset among them: an emulator has no factory to go back to.
-        raise Trouble(Trouble.INSTRUCTION)
-
-    def _bulk_read(self, data: bytes, *, wide: bool) -> list[tuple[int, int, bytes]]:
-        if wide:
-            entries = [data[i : i + 5] for i in range(0, len(data), 5)]
-            for turn, entry in enumerate(entries):
-                if len(entry) == 5 and entry[0] == self.id:
-                    address = int.from_bytes(entry[1:3], "little")
-                    count = int.from_bytes(entry[3:5], "little")
-                    return [(turn, 0, self.memory.read(address, count))]
-            return []
-        entries = [data[i : i + 3] for i in range(1, len(data), 3)]
-        for turn, entry in enumerate(entries):
-            if len(entry) == 3 and entry[1] == self.id:
-                return [(turn, 0, self.memory.read(entry[2], entry[0]))]
-        return []
+            case 0x82 if wide:  # sync read
+                return read(sync_read(data, self.id))
+            case 0x92:  # bulk read
+                return read(bulk_read(data, protocol, self.id))
+        # A factory reset among others: an emulator has no factory settings.
+        raise StatusError(StatusError.INSTRUCTION)
 
     def _write(self, address: int, data: bytes) -> None:
         written = self.memory.check(address, data)
         if self.watchdog_error and any(r.name in _GOALS for r, _ in written):
-            raise Trouble(Trouble.RANGE)
+            raise StatusError(StatusError.RANGE)
         for register, value in written:
-            self._take(register, value)
+            self._set(register, value)
 
-    def _take(self, register: Register, value: int) -> None:
+    def _set(self, register: Register, value: int) -> None:
         if register.name == "torque_enable":
             if value and not self.torque:
                 if self.memory.alert:
-                    return  # until it is started again
+                    return  # stays off until a restart
                 self.motor.stop()
                 self._note("torque on")
             elif not value:
@@ -378,7 +322,7 @@ class Servo:
         self.memory[register.name] = value
         if register.name == "goal_position":
             self.goals.append((self._now, value))
-            # An AX-12 switches its torque on when it is told a goal.
+            # An AX-12 switches torque on when it gets a goal.
             if self.model.protocol == 1 and not self.torque and not self.memory.alert:
                 self.memory["torque_enable"] = 1
                 self._note("torque on")

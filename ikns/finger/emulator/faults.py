@@ -1,4 +1,4 @@
-"""Faults on demand: what can break between a computer and a servo."""
+"""Faults to inject between a computer and a servo."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ikns.errors import InvalidInput
 
 __all__ = ["FAULTS", "Fault", "parse_fault"]
 
-#: What each kind does, and the value it takes, if any.
+#: Kinds of faults, and what each one does with its value, if it takes one.
 FAULTS: dict[str, str] = {
     "silence": "nothing passes, in either direction",
     "mute": "the servo obeys but does not answer",
@@ -23,24 +23,24 @@ FAULTS: dict[str, str] = {
     "unplug": "the adapter is pulled out in the middle of an answer",
 }
 _VALUES = {"delay": 0.05, "id": math.nan}
-#: Kinds that happen at once rather than last.
+#: Kinds that happen at an instant and have no duration.
 MOMENTARY = ("alert", "overheat", "power")
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that goes wrong.
+    """A fault and its time.
 
     Parameters
     ----------
     kind : str
         One of :data:`FAULTS`.
     start : float
-        Seconds after the emulator began.
+        Seconds after the start of the emulator.
     duration : float
-        Seconds; infinite for the rest of the time.
+        Seconds; infinite: until the end.
     value : float
-        NaN where the kind takes none.
+        NaN for kinds without a value.
     """
 
     kind: str
@@ -49,7 +49,7 @@ class Fault:
     value: float = math.nan
 
     def active(self, now: float) -> bool:
-        """Whether it lasts at a time."""
+        """Whether it is active at a time, s after the start."""
         return self.start <= now < self.start + self.duration
 
 

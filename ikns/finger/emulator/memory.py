@@ -1,14 +1,15 @@
-"""The control table of a simulated servo, with the rules of its firmware."""
+"""Control table of a simulated servo, with the rules of its firmware."""
 
 from __future__ import annotations
 
-from ikns.finger.models import Model, Register
+from ikns.finger.control_table import Register
+from ikns.finger.models import Model
 
-__all__ = ["Memory", "Trouble"]
+__all__ = ["Memory", "StatusError"]
 
 
-class Trouble(Exception):
-    """An error number that goes into the status packet (Protocol 2.0)."""
+class StatusError(Exception):
+    """Error number for the status packet (Protocol 2.0)."""
 
     FAILED, INSTRUCTION, CRC, RANGE, LENGTH, LIMIT, ACCESS = range(1, 8)
 
@@ -18,7 +19,7 @@ class Trouble(Exception):
 
 
 class Memory:
-    """Values by name, and bytes by address.
+    """Register values by name, and bytes by address.
 
     Parameters
     ----------
@@ -27,7 +28,7 @@ class Memory:
     Attributes
     ----------
     alert : int
-        Bits of the hardware error status, also where no register shows them.
+        Bits of the hardware error status, also for models without such a register.
 
     Examples
     --------
@@ -51,23 +52,23 @@ class Memory:
         """Set a register, as the servo itself may."""
         self._values[name] = value
 
-    def forget(self) -> None:
-        """Lose what is not kept without power."""
+    def reset_ram(self) -> None:
+        """Reset the RAM area to its initial values."""
         for register in self._by_address:
             if register.address >= self._model.ram:
                 self._values[register.name] = register.initial
         self.alert = 0
 
     def read(self, address: int, count: int) -> bytes:
-        """Bytes from an address; zero between the registers.
+        """Return bytes from an address; gaps between registers read as zero.
 
         Raises
         ------
-        Trouble
-            When they lie beyond the table.
+        StatusError
+            When they are outside the control table.
         """
         if count < 1 or address + count > self._model.memory:
-            raise Trouble(Trouble.ACCESS)
+            raise StatusError(StatusError.ACCESS)
         data = bytearray(count)
         for register in self._by_address:
             if register.end <= address or register.address >= address + count:
@@ -83,39 +84,39 @@ class Memory:
 
         Raises
         ------
-        Trouble
-            When the firmware would refuse any of them; then none may be written.
+        StatusError
+            When the firmware would reject any of them; then none may be written.
         """
         end = address + len(data)
         hit = [r for r in self._by_address if r.address < end and r.end > address]
         if not hit or end > self._model.memory:
-            raise Trouble(Trouble.ACCESS)
+            raise StatusError(StatusError.ACCESS)
         written = []
         for register in hit:
             if register.address < address or register.end > end:
-                raise Trouble(Trouble.LENGTH)
-            kept = register.address < self._model.ram
-            if not register.writable or (kept and self._values["torque_enable"]):
-                raise Trouble(Trouble.ACCESS)
+                raise StatusError(StatusError.LENGTH)
+            eeprom = register.address < self._model.ram
+            if not register.writable or (eeprom and self._values["torque_enable"]):
+                raise StatusError(StatusError.ACCESS)
             start = register.address - address
             value = register.from_bytes(data[start : start + register.size])
             if not register.lower <= value <= register.upper:
-                raise Trouble(Trouble.RANGE)
+                raise StatusError(StatusError.RANGE)
             self._check_limit(register.name, value)
             written.append((register, value))
         return written
 
     def _check_limit(self, name: str, value: int) -> None:
         values = self._values
-        # Only plain position control heeds the position limits.
+        # Only plain position control obeys the position limits.
         if name == "goal_position" and values.get("operating_mode", 3) == 3:
             low, high = values["min_position_limit"], values["max_position_limit"]
             if not low <= value <= high:
-                raise Trouble(Trouble.LIMIT)
+                raise StatusError(StatusError.LIMIT)
         limit = {
             "goal_pwm": "pwm_limit",
             "goal_current": "current_limit",
             "goal_velocity": "velocity_limit",
         }.get(name)
         if limit is not None and abs(value) > values[limit]:
-            raise Trouble(Trouble.LIMIT)
+            raise StatusError(StatusError.LIMIT)

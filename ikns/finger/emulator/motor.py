@@ -1,4 +1,4 @@
-"""How a simulated servo moves: profile, motor, obstacle, heat."""
+"""Dynamics of a simulated servo: profile, motor, obstacles, heat."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from ikns.finger.models import Model
 
 __all__ = ["Motor"]
 
-# Of a loaded servo of this size, ours: seconds to follow its profile, seconds to change
-# speed, and the error (turns) at which it pushes as hard as it may.
+# Assumed for a loaded servo of this size: seconds to follow its profile, seconds to
+# change speed, and the error in turns at which it pushes with full effort.
 _FOLLOW, _SPIN, _YIELD = 0.03, 0.01, 0.02
-# Heat, ours: degrees above the room at full effort, and seconds to get there.
-_ROOM, _HEAT, _WARM = 25.0, 60.0, 120.0
-#: A motor this slow stands still, ticks per second.
+# Assumed heating: room temperature, degC; rise at full effort; time constant, s.
+_ROOM, _HEAT, _HEAT_TIME = 25.0, 60.0, 120.0
+#: A slower motor stands still, ticks per second.
 _FRICTION = 0.01
-#: Effort beyond this share, for so many seconds, is an overload.
-_OVERLOAD, _PATIENCE = 0.95, 2.0
+#: Effort above this share for longer than this time is an overload, s.
+_OVERLOAD, _OVERLOAD_TIME = 0.95, 2.0
 _STEP = 1e-3
 
 
@@ -35,13 +35,13 @@ class Motor:
     position, velocity : float
         Ticks and ticks per second.
     profile : float
-        Where the profile is on its way to the goal.
+        Position of the profile on its way to the goal, ticks.
     effort : float
         Share of full effort, -1 to 1.
     temperature : float
         Degrees Celsius.
     obstacles : tuple of float
-        Lowest and highest position that the surroundings allow.
+        Lowest and highest position that obstacles allow, ticks.
     """
 
     def __init__(self, model: Model, position: float) -> None:
@@ -54,12 +54,27 @@ class Motor:
 
     @property
     def overloaded(self) -> bool:
-        """Whether it has pushed with all it has for too long."""
-        return self._strained > _PATIENCE
+        """Whether it has pushed with nearly full effort for too long."""
+        return self._strained > _OVERLOAD_TIME
 
     def stop(self) -> None:
-        """Give up the way to the goal and stay here."""
+        """Stop the profile at the present position."""
         self.profile, self._profile_velocity = self.position, 0.0
+
+    def measurements(self) -> dict[str, float]:
+        """Values of the registers that show measurements, in their units."""
+        model, effort = self._model, self.effort
+        return {
+            "present_position": self.position,
+            "present_velocity": self.velocity / model.velocity_unit,
+            "present_load": 1000 * effort,
+            "present_current": effort * model.stall_current / model.current_unit,
+            "present_pwm": effort * model["pwm_limit"].upper,
+            "present_temperature": self.temperature,
+            "present_input_voltage": 120 - 10 * abs(effort),
+            "moving": abs(self.velocity) > 10 * model.velocity_unit,
+            "position_trajectory": self.profile,
+        }
 
     def move(
         self,
@@ -71,7 +86,7 @@ class Motor:
         acceleration: float,
         max_effort: float,
     ) -> None:
-        """Let time pass.
+        """Simulate the motion over a duration.
 
         Parameters
         ----------
@@ -91,11 +106,11 @@ class Motor:
             if torque:
                 self._follow(goal, dt, rate, acceleration)
                 self._push(dt, max_effort)
-            else:  # the gear brakes it
+            else:  # no torque: the gear holds it
                 self.velocity = self.effort = 0.0
                 self.stop()
             warmth = _ROOM + _HEAT * self.effort**2
-            self.temperature += (warmth - self.temperature) * dt / _WARM
+            self.temperature += (warmth - self.temperature) * dt / _HEAT_TIME
             strained = abs(self.effort) > _OVERLOAD
             self._strained = self._strained + dt if strained else 0.0
 

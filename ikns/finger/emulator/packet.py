@@ -1,4 +1,4 @@
-"""Bytes of the Dynamixel protocols, both ways.
+"""Packets of the Dynamixel protocols: encoding and parsing.
 
 Source: ROBOTIS e-Manual, pages "DYNAMIXEL Protocol 2.0" and "Protocol 1.0".
 """
@@ -27,7 +27,7 @@ BROADCAST = 0xFE
 STATUS = 0x55
 _HEADER_2 = b"\xff\xff\xfd\x00"
 _HEADER_1 = b"\xff\xff"
-#: Longer than any packet of one servo: a length beyond it is noise.
+#: Longer than any packet of one servo: a greater length is noise.
 _LONGEST = 1024
 
 
@@ -119,14 +119,14 @@ def encode(packet: Packet, protocol: Protocol) -> bytes:
 
 
 class Parser:
-    """Finds packets in a stream of bytes that may hold noise and arrives in pieces.
+    """Finds packets in a stream of bytes that arrives in pieces and may contain noise.
 
     Parameters
     ----------
     protocol : {1, 2}
     status : bool
-        Whether status packets are expected rather than instructions; on Protocol 1.0
-        they look alike.
+        Whether to expect status packets rather than instructions, which look alike in
+        Protocol 1.0.
 
     Examples
     --------
@@ -140,42 +140,42 @@ class Parser:
     def __init__(self, protocol: Protocol, *, status: bool = False) -> None:
         self._next = self._next_1 if protocol == 1 else self._next_2
         self._status = status
-        self._seen = b""
+        self._buffer = b""
 
     def feed(self, data: bytes) -> list[Packet]:
-        """Take in bytes; return the packets that they complete."""
-        self._seen += data
+        """Add bytes; return the packets that they complete."""
+        self._buffer += data
         return list(self._packets())
 
-    def forget(self) -> None:
-        """Drop a packet that never ended."""
-        self._seen = b""
+    def reset(self) -> None:
+        """Drop an incomplete packet."""
+        self._buffer = b""
 
     def _packets(self) -> Iterator[Packet]:
         while (packet := self._next()) is not None:
             yield packet
 
     def _start(self, header: bytes) -> bool:
-        at = self._seen.find(header)
-        if at < 0:  # its first bytes may be there already
-            at = max(len(self._seen) - len(header) + 1, 0)
-            self._seen = self._seen[at:]
+        at = self._buffer.find(header)
+        if at < 0:  # the first bytes of a header may be there
+            at = max(len(self._buffer) - len(header) + 1, 0)
+            self._buffer = self._buffer[at:]
             return False
-        self._seen = self._seen[at:]
+        self._buffer = self._buffer[at:]
         return True
 
     def _next_2(self) -> Packet | None:
         while self._start(_HEADER_2):
-            if len(self._seen) < 7:
+            if len(self._buffer) < 7:
                 return None
-            length = int.from_bytes(self._seen[5:7], "little")
+            length = int.from_bytes(self._buffer[5:7], "little")
             if not 3 <= length <= _LONGEST:
-                self._seen = self._seen[1:]
+                self._buffer = self._buffer[1:]
                 continue
-            whole = self._seen[: 7 + length]
+            whole = self._buffer[: 7 + length]
             if len(whole) < 7 + length:
                 return None
-            self._seen = self._seen[len(whole) :]
+            self._buffer = self._buffer[len(whole) :]
             intact = crc16(whole[:-2]) == int.from_bytes(whole[-2:], "little")
             body = unstuff(whole[7:-2])
             if body[0] != STATUS:
@@ -186,16 +186,16 @@ class Parser:
 
     def _next_1(self) -> Packet | None:
         while self._start(_HEADER_1):
-            if len(self._seen) < 4:
+            if len(self._buffer) < 4:
                 return None
-            number, length = self._seen[2:4]
+            number, length = self._buffer[2:4]
             if number == 0xFF or length < 2:
-                self._seen = self._seen[1:]
+                self._buffer = self._buffer[1:]
                 continue
-            whole = self._seen[: 4 + length]
+            whole = self._buffer[: 4 + length]
             if len(whole) < 4 + length:
                 return None
-            self._seen = self._seen[len(whole) :]
+            self._buffer = self._buffer[len(whole) :]
             intact = checksum(whole[2:-1]) == whole[-1]
             if self._status:
                 return Packet(number, 0, whole[5:-1], whole[4], intact)

@@ -1,4 +1,4 @@
-"""A bus on a pseudo-terminal: simulated servos that any serial program can talk to."""
+"""Simulated servos on a pseudo-terminal that any serial program can open."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from typing import Self
 from ikns.errors import InvalidInput
 from ikns.finger.emulator.device import Servo
 from ikns.finger.emulator.faults import FAULTS, MOMENTARY, Fault
+from ikns.finger.emulator.packet import checksum, crc16
 
 __all__ = ["Wire"]
 
-#: The servos move at least this often, seconds.
+#: Longest step of the servos' simulation, s.
 _TICK = 0.005
-#: A plug is pulled without an answer in flight after so long, seconds.
-_PULL = 0.1
-#: A receiver tolerates so much difference in speed.
+#: The adapter is unplugged during a response, or after this time without one, s.
+_UNPLUG_DELAY = 0.1
+#: Relative difference of bit rates that a receiver tolerates.
 _BAUD_TOLERANCE = 0.03
 _SPEEDS = {
     getattr(termios, name): int(name[1:])
@@ -33,25 +34,25 @@ _SPEEDS = {
 
 
 class Wire:
-    """Simulated servos on one bus, open as a pseudo-terminal until closed.
+    """Simulated servos on one bus, reachable through a pseudo-terminal until closed.
 
     Parameters
     ----------
     *servos : Servo
     link : path, optional
-        A symbolic link to the pseudo-terminal, so that its name stays the same.
+        A symbolic link to the pseudo-terminal, for a name that does not change.
     faults : sequence of Fault
-        When they start is counted from now.
+        Their start times count from now.
 
     Attributes
     ----------
     port : str
-        What to open: the link, or the pseudo-terminal itself.
+        Port to open: the link, or the pseudo-terminal itself.
 
     Raises
     ------
     InvalidInput
-        When the link's name is taken.
+        When the link exists already.
 
     Examples
     --------
@@ -70,7 +71,7 @@ class Wire:
         self._link = None if link is None else Path(link)
         if self._link is not None and self._link.exists():
             raise InvalidInput(f"{self._link}: exists already; choose another link.")
-        self._began = time.monotonic()
+        self._start = time.monotonic()
         self._lock = threading.RLock()
         self._faults = list(faults)
         self._due: list[tuple[float, bytes]] = []
@@ -83,42 +84,42 @@ class Wire:
 
     @property
     def port(self) -> str:
-        """What to open."""
+        """Port to open."""
         return self._path if self._link is None else str(self._link)
 
     @property
     def plugged(self) -> bool:
-        """Whether there is a port at all."""
+        """Whether the port exists."""
         return self._master >= 0
 
     @property
     def elapsed(self) -> float:
-        """Seconds since it began."""
-        return time.monotonic() - self._began
+        """Seconds since the start."""
+        return time.monotonic() - self._start
 
     def inject(self, kind: str, duration: float = math.inf, value: float = 0.0) -> None:
-        """Let something go wrong now.
+        """Start a fault now.
 
         Parameters
         ----------
         kind : str
             One of :data:`ikns.finger.emulator.FAULTS`.
         duration, value : float
-            Seconds, and what the kind takes.
+            Seconds, and the value of the kind.
         """
         if kind not in FAULTS:
             raise InvalidInput(f"unknown fault '{kind}', expected {', '.join(FAULTS)}.")
         with self._lock:
             self._faults.append(Fault(kind, self.elapsed, duration, value))
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """End all faults; alerts last until a reboot."""
         with self._lock:
             self._faults.clear()
             self._replug_at = 0.0
 
     def close(self) -> None:
-        """Take the port away."""
+        """Stop the servos and remove the port."""
         self._stop.set()
         self._thread.join()
         self._unplug()
@@ -127,8 +128,8 @@ class Wire:
         """Return itself."""
         return self
 
-    def __exit__(self, *exception: object) -> None:
-        """Take the port away."""
+    def __exit__(self, *_: object) -> None:
+        """Close."""
         self.close()
 
     def _plug(self) -> None:
@@ -155,7 +156,7 @@ class Wire:
     def _run(self) -> None:
         while not self._stop.is_set():
             with self._lock:
-                self._happen()
+                self._start_faults()
                 if self.plugged:
                     self._send()
                 for servo in self.servos:
@@ -165,7 +166,7 @@ class Wire:
             if not self.plugged:
                 time.sleep(wait)
             elif select.select([self._master], [], [], wait)[0]:
-                # What was there may have been flushed by the other end since.
+                # The other end may have flushed the bytes since.
                 with self._lock, contextlib.suppress(BlockingIOError):
                     self._receive(os.read(self._master, 4096))
 
@@ -174,8 +175,8 @@ class Wire:
         active = [f for f in self._faults if f.kind == kind and f.active(now)]
         return active[-1] if active else None
 
-    def _happen(self) -> None:
-        """Let the faults begin that do not merely change bytes."""
+    def _start_faults(self) -> None:
+        """Start the faults that do more than change bytes."""
         for kind in MOMENTARY:
             if (fault := self._active(kind)) is None:
                 continue
@@ -189,7 +190,7 @@ class Wire:
         begun = (f for f in self._faults if f.kind == "unplug")
         fault = next((f for f in begun if f.start <= self.elapsed), None)
         if fault is not None and self.plugged:
-            if self._due or self.elapsed > fault.start + _PULL:
+            if self._due or self.elapsed > fault.start + _UNPLUG_DELAY:
                 if self._due and (data := min(self._due)[1]):
                     with contextlib.suppress(BlockingIOError):
                         os.write(self._master, data[: len(data) // 2])
@@ -206,7 +207,7 @@ class Wire:
         delay = self._active("delay")
         for servo in self.servos:
             if abs(speed - servo.baud) > _BAUD_TOLERANCE * servo.baud:
-                continue  # framing errors: it hears nothing
+                continue  # framing errors: it receives nothing
             for reply in servo.receive(data):
                 late = 0.0 if delay is None else delay.value or 0.05
                 self._due.append((reply.due + late, reply.data))
@@ -218,10 +219,10 @@ class Wire:
         for _, data in ready:
             if self._active("silence") is None and self._active("mute") is None:
                 with contextlib.suppress(BlockingIOError):
-                    os.write(self._master, self._spoiled(data))
+                    os.write(self._master, self._corrupt(data))
 
-    def _spoiled(self, data: bytes) -> bytes:
-        """Bytes as the faults of the moment leave them."""
+    def _corrupt(self, data: bytes) -> bytes:
+        """Apply the active faults to the bytes of a response."""
         if self._active("crc") is not None:
             data = data[:-1] + bytes([data[-1] ^ 0x5A])
         fault = self._active("id")
@@ -232,9 +233,7 @@ class Wire:
 
 
 def _with_id(data: bytes, protocol: int, number: int) -> bytes:
-    """Give a status another sender, with the checksum that fits."""
-    from ikns.finger.emulator.packet import checksum, crc16
-
+    """Replace the sender of a status packet, with a matching checksum."""
     at = 4 if protocol == 2 else 2
     number = number if number >= 0 else (data[at] + 1) % 253
     changed = data[:at] + bytes([number]) + data[at + 1 :]

@@ -6,32 +6,38 @@ every recording; `procedure` ties them to a source of frames.
 """
 
 from ikns.live.calibration.folder import RecordingsFolder
-from ikns.live.calibration.guidance import Status
-from ikns.live.calibration.guide import Guide, in_words
+from ikns.live.calibration.guidance import CalibrationStatus
 from ikns.live.calibration.judge import Judge
 from ikns.live.calibration.procedure import (
     accepted_recordings,
-    carry_out,
     check_labels,
-    recall,
+    restore,
+    run_protocol,
 )
-from ikns.live.calibration.protocol import Change, Key, LiveProtocol, Step, paper_steps
+from ikns.live.calibration.protocol import (
+    Change,
+    Key,
+    LiveProtocol,
+    ProtocolStep,
+    paper_steps,
+)
+from ikns.live.calibration.targets import TargetPoints, direction_in_words
 from ikns.live.calibration.verdict import Verdict
 
 __all__ = [
     "Change",
-    "Guide",
+    "TargetPoints",
     "Judge",
     "Key",
     "LiveProtocol",
     "RecordingsFolder",
-    "Status",
-    "Step",
+    "CalibrationStatus",
+    "ProtocolStep",
     "Verdict",
     "accepted_recordings",
-    "carry_out",
+    "run_protocol",
     "check_labels",
-    "in_words",
+    "direction_in_words",
     "paper_steps",
-    "recall",
+    "restore",
 ]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ikns.errors import FileError, InvalidInput
-from ikns.live.calibration.protocol import Step
+from ikns.live.calibration.protocol import ProtocolStep
 from ikns.live.calibration.verdict import Verdict
 from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
@@ -78,7 +78,7 @@ class RecordingsFolder:
             if take["outcome"] == "accepted"
         }
 
-    def pending(self, steps: Sequence[Step]) -> dict[str, Path]:
+    def pending(self, steps: Sequence[ProtocolStep]) -> dict[str, Path]:
         """Return recordings that were kept but not decided on, by step."""
         decided = {take["recording"] for take in self._takes}
         found: dict[str, Path] = {}
@@ -88,7 +88,7 @@ class RecordingsFolder:
                 found |= {step.name: new[-1]} if new else {}
         return found
 
-    def keep(self, step: Step, recording: Recording) -> Recording:
+    def keep(self, step: ProtocolStep, recording: Recording) -> Recording:
         """Write a take, synced to the disk.
 
         Returns
@@ -107,7 +107,7 @@ class RecordingsFolder:
         _sync(path)
         return read(path)
 
-    def decide(self, step: Step, outcome: str, verdict: Verdict) -> None:
+    def decide(self, step: ProtocolStep, outcome: str, verdict: Verdict) -> None:
         """Write down what became of the last take of a step."""
         files = self._files(step)
         decided = {take["recording"] for take in self._takes}
@@ -130,7 +130,7 @@ class RecordingsFolder:
         """Every take that was decided on, in that order."""
         return [dict(take) for take in self._takes]
 
-    def _files(self, step: Step) -> list[Path]:
+    def _files(self, step: ProtocolStep) -> list[Path]:
         """Return the takes of a step, the first one first."""
         first = self.path / f"{step.name}.c3d"
         more = sorted(

@@ -9,23 +9,23 @@ import numpy as np
 
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
-from ikns.live.calibration.guide import Guide, HandTracker, in_words
 from ikns.live.calibration.judge import Judge
-from ikns.live.calibration.protocol import LiveProtocol, Step
+from ikns.live.calibration.protocol import LiveProtocol, ProtocolStep
+from ikns.live.calibration.targets import HandTracker, TargetPoints, direction_in_words
 from ikns.live.stream import Frame, Source
 
-__all__ = ["Outlook", "Status"]
+__all__ = ["Guidance", "CalibrationStatus"]
 
 
 @dataclass(frozen=True)
-class Status:
+class CalibrationStatus:
     """How it stands, for a line on a screen.
 
     Parameters
     ----------
     state : str
         Of the protocol.
-    step : Step
+    step : ProtocolStep
     seconds_left : float
         Of the countdown or the recording.
     seen, expected : int
@@ -41,7 +41,7 @@ class Status:
     """
 
     state: str
-    step: Step
+    step: ProtocolStep
     seconds_left: float
     seen: int
     expected: int
@@ -51,26 +51,26 @@ class Status:
     way: str
 
 
-class Outlook:
+class Guidance:
     """What the experimenter sees between changes."""
 
     def __init__(self, source: Source, judge: Judge, n_points: int) -> None:
         self._labels, self._judge, self._n_points = source.labels, judge, n_points
         self._worn = MarkerSet.load(judge.marker_set).without_static()
         self._tracker: tuple[Skeleton, HandTracker] | None = None
-        self._guide: tuple[object, Guide] | None = None
+        self._guide: tuple[object, TargetPoints] | None = None
         self._before: tuple[float, np.ndarray] | None = None
 
-    def guide(self) -> Guide | None:
+    def guide(self) -> TargetPoints | None:
         """Places to suggest, once there was a free exploration."""
         explored = self._judge.explored
         if explored is None:
             return None
         if self._guide is None or self._guide[0] is not explored:
-            self._guide = (explored, Guide(explored, self._n_points))
+            self._guide = (explored, TargetPoints(explored, self._n_points))
         return self._guide[1]
 
-    def where(self, step: Step | None) -> str:
+    def where(self, step: ProtocolStep | None) -> str:
         """Where the hand should be, in words; empty where nobody knows."""
         guide = self.guide()
         if guide is None or step is None or step.kind != "point":
@@ -79,7 +79,7 @@ class Outlook:
 
     def status(
         self, protocol: LiveProtocol, frame: Frame | None, silence: float
-    ) -> Status:
+    ) -> CalibrationStatus:
         """Look at the last frame."""
         step = protocol.step
         assert step is not None
@@ -96,8 +96,11 @@ class Outlook:
                 guide = self.guide()
                 if guide is not None and step.kind == "point":
                     offset = guide.places[_number(step)] - place
-                    to_go, way = float(np.linalg.norm(offset)), in_words(offset)
-        return Status(
+                    to_go, way = (
+                        float(np.linalg.norm(offset)),
+                        direction_in_words(offset),
+                    )
+        return CalibrationStatus(
             protocol.state,
             step,
             protocol.seconds_left,
@@ -119,6 +122,6 @@ class Outlook:
         return self._tracker[1].place(frame.markers)
 
 
-def _number(step: Step) -> int:
+def _number(step: ProtocolStep) -> int:
     """Return the number of a point, from 0."""
     return int(step.name.rsplit("_", 1)[-1]) - 1

@@ -11,7 +11,7 @@ from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import IknsError, InvalidInput
 from ikns.live.calibration.point_verdict import judge_point
-from ikns.live.calibration.protocol import Step
+from ikns.live.calibration.protocol import ProtocolStep
 from ikns.live.calibration.verdict import Verdict, judge_free, judge_static
 from ikns.recording.recording import Recording
 
@@ -73,7 +73,7 @@ class Judge:
         self._n_dof, self._variance = n_dof, variance
         self._max_hand_speed, self._min_still = max_hand_speed, min_still
 
-    def judge(self, step: Step, recording: Recording | None) -> Verdict:
+    def judge(self, step: ProtocolStep, recording: Recording | None) -> Verdict:
         """Say what a recording of a step is good for; None stands for no frames."""
         if recording is None:
             return Verdict(False, False, "No frames came.", {})
@@ -83,7 +83,7 @@ class Judge:
             # The person is still there and can do it again.
             return Verdict(False, False, f"It cannot be judged: {error}", {})
 
-    def accept(self, step: Step, verdict: Verdict) -> None:
+    def accept(self, step: ProtocolStep, verdict: Verdict) -> None:
         """Learn from a step that was accepted."""
         if verdict.skeleton is not None:
             self.skeleton = verdict.skeleton
@@ -92,7 +92,7 @@ class Judge:
         if verdict.place is not None:
             self.places[step.name] = verdict.place
 
-    def _judge(self, step: Step, recording: Recording) -> Verdict:
+    def _judge(self, step: ProtocolStep, recording: Recording) -> Verdict:
         if step.kind == "static":
             return judge_static(
                 recording,

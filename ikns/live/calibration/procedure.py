@@ -17,14 +17,14 @@ from ikns.calibration import sight_needs
 from ikns.errors import MarkerMismatch, NotEnoughData, StreamError
 from ikns.live.calibration.clock import DeviceClock
 from ikns.live.calibration.folder import RecordingsFolder
-from ikns.live.calibration.guidance import Outlook, Status
+from ikns.live.calibration.guidance import CalibrationStatus, Guidance
 from ikns.live.calibration.judge import Judge
-from ikns.live.calibration.protocol import Change, Key, LiveProtocol, Step
+from ikns.live.calibration.protocol import Change, Key, LiveProtocol, ProtocolStep
 from ikns.live.calibration.verdict import Verdict
 from ikns.live.stream import Frame, Source
 from ikns.recording.files import read
 
-__all__ = ["accepted_recordings", "carry_out", "check_labels", "recall"]
+__all__ = ["accepted_recordings", "run_protocol", "check_labels", "restore"]
 
 #: Called with a change, the verdict where there is one, and where the hand should go.
 OnChange = Callable[[Change, Verdict | None, str], None]
@@ -61,7 +61,9 @@ def check_labels(
         )
 
 
-def recall(judge: Judge, folder: RecordingsFolder, steps: Sequence[Step]) -> None:
+def restore(
+    judge: Judge, folder: RecordingsFolder, steps: Sequence[ProtocolStep]
+) -> None:
     """Teach the judge what was accepted before."""
     accepted = folder.accepted
     for step in steps:
@@ -70,7 +72,7 @@ def recall(judge: Judge, folder: RecordingsFolder, steps: Sequence[Step]) -> Non
 
 
 def accepted_recordings(
-    folder: RecordingsFolder, steps: Sequence[Step]
+    folder: RecordingsFolder, steps: Sequence[ProtocolStep]
 ) -> tuple[Path, list[Path]]:
     """Return the static trial and the points to calibrate from.
 
@@ -95,7 +97,7 @@ def accepted_recordings(
     return accepted[static[0].name], [accepted[step.name] for step in points]
 
 
-def carry_out(
+def run_protocol(
     source: Source,
     protocol: LiveProtocol,
     judge: Judge,
@@ -104,9 +106,9 @@ def carry_out(
     n_points: int,
     keys: Callable[[bool], Sequence[Key]] = lambda waiting: (),
     on_change: OnChange = lambda change, verdict, where: None,
-    on_status: Callable[[Status], None] | None = None,
+    on_status: Callable[[CalibrationStatus], None] | None = None,
     status_every: float = 0.1,
-    patience: float = 10.0,
+    read_timeout: float = 10.0,
 ) -> None:
     """Go through the protocol until it is done or stopped.
 
@@ -116,7 +118,7 @@ def carry_out(
     protocol : LiveProtocol
         Not begun yet.
     judge : Judge
-        That knows what was accepted before, see :func:`recall`.
+        That knows what was accepted before, see :func:`restore`.
     folder : RecordingsFolder
     n_points : int
         Points in all, for the places to suggest.
@@ -126,8 +128,8 @@ def carry_out(
         Called with every change, the verdict where there is one, and words for where
         the hand should go.
     on_status : callable, optional
-        Called with a :class:`Status` about every `status_every` seconds.
-    patience : float
+        Called with a :class:`CalibrationStatus` about every `status_every` seconds.
+    read_timeout : float
         Seconds without a frame after which nobody waits any longer where no key could
         end the wait.
 
@@ -137,7 +139,7 @@ def carry_out(
         When the source ends, or falls silent with nobody at the keys.
     """
     _Run(source, protocol, judge, folder, n_points, on_change).go(
-        keys, on_status, status_every, patience
+        keys, on_status, status_every, read_timeout
     )
 
 
@@ -159,14 +161,14 @@ class _Run:
         self._verdict: Verdict | None = None
         self._clock = DeviceClock()
         self._frame: Frame | None = None
-        self._outlook = Outlook(source, judge, n_points)
+        self._guidance = Guidance(source, judge, n_points)
 
     def go(
         self,
         keys: Callable[[bool], Sequence[Key]],
-        on_status: Callable[[Status], None] | None,
+        on_status: Callable[[CalibrationStatus], None] | None,
         status_every: float,
-        patience: float,
+        read_timeout: float,
     ) -> None:
         protocol, source = self._protocol, self._source
         self._handle(protocol.begin(0.0))
@@ -184,14 +186,14 @@ class _Run:
                 self._handle(protocol.frame(frame, self._clock.now))
             else:
                 self._handle(protocol.tick(self._clock.now))
-                self._wait(patience)
+                self._wait(read_timeout)
             if on_status and not protocol.over:
                 if time.monotonic() - shown >= status_every:
                     shown = time.monotonic()
                     silence = self._clock.silence
-                    on_status(self._outlook.status(protocol, self._frame, silence))
+                    on_status(self._guidance.status(protocol, self._frame, silence))
 
-    def _wait(self, patience: float) -> None:
+    def _wait(self, read_timeout: float) -> None:
         protocol, source = self._protocol, self._source
         step = protocol.step.name if protocol.step else "the end"
         if source.ended and not protocol.waiting and not protocol.over:
@@ -199,9 +201,9 @@ class _Run:
                 f"{source.name}: ended at {step}; what was recorded is in "
                 f"{self._folder.path}, so go on with --resume."
             )
-        if protocol.auto and self._clock.silence > patience:
+        if protocol.auto and self._clock.silence > read_timeout:
             raise StreamError(
-                f"{source.name}: no frame for {patience:g} s at {step}; what was "
+                f"{source.name}: no frame for {read_timeout:g} s at {step}; what was "
                 f"recorded is in {self._folder.path}, so go on with --resume."
             )
         if source.ended:
@@ -218,7 +220,7 @@ class _Run:
                     self._folder.decide(step, change.what, self._verdict)
             if change.what == "stopped":
                 self._verdict = None
-            self._on_change(change, self._verdict, self._outlook.where(step))
+            self._on_change(change, self._verdict, self._guidance.where(step))
             if change.what in ("accepted", "redo", "skipped"):
                 self._verdict = None
             if change.what == "judging":

@@ -12,11 +12,19 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from ikns.errors import InvalidInput
-from ikns.live.calibration.assemble import take_recording
+from ikns.live.calibration.frames import recording_from_frames
 from ikns.live.stream import Frame
 from ikns.recording.recording import Recording
 
-__all__ = ["KEYS", "Change", "Key", "LiveProtocol", "State", "Step", "paper_steps"]
+__all__ = [
+    "KEYS",
+    "Change",
+    "Key",
+    "LiveProtocol",
+    "State",
+    "ProtocolStep",
+    "paper_steps",
+]
 
 Key = Literal["next", "redo", "skip", "quit"]
 KEYS: tuple[Key, ...] = ("next", "redo", "skip", "quit")
@@ -26,7 +34,7 @@ State = Literal[
 
 
 @dataclass(frozen=True)
-class Step:
+class ProtocolStep:
     """One recording of the protocol.
 
     Parameters
@@ -53,7 +61,7 @@ class Change(NamedTuple):
     ----------
     time : float
         As told to the call, s.
-    step : Step or None
+    step : ProtocolStep or None
         None at the end.
     what : str
         The new state, or what became of the step: ``accepted``, ``redo``, ``skipped``;
@@ -61,7 +69,7 @@ class Change(NamedTuple):
     """
 
     time: float
-    step: Step | None
+    step: ProtocolStep | None
     what: str
 
 
@@ -72,7 +80,7 @@ def paper_steps(
     free_seconds: float = 60.0,
     point_seconds: float = 5.0,
     countdown: float = 3.0,
-) -> tuple[Step, ...]:
+) -> tuple[ProtocolStep, ...]:
     """Return the steps of Lisini Baldi et al. (arXiv 2012.03600).
 
     Raises
@@ -97,10 +105,10 @@ def paper_steps(
             f"expected a countdown of 0 s to 3600 s, found {countdown:g} s."
         )
     return (
-        Step("static", "static", static_seconds, countdown),
-        Step("free", "free", free_seconds, countdown),
+        ProtocolStep("static", "static", static_seconds, countdown),
+        ProtocolStep("free", "free", free_seconds, countdown),
         *(
-            Step(f"point_{k:02d}", "point", point_seconds, countdown)
+            ProtocolStep(f"point_{k:02d}", "point", point_seconds, countdown)
             for k in range(1, points + 1)
         ),
     )
@@ -111,7 +119,7 @@ class LiveProtocol:
 
     Parameters
     ----------
-    steps : sequence of Step
+    steps : sequence of ProtocolStep
     labels : sequence of M str
         Markers of the frames.
     rate : float
@@ -127,7 +135,7 @@ class LiveProtocol:
     Attributes
     ----------
     state : str
-    step : Step or None
+    step : ProtocolStep or None
         The present one; None once there is none left.
     take : Recording or None
         What was recorded of it, None with fewer than two frames.
@@ -140,7 +148,7 @@ class LiveProtocol:
 
     def __init__(
         self,
-        steps: Sequence[Step],
+        steps: Sequence[ProtocolStep],
         *,
         labels: Sequence[str],
         rate: float,
@@ -162,7 +170,7 @@ class LiveProtocol:
         self._since = 0.0
 
     @property
-    def step(self) -> Step | None:
+    def step(self) -> ProtocolStep | None:
         """The present step."""
         return self._left[0] if self._left else None
 
@@ -243,7 +251,7 @@ class LiveProtocol:
         return [Change(now, self.step, "refused")]
 
     @property
-    def _present(self) -> Step:
+    def _present(self) -> ProtocolStep:
         assert self._left
         return self._left[0]
 
@@ -267,7 +275,7 @@ class LiveProtocol:
         return [self._to("countdown", now)]
 
     def _finish(self, now: float) -> list[Change]:
-        self.take = take_recording(
+        self.take = recording_from_frames(
             self._frames, self._labels, self._rate, self._present.name
         )
         self._frames = []

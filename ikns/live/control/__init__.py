@@ -1,4 +1,4 @@
-"""Control: from what cameras see in one frame to the control signal."""
+"""Control: from the markers of a frame to the control signal and the flexion."""
 
 from ikns.live.control.frame import ControlFrame, FrameSolver
 from ikns.live.control.null_rate import null_rate

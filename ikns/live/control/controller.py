@@ -1,7 +1,7 @@
-"""From a frame of markers to what a finger is asked: the live loop, no clock, no I/O.
+"""From a frame of markers to the commanded flexion, without clock or input and output.
 
-Every call says what time it is and nothing else is looked at, so the same frames at the
-same times give the same answers, bit for bit, live and replayed from a session.
+Every call passes the time, so the same frames at the same times give the same results,
+bit for bit, live and when a session is replayed.
 """
 
 from __future__ import annotations
@@ -13,72 +13,74 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.live.control.frame import ControlFrame, FrameSolver
-from ikns.live.control.refusal import explains, refusal
+from ikns.live.control.rejection import fits_markers, rejection_reason
 from ikns.live.control.safety import Changes, SafetyMachine, State
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.live.control.smoothing import OneEuro
 
 __all__ = ["Controller", "Decision"]
 
-#: A device clock that runs back by more than this was started anew, s.
+#: A device clock that steps back by more than this was restarted, s.
 _RESTART = 1.0
-#: Cut-off of the hand's speed, Hz: natural reaches lie below it.
+#: Cut-off frequency for the hand's speed, Hz; natural reaches are below it.
 _SPEED_CUTOFF = 5.0
-#: Why there is no pose while no frame has come since the last that counted.
+#: Why there is no valid pose when no frame came since the last valid one.
 _SILENCE = "no frame came"
 
 
 class Decision(NamedTuple):
-    """What a frame led to.
+    """Result of one frame.
 
     Parameters
     ----------
     solved : ControlFrame
         Pose and raw control signal.
-    refused : str
-        Why the frame does not count, in words; empty if it does.
+    rejection : str
+        Why the frame is rejected, in words; empty if it is valid.
     flexion : float
-        What the finger is asked, 0 to 1; NaN before the first pose.
+        Commanded flexion, 0 to 1; NaN before the first valid pose.
     state : str
-        Of the safety machine, after the frame.
+        State of the safety machine after the frame.
     changes : tuple of Transition
-        On the way there.
+        State changes caused by the frame.
     """
 
     solved: ControlFrame
-    refused: str
+    rejection: str
     flexion: float
     state: State
     changes: Changes
 
     @property
     def valid(self) -> bool:
-        """Whether the frame counts."""
-        return not self.refused
+        """Whether the frame is valid."""
+        return not self.rejection
 
 
 class Controller:
-    """The live loop, frame by frame.
+    """Turns markers into a commanded flexion, frame by frame.
 
     Parameters
     ----------
     solver : FrameSolver
-        Markers to pose and control signal; the first degree of freedom drives.
-    settings : Settings, optional
+        Finds pose and control signal; the first degree of freedom drives the finger.
+    settings : ControlSettings, optional
 
     Attributes
     ----------
     machine : SafetyMachine
-        To be armed, started and stopped by the caller.
+        Armed, activated and stopped by the caller.
     flexion : float
-        What the finger is asked.
+        Commanded flexion.
     smoothing_delay : float
-        Of the control signal at the last frame, s.
+        Delay of the smoothed control signal at the last frame, s.
     """
 
-    def __init__(self, solver: FrameSolver, settings: Settings | None = None) -> None:
+    def __init__(
+        self, solver: FrameSolver, settings: ControlSettings | None = None
+    ) -> None:
         self.solver = solver
-        self.settings = s = Settings() if settings is None else settings
+        self.settings = s = ControlSettings() if settings is None else settings
         self.machine = SafetyMachine(hold_after=s.hold_after, safe_after=s.safe_after)
         self.flexion = math.nan
         self._smooth = OneEuro(cutoff=s.cutoff, beta=s.beta)
@@ -91,22 +93,21 @@ class Controller:
 
     @property
     def smoothing_delay(self) -> float:
-        """Of the control signal at the last frame, s."""
+        """Delay of the smoothed control signal at the last frame, s."""
         return self._smooth.delay
 
     def frame(
         self, markers: NDArray[np.float64], device_time: float, receive_time: float
     ) -> Decision:
-        """Take one frame.
+        """Process one frame.
 
         Parameters
         ----------
         markers : (M, 3) array
             m in the world, in the order of the skeleton's marker set; NaN = not seen.
         device_time : float
-            On the device's clock, s. A frame that is not newer than the last, or whose
-            markers are the last one's to the bit (cameras are never that still), shows
-            nothing new and does not count.
+            On the device's clock, s. A frame that is not newer than the last one, or
+            has exactly the same markers (cameras always add noise), is rejected.
         receive_time : float
             On the caller's monotonic clock, s.
         """
@@ -120,14 +121,15 @@ class Controller:
         else:
             self._device_time, self._markers = device_time, seen
         solved = self.solver.solve(markers)
-        refused = refusal(self.solver, self.settings, markers, solved, new=new)
+        rejection = rejection_reason(
+            self.solver, self.settings, markers, solved, new=new
+        )
         machine = self.machine
-        if refused:
-            self._why = refused
-            changes = machine.check(receive_time, refused)
-            # Its pose may be wrong and no place to start the next from; nor is one of
-            # long ago.
-            if not explains(solved, self.settings):
+        if rejection:
+            self._why = rejection
+            changes = machine.check(receive_time, rejection)
+            # The next frame must not start from a pose that does not fit or is old.
+            if not fits_markers(solved, self.settings):
                 at, q = self._counted
                 recent = receive_time - at < self.settings.safe_after
                 self.solver.reset(q if recent else None)
@@ -136,10 +138,10 @@ class Controller:
             self._why = _SILENCE
             self._counted = receive_time, solved.q
             self._follow(float(solved.c[0]), solved.hand_in_thorax, dt)
-        return Decision(solved, refused, self.flexion, machine.state, changes)
+        return Decision(solved, rejection, self.flexion, machine.state, changes)
 
     def check(self, now: float) -> Changes:
-        """Ask the watchdog while no frame comes."""
+        """Check the watchdog while no frame comes."""
         return self.machine.check(now, self._why)
 
     def _follow(self, c: float, hand: NDArray[np.float64], dt: float) -> None:

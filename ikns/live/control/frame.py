@@ -1,4 +1,4 @@
-"""The live frame: markers in, control signal out, in one compiled call."""
+"""One live frame, from markers to the control signal, in one compiled call."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ Array = NDArray[np.float64]
 
 
 class ControlFrame(NamedTuple):
-    """What one frame says.
+    """Pose and control signal of one frame.
 
     Parameters
     ----------
     c : (d,) array
         Control signals, not clipped; NaN while the chain is not in sight, and where
-        the map has none.
+        the map has no value.
     q : (nq,) array
         Configuration of the skeleton.
     hand_in_thorax : (3,) array
-        Where the task happens, m.
+        Task position, m.
     in_sight : bool
         Whether every segment of the chain was seen.
     inside : bool
-        Whether the hand is among the points of the map; false out of sight.
+        Whether the hand is inside the hull of the map's points; false out of sight.
     residual : float
-        Root mean square marker distance, m; NaN without markers.
+        Root mean square distance between pose and markers, m; NaN without markers.
     worst_residual : float
-        Largest distance of a marker of the chain's segments, m; NaN without any.
+        Largest distance between pose and a marker of the chain, m; NaN without any.
     intermarker_error : float
-        Largest difference between the distance of two markers of a segment and what it
-        is on the person's skeleton, m; 0 where no two are seen.
+        Largest difference between the distance of two markers of a segment and that on
+        the person's skeleton, m; 0 where no two are seen.
     iterations : int
     converged : bool
     """
@@ -62,11 +62,11 @@ class ControlFrame(NamedTuple):
 
 
 class FrameSolver:
-    """Solve frames one after the other, each from the pose before.
+    """Solve successive frames, each starting from the pose before.
 
-    The same as :meth:`ikns.MarkerIK.solve`, the hand, and
-    :meth:`ikns.NullSpaceMap.control_signal` one after the other, but in one call. It
-    keeps the pose and memory to work in: one for each thread.
+    Does the same as :meth:`ikns.MarkerIK.solve`, the hand position, and
+    :meth:`ikns.NullSpaceMap.control_signal` in sequence, but in one compiled call. It
+    keeps the pose and work memory, so use one per thread.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class FrameSolver:
         )
         self._lost = self._lost and not np.isfinite(residual)
         q = self._q.copy()
-        if status == UNSURE:  # never seen; the slow way then
+        if status == UNSURE:  # has not been observed; use the slow way
             angles = q[7:][self._map.columns]
             c = np.reshape(self.null_space_map.control_signal(angles, place), -1)
         inside = status == INSIDE_HULL

@@ -1,4 +1,4 @@
-"""A map's directions and ranges at one place after the other, quickly."""
+"""Fast evaluation of a map's directions and ranges at successive hand positions."""
 
 from __future__ import annotations
 

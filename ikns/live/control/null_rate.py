@@ -1,4 +1,4 @@
-"""How fast a joint velocity moves c through the null space alone."""
+"""Rate of c due to the null-space part of a joint velocity."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ def null_rate(
     *,
     metric: ArrayLike | None = None,
 ) -> Array:
-    """Rate of c by the null-space part of a joint velocity.
+    """Rate of c due to the null-space part of a joint velocity.
 
     ``Z P v / (M - m)`` with the projector ``P = N' (N W N')^-1 N W``. The rows of N
-    span the null space; neither their signs nor their order matter, so nothing jumps
-    where a decomposition turns its basis over. A null motion passes unchanged
-    (``P n = n``), so with the hand held this is the rate of the position mode's c,
-    however the self-motion bends.
+    span the null space; their signs and order do not matter, so a decomposition whose
+    basis flips causes no jump. A null motion passes unchanged (``P n = n``), so while
+    the hand is held this is the rate of the position mode's c, even along a curved
+    self-motion.
 
-    Which task motion counts as free of null motion is a choice, made by W: for W the
-    identity the shortest joint velocity that does the task, for W a mass matrix the one
-    with least kinetic energy, for W the inverse covariance of joint velocities the one
-    to be expected (Khatib 1987, IEEE J Robot Autom 3:43, for the weighted inverse).
+    W decides which task motion counts as free of null motion: with the identity it is
+    the shortest joint velocity that does the task, with a mass matrix the one of least
+    kinetic energy, with the inverse covariance of joint velocities the expected one
+    (Khatib 1987, IEEE J Robot Autom 3:43, for the weighted inverse).
 
     Parameters
     ----------
     directions : (..., d, n) array
-        Z at the hand's place.
+        Z at the hand's position.
     width : (..., d) array
         M - m there, rad.
     basis : (..., r, n) array
@@ -44,8 +44,8 @@ def null_rate(
     v : (..., n) array
         Joint velocity, rad/s.
     metric : (n, n) array, optional
-        W, symmetric and positive; default the identity, for which the rows of N must be
-        orthonormal.
+        W, symmetric and positive definite; by default the identity, for which the rows
+        of N must be orthonormal.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def null_rate(
     else:
         weighted = N @ np.asarray(metric, dtype=float)
         gram = weighted @ across
-        # A row of zeros stays out: one equation 1 * 0 = 0.
+        # A row of zeros is skipped: its equation becomes 1 * 0 = 0.
         empty = np.einsum("...ii->...i", gram) == 0
         gram = gram + empty[..., None] * np.eye(gram.shape[-1])
         amount = np.linalg.solve(gram, weighted @ np.asarray(v, dtype=float)[..., None])
@@ -72,10 +72,10 @@ def null_rate(
 
 
 def garrote(values: Array, least: Array | float) -> Array:
-    """Zero up to `least`, and beyond it less by ``least**2 / value``.
+    """Zero up to `least`, above it reduced by ``least**2 / value``.
 
-    Continuous, and large values pass almost whole (non-negative garrote: Breiman 1995,
-    Technometrics 37:373; as a threshold Gao 1998, J Comput Graph Stat 7:469).
+    Continuous, and large values pass almost unchanged (non-negative garrote: Breiman
+    1995, Technometrics 37:373; as a threshold Gao 1998, J Comput Graph Stat 7:469).
 
     Examples
     --------
@@ -89,7 +89,7 @@ def garrote(values: Array, least: Array | float) -> Array:
 
 
 def checked_metric(metric: ArrayLike | None, n: int) -> Array | None:
-    """Return a metric of n joints as a matrix, or say what is wrong with it."""
+    """Return a metric of n joints as a matrix, or raise an error."""
     if metric is None:
         return None
     W = np.array(metric, dtype=np.float64)

@@ -1,18 +1,18 @@
-"""Rate mode: c moves with the null-space part of the joint velocity alone.
+"""Rate mode: only the null-space part of the joint velocity moves c.
 
-The paper's position mode reads c off the posture, so c also changes where a reach
-changes the posture. Rate mode adds up how fast the joints move within the null space::
+The paper's position mode computes c from the posture, so c also changes when a reach
+changes the posture. Rate mode integrates the joint velocity within the null space::
 
     dc/dt = beyond(Z^ P v / (M^ - m^), carry * hand speed)
 
-P projects on the null space, learned (the span of Z^) or analytic (that of the hand's
-Jacobian). A natural reach moves the arm within its null space too, the more the faster
-the hand goes; what stays below `carry` times the hand's speed is taken for that and
-does not count (:func:`ikns.live.control.null_rate.garrote`).
+P projects onto the null space, learned (the span of Z^) or analytic (that of the hand's
+Jacobian). A natural reach moves the arm within its null space too, and the more so the
+faster the hand is; rates below `carry` times the hand's speed are attributed to the
+reach and ignored (:func:`ikns.live.control.null_rate.garrote`).
 
-What is added up drifts, so c is drawn to the position mode's value: while the person
-moves it (`travel`), where nobody sees the correction, and with time while the hand is
-held (`tau`), if wanted. An elbow at rest then leaves c at rest unless `tau` is finite.
+An integral drifts, so c is pulled towards the position mode's value: while the person
+moves c (`travel`), where the correction is not noticed, and optionally with time while
+the hand is held (`tau`). With an infinite `tau`, c rests while the elbow rests.
 """
 
 from __future__ import annotations
@@ -37,41 +37,42 @@ __all__ = ["RateControl", "samples_of"]
 
 Array = NDArray[np.float64]
 
-#: What happened within a longer gap nobody knows, s.
+#: Samples farther apart are not integrated across, s.
 _GAP = 0.1
 
 
 class RateControl:
-    """c from joint velocities, sample by sample. One for each thread.
+    """Control signal c from joint velocities, sample by sample; use one per thread.
 
     Parameters
     ----------
     null_space_map : NullSpaceMap
         Fitted, for `chain`.
     skeleton : Skeleton, optional
-        Projects on the null space of its Jacobian; without one, on the span of Z^.
+        Projects onto the null space of its Jacobian; without one, onto the span of Z^.
     chain : str
         See :data:`ikns.body.chains.CHAINS`.
     task : {"pose", "position"}
-        What the hand holds, for the Jacobian.
+        What of the hand is held, for the Jacobian.
     metric : (n,) or (n, n) array, optional
         W of :func:`ikns.live.control.null_rate`, or its diagonal. Default: the
         identity.
     carry : float or (d,) array
-        How much c a reach carries along with it, per m of the hand's way; see
-        :func:`ikns.live.control.reach_gain`. Defaults were chosen on virtual subjects
-        that no result of ``benchmarks/rate_mode.py`` is from.
+        Change of c per meter of hand path that a reach causes; see
+        :func:`ikns.live.control.reach_gain`. The default was chosen on virtual subjects
+        that are not part of the results of ``benchmarks/rate_mode.py``.
     travel : float
-        A small offset to the position mode shrinks to 1/e while c is moved by this
-        much. The correction never exceeds the motion: c at most stops or goes twice as
-        fast, and never runs against the person. Infinite: the offset stays.
+        A small offset from the position mode shrinks to 1/e while c moves by this much.
+        The correction never exceeds the motion: c at most stops or moves twice as fast,
+        and never moves against the person. Infinite: the offset stays.
     tau : float
-        And within this time while the hand is held, s. This moves c by itself.
+        Time in which the offset shrinks to 1/e while the hand is held, s. This moves c
+        without any motion of the person.
     max_hand_speed : float
-        Slower hands are held, m/s.
+        Slower hands count as held, m/s.
     limits : (float, float) or None
-        c stays within, and what goes beyond is forgotten: moving on against a stop puts
-        c right, and moving back is answered at once. None for analysis.
+        c is clipped to this range at every step: moving on against a limit corrects an
+        offset, and moving back takes effect at once. None for analysis.
 
     Raises
     ------
@@ -141,7 +142,7 @@ class RateControl:
         self.reset()
 
     def reset(self, c: ArrayLike | None = None) -> None:
-        """Start again at `c`, or where the position mode is at the next sample."""
+        """Restart at `c`, or at the position mode's value of the next sample."""
         d = self.null_space_map.directions_.shape[1]
         self.c: Array = np.full(d, np.nan)
         self._rate: Array | None = None
@@ -164,11 +165,11 @@ class RateControl:
         *,
         hand_speed: float | None = None,
     ) -> Array:
-        """Take the next sample.
+        """Process the next sample.
 
-        Rates are added up by trapezoids, so an error of a sampled motion shrinks with
-        the square of `dt`. A sample that misses anything, or comes over 0.1 s after
-        the one before, leaves c as it is, and the next one starts again: c never jumps.
+        Rates are integrated by the trapezoidal rule, so the error of a sampled motion
+        shrinks with the square of `dt`. An incomplete sample, or one more than 0.1 s
+        after the last, leaves c unchanged and restarts the integration: c never jumps.
 
         Parameters
         ----------
@@ -180,14 +181,14 @@ class RateControl:
         x : (3,) array
             Hand in the thorax frame, m.
         dt : float
-            Time since the sample before, s.
+            Time since the last sample, s.
         hand_speed : float, optional
-            m/s, smoothed like `v`. Default: from `x` and the sample before.
+            m/s, smoothed like `v`. Default: from `x` and the last sample.
 
         Returns
         -------
         (d,) array
-            Within the limits; NaN before the first whole sample.
+            Within the limits; NaN before the first complete sample.
         """
         place = np.asarray(x, dtype=np.float64)
         if hand_speed is None:
@@ -243,12 +244,12 @@ class RateControl:
         return np.minimum(np.maximum(c, self.limits[0]), self.limits[1])
 
     def track(self, motion: Motion) -> Array:
-        """Start again and take all samples of a motion.
+        """Restart and process all samples of a motion.
 
         Returns
         -------
         (T,) array, or (T, d) for several degrees of freedom
-            What :meth:`step` returns, one sample after the other.
+            Control signal of each sample, as from :meth:`step`.
         """
         self.reset()
         steps = np.diff(motion.time, prepend=motion.time[:1])
@@ -262,7 +263,7 @@ class RateControl:
 
 
 def samples_of(control: RateControl, motion: Motion) -> tuple[Array, Array, Array]:
-    """Return what :meth:`RateControl.step` takes as q, v and x, a row a sample."""
+    """Return q, v and x for :meth:`RateControl.step`, one row per sample."""
     chain = control.chain
     q = motion.chain_angles(chain) if control.skeleton is None else motion.q
     return q, motion.chain_velocities(chain), motion.task_position(chain)
@@ -273,5 +274,5 @@ def _null_space(J: Array) -> Array:
     k, n = J.shape
     basis, rank = np.empty((1, max(n - k, 0), n)), np.empty(1, dtype=np.int64)
     write_bases(J[None], 1e-9, False, basis, rank)
-    # An arm stretched out has more.
+    # A stretched arm has a larger null space.
     return basis[0] if rank[0] == min(k, n) else null_spaces(J)[0]

@@ -1,4 +1,4 @@
-"""How much of the self-motion belongs to reaching."""
+"""How much reaching alone moves c."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ __all__ = ["reach_gain"]
 def reach_gain(
     control: RateControl, motion: Motion, *, quantile: float = 0.9
 ) -> NDArray[np.float64]:
-    """How much c the reaches of a motion carry along, per m of the hand's way.
+    """Change of c per meter of hand path that the reaches of a motion cause.
 
-    The null rate of c over the hand's speed while the hand travels: the value that
-    holds for the share `quantile` of the way. With it as ``RateControl(carry=...)``, c
-    stays on that share of such reaches. It is also how much of a deliberate
-    self-motion a reach swallows.
+    The null rate of c divided by the hand's speed while the hand travels: the value not
+    exceeded along the share `quantile` of the hand's path. With it as
+    ``RateControl(carry=...)``, c does not change along that share of such reaches. A
+    deliberate self-motion during a reach is reduced by about as much.
 
     Parameters
     ----------
     control : RateControl
         Its `carry` is not used.
     motion : Motion
-        Reaches of somebody who does not mean to move c, such as those between the
+        Reaches of a person who does not intend to move c, such as those between the
         points of a calibration.
     quantile : float
         In [0, 1].
@@ -40,7 +40,7 @@ def reach_gain(
     Raises
     ------
     NotEnoughData
-        When the hand never travels in sight.
+        When the hand is never both fast and in sight.
     """
     if not 0 <= quantile <= 1:
         raise InvalidInput(f"expected a quantile from 0 to 1, found {quantile}.")
@@ -55,12 +55,12 @@ def reach_gain(
             f"expected samples with the hand faster than {control.max_hand_speed:g} "
             f"m/s and every joint known, found none of {len(speed)}."
         )
-    way = speed[rows][known]
-    ratios = np.abs(rates[known]) / way[:, None]
+    hand_speed = speed[rows][known]
+    ratios = np.abs(rates[known]) / hand_speed[:, None]
     found = np.empty(d)
     for k, ratio in enumerate(ratios.T):
         order = np.argsort(ratio)
-        share = np.cumsum(way[order]) / way.sum()
+        share = np.cumsum(hand_speed[order]) / hand_speed.sum()
         # Rounding may leave the last share below 1.
         found[k] = ratio[order][min(np.searchsorted(share, quantile), len(order) - 1)]
     return found

@@ -1,12 +1,12 @@
-"""When the finger may move: five states, and a reason for every way between them.
+"""When the finger may move: a state machine that gives a reason for every transition.
 
     disarmed -> armed -> active <-> holding -> safe -> disarmed
 
-Only in ``active`` does the finger follow the signal. Poses that stop coming lead from
-``active`` to ``holding`` (the finger stays where it is) and then to ``safe`` (the safe
-state that was chosen: hold, open or limp); poses that come back lead from ``holding``
-to ``active``. A stop leads to ``safe`` from anywhere but ``disarmed``, and out of
-``safe`` there is no way but to disarm: somebody has to look and arm again.
+The finger follows the signal only in ``active``. Without valid poses the machine goes
+from ``active`` to ``holding`` (the finger stays where it is) and then to ``safe`` (the
+chosen safe state: hold, open or limp); when poses return, it goes from ``holding`` back
+to ``active``. A stop leads to ``safe`` from any state but ``disarmed``. ``safe`` can
+only be left by disarming: someone has to check and arm again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ State = Literal["disarmed", "armed", "active", "holding", "safe"]
 
 
 class Transition(NamedTuple):
-    """One change of state.
+    """One state transition.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Transition(NamedTuple):
     before, after : str
         States.
     reason : str
-        Why, in words.
+        In words.
     """
 
     time: float
@@ -44,16 +44,16 @@ Changes = tuple[Transition, ...]
 
 
 class SafetyMachine:
-    """The state machine. It has no clock: every call says what time it is.
+    """The state machine. It has no clock: every call passes the time.
 
-    Every call returns the changes of state that it made, for the log.
+    Every call returns its state transitions, for the log.
 
     Parameters
     ----------
     hold_after : float
-        Without a valid pose for longer than this the finger holds, s.
+        After more than this time without a valid pose the finger holds, s.
     safe_after : float
-        Without one for longer than this the finger goes to its safe state, s.
+        After more than this time it goes to its safe state, s.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class SafetyMachine:
 
     @property
     def deadline(self) -> float:
-        """When :meth:`check` has something to do if no valid pose comes before, s."""
+        """Time of the next timeout if no valid pose comes before, s."""
         if self.state == "active":
             return self._seen + self.hold_after
         return self._seen + self.safe_after if self.state == "holding" else math.inf
@@ -83,14 +83,14 @@ class SafetyMachine:
         return self._go(now, "armed", reason) if self.state == "disarmed" else ()
 
     def activate(self, now: float, reason: str = "asked to start") -> Changes:
-        """Let the finger follow, if armed and poses are coming."""
+        """Let the finger follow the signal, if armed and poses are coming."""
         now = self._at(now)
         ready = self.state == "armed" and now - self._seen <= self.hold_after
         return self._go(now, "active", reason) if ready else ()
 
     def pose(self, now: float, why: str = "") -> Changes:
-        """Tell that a valid pose has come, and why there was none before."""
-        # The watchdog speaks first: what comes after too long a silence is too late.
+        """Report a valid pose, and why there was none before."""
+        # The watchdog comes first: a pose after too long a silence is too late.
         late = self.check(now, why)
         if self.state != "safe":
             self._seen = self._at(now)
@@ -99,9 +99,9 @@ class SafetyMachine:
         return late
 
     def check(self, now: float, why: str = "") -> Changes:
-        """Ask the watchdog; to be called at least as often as the finger is told.
+        """Check the watchdog; call it at least as often as the finger is commanded.
 
-        `why` there is no pose, if known, goes into the reason.
+        `why` says why there is no valid pose, if known, for the transition's reason.
         """
         now = self._at(now)
         silence = now - self._seen
@@ -114,17 +114,17 @@ class SafetyMachine:
         return ()
 
     def stop(self, now: float, reason: str) -> Changes:
-        """Go to the safe state at once: a fault, or the person asked."""
+        """Go to the safe state at once, after a fault or on request."""
         if self.state in ("disarmed", "safe"):
             return ()
         return self._go(now, "safe", reason)
 
     def disarm(self, now: float, reason: str = "asked to disarm") -> Changes:
-        """Leave everything; the finger is relaxed."""
+        """End: the finger is relaxed."""
         return () if self.state == "disarmed" else self._go(now, "disarmed", reason)
 
     def _at(self, now: float) -> float:
-        """Time never runs back, whatever the clock says; NaN is no time at all."""
+        """Return a time that never runs back, even if the clock does or is NaN."""
         if now > self._now:
             self._now = now
         return self._now

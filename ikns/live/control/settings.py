@@ -1,4 +1,4 @@
-"""How the control signal becomes a flexion, and which frames count."""
+"""How the control signal becomes a flexion, and which frames are valid."""
 
 from __future__ import annotations
 
@@ -7,36 +7,36 @@ from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Settings"]
+__all__ = ["ControlSettings"]
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How the control signal becomes a flexion.
+class ControlSettings:
+    """How the control signal becomes a flexion, and which frames are valid.
 
     Parameters
     ----------
     cutoff, beta : float
-        Of the smoothing, Hz and Hz per (unit of c / s); see
-        :class:`ikns.live.control.smoothing.OneEuro`. The defaults are ours: with a
-        share ``a = w dt / (1 + w dt)`` of each innovation (w = 2 pi times the cut-off)
-        they leave ``sqrt(a / (2 - a))``, a quarter, of white noise of 100 Hz at rest
-        and cost ``dt (1 - a) / a = 1 / w``, 80 ms; where c moves by 1 per second, 16
-        ms.
+        Smoothing, Hz and Hz per (unit of c / s); see
+        :class:`ikns.live.control.smoothing.OneEuro`. The defaults were chosen for this
+        package: with a share ``a = w dt / (1 + w dt)`` of each innovation (w = 2 pi
+        times the cut-off) they pass ``sqrt(a / (2 - a))``, a quarter, of white noise at
+        100 Hz at rest and delay c by ``dt (1 - a) / a = 1 / w``, 80 ms; while c moves
+        by 1 per second, by 16 ms.
     dead_band : float
-        Smaller changes of flexion are not passed on.
+        Smaller changes of flexion are ignored.
     hold_speed : float, optional
-        While the hand is faster, the flexion stays as it is, m/s. Default: never.
+        While the hand is faster, the flexion is held, m/s. Default: never.
     max_residual : float
-        A pose that explains the markers worse than this is none, m, root mean square.
+        Largest root mean square distance between pose and markers of a valid frame, m.
     max_worst_residual : float
-        Nor is one that leaves a marker of the chain farther off, m. The default is a
-        little more than the 70 mm that two people came to in daily activities
+        Largest distance between pose and a marker of the chain, m. The default is
+        slightly above the 70 mm found with two people in daily activities
         (``benchmarks/stray_marker.py``).
     max_intermarker_error : float
-        Nor does a frame count where the distance between two markers of a segment of
-        the chain is farther off what it was at calibration, m. Real people's came to
-        24 mm between landmarks on the skin, to 13 within clusters (same benchmark).
+        Largest change since calibration of the distance between two markers of a
+        segment of the chain, m. Two real people had up to 24 mm between skin landmarks
+        and 13 mm within clusters (same benchmark).
     hold_after, safe_after : float
         See :class:`ikns.live.control.safety.SafetyMachine`, s.
     """
@@ -52,7 +52,7 @@ class Settings:
     safe_after: float = 0.5
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense."""
+        """Reject values out of range."""
         if not 0 <= self.dead_band < 1:
             raise InvalidInput(
                 f"expected a dead band from 0 to below 1, found {self.dead_band:g}."

@@ -1,8 +1,8 @@
-"""Causal smoothing of one signal, and what it costs in delay: the one-euro filter.
+"""Causal smoothing of one signal with the one-euro filter, and its delay.
 
-A low-pass of first order whose cut-off rises with the speed of the signal: slow parts
-are smooth, fast parts on time. G. Casiez, N. Roussel and D. Vogel (2012), 1 Euro
-filter, CHI, doi 10.1145/2207676.2208639.
+A first-order low-pass filter whose cut-off rises with the speed of the signal: slow
+parts are smoothed, fast parts are hardly delayed. G. Casiez, N. Roussel and D. Vogel
+(2012), 1 Euro filter, CHI, doi 10.1145/2207676.2208639.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ class OneEuro:
     Parameters
     ----------
     cutoff : float
-        Of a signal at rest, Hz.
+        Cut-off frequency for a signal at rest, Hz.
     beta : float
-        How much the cut-off rises with the signal's speed, Hz per (unit / s). The speed
-        is that from the last output to the new input, as in the publication, so a
-        signal that runs ahead counts as faster than it is.
+        Increase of the cut-off with the signal's speed, Hz per (unit / s). The speed is
+        taken from the last output to the new input, as in the publication, so it is
+        overestimated while the output lags behind.
     speed_cutoff : float
-        Of the low-pass on the speed itself, Hz; 1 in the publication.
+        Cut-off frequency for the speed, Hz; 1 in the publication.
 
     Attributes
     ----------
     value : float
         The last output; NaN before the first sample.
     delay : float
-        How far a steadily moving signal is behind at the last cut-off, s. For steps of
-        dt and a share a of each innovation it is ``dt (1 - a) / a``.
+        Delay of a steadily moving signal at the last cut-off, s: ``dt (1 - a) / a`` for
+        steps dt and the share a of each innovation that passes.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class OneEuro:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past: the next sample comes out as it is."""
+        """Reset: the next sample passes unchanged."""
         self.value = math.nan
         self.delay = 0.0
         self._speed = 0.0
@@ -66,10 +66,9 @@ class OneEuro:
         Parameters
         ----------
         x : float
-            NaN and infinity are not looked at: the last value stays.
+            NaN and infinity leave the value unchanged.
         dt : float
-            Since the last sample, s. Zero and less are a sample that comes again: the
-            last value stays.
+            Time since the last sample, s; zero or less leaves the value unchanged.
         """
         if not math.isfinite(x):
             return self.value
@@ -81,7 +80,7 @@ class OneEuro:
         speed = (x - self.value) / dt
         speed = self._speed + _share(self._speed_cutoff, dt) * (speed - self._speed)
         share = _share(self._cutoff + self._beta * abs(speed), dt)
-        if not share > 0:  # in next to no time a jump beyond all numbers, or no step
+        if not share > 0:  # overflow of a jump in a tiny step, or underflow of the step
             return self.value
         self._speed = speed
         self.value += share * (x - self.value)
@@ -90,6 +89,6 @@ class OneEuro:
 
 
 def _share(cutoff: float, dt: float) -> float:
-    """Part of an innovation that passes: that of an RC low-pass, backward Euler."""
+    """Share of an innovation that passes: RC low-pass filter, backward Euler."""
     turn = 2 * math.pi * cutoff * dt
     return turn / (1 + turn)

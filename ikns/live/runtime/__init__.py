@@ -1,8 +1,8 @@
-"""The live loop: source, pose, signal, finger, session; and again from disk."""
+"""The live loop from a source of frames to a finger, and its replay."""
 
 from ikns.live.runtime.loop import run
 from ikns.live.runtime.priority import check_realtime
 from ikns.live.runtime.replay import Replayed, replay_run
-from ikns.live.runtime.report import Report, Status
+from ikns.live.runtime.report import LoopStatus, Report
 
-__all__ = ["Replayed", "Report", "Status", "check_realtime", "replay_run", "run"]
+__all__ = ["Replayed", "Report", "LoopStatus", "check_realtime", "replay_run", "run"]

@@ -1,4 +1,4 @@
-"""Who waits for whom while a finger is driven: other threads, and other programs."""
+"""Priority of the control loop over other threads and programs."""
 
 from __future__ import annotations
 
@@ -10,41 +10,43 @@ from contextlib import contextmanager
 
 from ikns.errors import InvalidInput
 
-__all__ = ["check_realtime", "first_in_line"]
+__all__ = ["check_realtime", "realtime_priority"]
 
-#: For which other threads may keep the interpreter while the loop waits for it, s:
-#: what a frame takes; Python's own 5 ms are ten times as long (a busy thread beside
-#: the loop: benchmarks/live_loop.py).
-_TURN = 5e-4
-#: Lowest of the real-time priorities: before every ordinary program, after whatever
-#: else somebody made real-time on purpose.
+#: Switch interval of the interpreter, s: another thread may keep the loop waiting for
+#: as long as a frame takes. Python's default of 5 ms is ten times as long (measured
+#: with a busy thread in benchmarks/live_loop.py).
+_SWITCH_INTERVAL = 5e-4
+#: Lowest of the real-time priorities: above ordinary programs, below other real-time
+#: ones.
 _PRIORITY = 1
 
 
 @contextmanager
-def first_in_line(*, realtime: bool = False) -> Iterator[None]:
-    """Let nobody keep this thread waiting for long.
+def realtime_priority(*, realtime: bool = False) -> Iterator[None]:
+    """Keep this thread from waiting long for others.
 
-    Python's collector of cycles may take milliseconds; the loop makes no cycles, so
-    nothing piles up meanwhile. Other threads give the interpreter back soon. In real
-    time (SCHED_RR, see sched(7)) other programs wait too; what the thread starts, such
-    as a finger's, inherits that. Linux itself keeps a twentieth of the time for others.
+    Turns Python's garbage collector of cycles off, as it may take milliseconds and the
+    loop makes no cycles, and makes other threads release the interpreter sooner. With
+    real-time scheduling (SCHED_RR, see sched(7)) other programs wait too, and threads
+    started here, such as a finger's, inherit it. Linux reserves a twentieth of the time
+    for others.
 
     Parameters
     ----------
     realtime : bool
+        Whether to use real-time scheduling.
 
     Raises
     ------
     InvalidInput
-        When the system does not allow it.
+        When the system does not allow real-time scheduling.
     """
     was_on, interval = gc.isenabled(), sys.getswitchinterval()
-    with _scheduled_first(wanted=realtime):
+    with _realtime_scheduling(wanted=realtime):
         gc.collect()
         gc.freeze()
         gc.disable()
-        sys.setswitchinterval(min(interval, _TURN))
+        sys.setswitchinterval(min(interval, _SWITCH_INTERVAL))
         try:
             yield
         finally:
@@ -55,26 +57,29 @@ def first_in_line(*, realtime: bool = False) -> Iterator[None]:
 
 
 def check_realtime() -> None:
-    """Ask whether the system allows real time.
+    """Check that the system allows real-time scheduling.
 
     Raises
     ------
     InvalidInput
         When it does not.
     """
-    with _scheduled_first(wanted=True):
+    with _realtime_scheduling(wanted=True):
         pass
 
 
 @contextmanager
-def _scheduled_first(*, wanted: bool) -> Iterator[None]:
+def _realtime_scheduling(*, wanted: bool) -> Iterator[None]:
     if not wanted:
         yield
         return
     try:
         before = os.sched_getscheduler(0), os.sched_getparam(0)
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(_PRIORITY))
-    except (PermissionError, AttributeError) as error:  # the latter beyond Linux
+    except (
+        PermissionError,
+        AttributeError,
+    ) as error:  # the latter outside Linux
         raise InvalidInput(
             "expected a system that lets this program run in real time, found one that "
             "does not: leave that out, or allow it (Linux: rtprio 1 for the user in "

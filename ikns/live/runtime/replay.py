@@ -1,4 +1,4 @@
-"""A run of a session again, from its markers and times, against what it recorded."""
+"""Replay a run of a session and compare the results with the recorded ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ikns.calibration.subject import Subject
 from ikns.errors import FileError
 from ikns.live.control.controller import Controller
 from ikns.live.control.frame import FrameSolver
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.live.session import Run
 from ikns.live.session.channels import STATES
 
@@ -20,16 +20,17 @@ __all__ = ["Replayed", "replay_run"]
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """What a replay computed, and where it differs from what was recorded.
+    """What a replay computed, and where that differs from the recorded values.
 
     Parameters
     ----------
     c, flexion : (T,) array
-        Raw control signal, and what the finger was asked.
+        Raw control signal and commanded flexion.
     state : (T,) integer array
-        Of the safety machine, numbered as in :data:`ikns.live.session.channels.STATES`.
+        State of the safety machine, an index into
+        :data:`ikns.live.session.channels.STATES`.
     different : dict of str to int
-        Frames that differ from the record in any bit, by column.
+        Number of frames that differ from the recorded values in any bit, by column.
     """
 
     c: NDArray[np.float64]
@@ -39,18 +40,17 @@ class Replayed:
 
     @property
     def same(self) -> bool:
-        """Whether every bit is as recorded."""
+        """Whether all values are as recorded, to the bit."""
         return not any(self.different.values())
 
 
 def replay_run(run: Run) -> Replayed:
-    """Compute c and the commands of a run again.
+    """Compute c and the commands of a run again from its markers and times.
 
     Parameters
     ----------
     run : Run
-        As from :func:`ikns.live.session.read_run`; the subject and the settings are
-        those that it was made with.
+        As from :func:`ikns.live.session.read_run`, with its subject and settings.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def replay_run(run: Run) -> Replayed:
     """
     subject = Subject.load(run.subject_folder)
     try:
-        settings = Settings(**run.configuration["settings"])
+        settings = ControlSettings(**run.configuration["settings"])
     except (LookupError, TypeError) as error:
         raise FileError(
             f"{run.session}: the configuration of run {run.number} has no settings: "
@@ -74,7 +74,7 @@ def replay_run(run: Run) -> Replayed:
     machine = controller.machine
     rows = len(run.frame)
     c, flexion, state = np.empty(rows), np.empty(rows), np.empty(rows, dtype=np.int64)
-    # The watchdog follows from the times of the frames; what was asked for does not.
+    # The watchdog's transitions follow from the frames' times; recorded stops do not.
     stops = [onset for onset, _, what, _ in run.events if what == "stop"]
     machine.arm(0.0)
     for i in range(rows):

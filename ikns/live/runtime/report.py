@@ -1,4 +1,4 @@
-"""What the live loop says of itself: while it goes, and when it has ended."""
+"""Status of the live loop while it runs, and its report at the end."""
 
 from __future__ import annotations
 
@@ -11,32 +11,33 @@ from numpy.typing import NDArray
 from ikns.live.control.safety import Transition
 from ikns.live.stream.delays import Delays
 
-__all__ = ["Report", "Status"]
+__all__ = ["Report", "LoopStatus"]
 
 
 @dataclass(frozen=True)
-class Status:
-    """How it goes, for a line on a screen.
+class LoopStatus:
+    """Status of the live loop, for a line on a screen.
 
     Parameters
     ----------
     time : float
         Since the start, s.
     rate : float
-        Frames per second over the last second or so.
+        Frames per second since the last status.
     frames, misses : int
-        So far; frames that took longer than a frame's time.
+        Frames so far, and those that took longer than a frame period.
     latency : float
-        99th percentile from receipt to command, s.
+        99th percentile of the time from receipt to command, s.
     residual, worst_residual : float
-        Of the last pose: all markers, and the farthest of the chain, m.
-    refused : str
-        Why the last frame did not count; empty if it did.
+        Of the last pose, m: all markers, and the farthest marker of the chain.
+    rejection : str
+        Why the last frame is rejected; empty if it is valid.
     inside : bool
-        Whether the hand is within the points of the map.
+        Whether the hand is inside the hull of the map's points.
     c, flexion, measured : float
-        Raw signal, what is asked, what the finger measured.
+        Raw control signal, commanded flexion, measured flexion.
     state : str
+        Of the safety machine.
     q : (nq,) array
         Configuration of the last frame; NaN before the first.
     """
@@ -48,7 +49,7 @@ class Status:
     latency: float
     residual: float
     worst_residual: float
-    refused: str
+    rejection: str
     inside: bool
     c: float
     flexion: float
@@ -59,32 +60,31 @@ class Status:
 
 @dataclass
 class Report:
-    """What happened, all told.
+    """What happened in a run.
 
     Parameters
     ----------
     frames, misses : int
-        Frames taken; those that took longer than a frame's time from receipt to
-        command.
-    rehearsals : int
-        Times that the caches were warmed before a frame was due.
+        Frames processed, and those that took longer than a frame period from receipt
+        to command.
+    warm_ups : int
+        How often the caches were warmed before a frame was due.
     seconds : float
+        Duration of the run.
     stages : dict of Delays
-        ``solve`` (markers to decision), ``command`` (telling the finger), ``total``
-        (receipt to command), ``loop`` (all of an iteration, logging included).
+        ``solve`` (markers to decision), ``command`` (to the finger), ``total`` (receipt
+        to command), ``loop`` (a whole iteration, logging included).
     transitions : list of Transition
-        From the start on; the last thousand.
+        State transitions; the last thousand.
     source : dict
-        What was dropped, late, repeated or out of order.
-    fault : str
-        Why it ended, where it was not asked to.
+        Counts of frames that were dropped, late, repeated or out of order.
     lost_rows : int
         Rows of the session that could not be written.
     """
 
     frames: int = 0
     misses: int = 0
-    rehearsals: int = 0
+    warm_ups: int = 0
     seconds: float = 0.0
     stages: dict[str, Delays] = field(
         default_factory=lambda: {
@@ -93,5 +93,4 @@ class Report:
     )
     transitions: list[Transition] = field(default_factory=list)
     source: dict[str, Any] = field(default_factory=dict)
-    fault: str = ""
     lost_rows: int = 0

@@ -1,7 +1,7 @@
-"""Live sources of markers: a recording, LSL, Qualisys or Vicon, all read alike.
+"""Live sources of markers: a recording, LSL, Qualisys or Vicon, with one interface.
 
-A source is an iterator of frames and a context manager. What went wrong on the way is
-counted (:class:`Continuity`) and told (``events``), never hidden.
+A source is an iterator of frames and a context manager. It counts lost, late and
+repeated frames (:class:`Continuity`) and reports breaks (``events``).
 """
 
 from ikns.live.stream.address import open_source

@@ -1,4 +1,4 @@
-"""Open a source by its address."""
+"""Open live sources by address."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def open_source(
     address: str,
     *,
     needs: MarkerSet | None = None,
-    patience: float = 10.0,
+    read_timeout: float = 10.0,
     late_after: float | None = None,
 ) -> Source:
     """Open a live source.
@@ -32,15 +32,15 @@ def open_source(
     ----------
     address : str
         ``replay:FILE`` (``?speed=2``, ``?speed=max`` for as fast as frames are read,
-        ``?loop=yes``), ``lsl:NAME`` (``?scope=machine`` to look on this machine only),
-        ``qualisys:HOST`` or ``vicon:HOST`` (``HOST:PORT`` too). A live one also takes
-        ``?timeout=SECONDS``; options are joined by ``&``.
+        ``?loop=yes``), ``lsl:NAME`` (``?scope=machine`` for streams of this machine
+        only), ``qualisys:HOST`` or ``vicon:HOST`` (also ``HOST:PORT``). All but a
+        replay also take ``?timeout=SECONDS``; options are joined by ``&``.
     needs : MarkerSet, optional
-        Every marker of it that is worn in motion must be among the labels.
-    patience : float
-        Seconds without a frame after which iterating gives up.
+        All its markers except static-only ones must be among the labels.
+    read_timeout : float
+        Iterating raises an error after this time without a frame, s.
     late_after : float, optional
-        Seconds from which a frame counts as late; one frame period by default.
+        A frame counts as late from this lateness on, s; one frame period by default.
 
     Returns
     -------
@@ -53,9 +53,21 @@ def open_source(
     FileError
         When the file is not a recording.
     StreamError
-        When the source does not answer, or is not what it should be.
+        When the source does not answer, or is of the wrong kind.
     MarkerMismatch
         When a marker of `needs` is missing.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from ikns.recording.files import write_c3d
+    >>> from ikns.recording.recording import Recording
+    >>> recording = Recording([0.0, 0.01], [[[0.1, 0.2, 0.3]]] * 2, ["C7"])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_c3d(f"{folder}/trial.c3d", recording)
+    ...     with open_source(f"replay:{folder}/trial.c3d?speed=max") as source:
+    ...         print(source.labels, [frame.number for frame in source])
+    ('C7',) [0, 1]
     """
     scheme, colon, rest = address.partition(":")
     place, _, query = rest.rpartition("?") if "?" in rest else (rest, "", "")
@@ -78,7 +90,7 @@ def open_source(
         if str(error).startswith(tuple(filter(None, (f"{scheme}:", place)))):
             raise
         raise type(error)(f"{address}: {error}") from None
-    source = Source(feed, patience=patience, late_after=late_after)
+    source = Source(feed, read_timeout=read_timeout, late_after=late_after)
     try:
         if needs is not None:
             _check_labels(source, needs.without_static())
@@ -137,7 +149,7 @@ _KINDS: dict[str, tuple[Callable[[str, Options], Feed], tuple[str, ...]]] = {
 
 
 def _host(text: str, port: int) -> tuple[str, int]:
-    """Split host and port; an IPv6 address with a port stands in brackets.
+    """Split host and port; an IPv6 address with a port is in brackets.
 
     >>> _host("10.0.0.5", 801), _host("[fe80::1]:802", 801), _host("fe80::1", 801)
     (('10.0.0.5', 801), ('fe80::1', 802), ('fe80::1', 801))

@@ -1,4 +1,4 @@
-"""Play a recording into an LSL outlet, on time and, if asked, with faults."""
+"""Play a recording into an LSL outlet, on time and optionally with faults."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from ikns.recording.recording import Recording
 
 __all__ = ["Broadcast", "broadcast"]
 
-#: Seconds between the last frame and the end of the stream; LSL throws away what a
-#: listener has not read when a stream goes down.
+#: Seconds between the last frame and the end of the stream; frames that a listener has
+#: not read when a stream ends are lost in LSL.
 _LINGER = 0.5
 
 
@@ -36,10 +36,9 @@ class Broadcast:
     seconds : float
         From the first to the last.
     faults : Counter
-        Frames struck, by kind; for ``swap`` pairs.
+        Frames affected, by kind; pairs for ``swap``.
     lateness : Delays
-        How long after their time the frames went out; those held up on purpose are left
-        out.
+        How late the frames were sent, except those delayed on purpose.
     """
 
     frames: int
@@ -58,20 +57,20 @@ def broadcast(
     seed: int = 0,
     stop: threading.Event | None = None,
 ) -> Broadcast:
-    """Send a recording, frame by frame on absolute deadlines.
+    """Send a recording frame by frame, on absolute deadlines.
 
     Parameters
     ----------
     recording : Recording
     outlet : LslOutlet
-        Of the recording's labels, at the recording's rate times the speed.
+        With the recording's labels, and its rate times `speed`.
     speed : float
         Above 0.
     loop : bool
         Start over at the end, until `stop` is set or the process is interrupted.
     faults : Faults, optional
     seed : int
-        Of the faults.
+        Seed of the faults.
     stop : threading.Event, optional
         Ends the broadcast once it is set.
 

@@ -1,9 +1,8 @@
-"""Count what a stream lost, delayed, repeated or shuffled.
+"""Count frames that a stream lost, delayed, repeated or reordered.
 
-Judged from frame numbers and times alone, with memory that does not grow. A delay is
-receive time minus device time; as the clocks need not agree, lateness is the delay
-above the smallest one of the last 30 to 60 s (packet delay variation, RFC 5481,
-section 4.2).
+Uses frame numbers and times only, and constant memory. The delay is receive time minus
+device time; as the clocks need not agree, lateness is the delay above the smallest one
+of the last 30 to 60 s (packet delay variation, RFC 5481, section 4.2).
 """
 
 from __future__ import annotations
@@ -18,34 +17,34 @@ from ikns.live.stream.frame import Frame
 
 __all__ = ["Continuity", "Counts"]
 
-#: Seconds of one half of the window in which the smallest delay counts.
+#: Half of the window for the smallest delay, s.
 _WINDOW = 30.0
-#: Gaps that can still be filled; older ones are final.
+#: Number of gaps that late frames can still fill; older gaps are final.
 _GAPS = 256
 
 
 @dataclass(frozen=True)
 class Counts:
-    """How a stream went; a frame can fall under several.
+    """Counts of frames by what happened to them; a frame can count several times.
 
     Parameters
     ----------
     received : int
-        Frames that came, repeated ones included.
+        Frames received, including repeated ones.
     dropped : int
-        Frame numbers that never came, between the first and the last that did.
+        Frame numbers missing between the first and the last received.
     late : int
-        Frames later than `late_after`, by default than when their successor was due.
+        Frames later than `late_after`; by default, after their successor was due.
     repeated : int
-        Frames whose number had come before.
+        Frames whose number had been received before.
     out_of_order : int
-        Frames that came after a later one.
+        Frames received after a later one.
     frozen : int
-        Frames with a number of their own but exactly the markers of the frame before.
+        Frames with a new number but exactly the markers of the frame before.
     restarts : int
-        Times that the numbering began anew.
+        How often the numbering restarted.
     jitter : dict
-        Lateness: ``p50``, ``p95``, ``p99``, ``p999`` and ``largest``, seconds.
+        Lateness in s: ``p50``, ``p95``, ``p99``, ``p999`` and ``largest``.
     """
 
     received: int
@@ -59,16 +58,16 @@ class Counts:
 
 
 class Continuity:
-    """Watch frames come in.
+    """Counts frames as they are received.
 
     Parameters
     ----------
     rate : float
         Frames per second of the device's clock.
     speed : float
-        Device seconds per second; 0 when there is no pace that frames could miss.
+        Device seconds per second; 0 when frames have no pace.
     late_after : float, optional
-        Seconds from which a frame is late; one frame period by default.
+        A frame is late from this lateness on, s; one frame period by default.
     """
 
     def __init__(
@@ -81,7 +80,7 @@ class Continuity:
         self._speed = speed
         period = 1 / (rate * speed) if speed else math.inf
         self.late_after = period if late_after is None else late_after
-        # A number further back than ten seconds is a new count, not a late frame.
+        # A number more than ten seconds back is a restart, not a late frame.
         self._horizon = max(100, round(10 * rate))
         self._delays = Delays()
         self._received = self._dropped = self._late = self._repeated = 0
@@ -92,12 +91,12 @@ class Continuity:
         self.new_clock()
 
     def new_clock(self) -> None:
-        """Forget the smallest delay, as after a device has started anew."""
+        """Forget the smallest delay, as after a restart of the device."""
         self._smallest = self._smallest_before = math.inf
         self._window_ends = -math.inf
 
     def add(self, frame: Frame) -> None:
-        """Take note of the next frame."""
+        """Count the next frame."""
         if self._last is None or frame.number < self._highest - self._horizon:
             if self._last is not None:
                 self._restarts += 1
@@ -118,7 +117,7 @@ class Continuity:
         self._time(frame)
 
     def _place(self, number: int) -> bool:
-        """Put a number among those that came; False when it was there already."""
+        """Add a frame number; return False if it was received before."""
         if number > self._highest:
             self._miss(self._highest + 1, number)
             self._highest = number

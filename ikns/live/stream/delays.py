@@ -1,4 +1,4 @@
-"""Percentiles of delays in constant memory, for hours of frames."""
+"""Percentiles of delays in constant memory."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 __all__ = ["Delays"]
 
-# 40 bins a decade: an edge is 10^(1/40) = 1.059 times the one before.
+# 40 bins per decade: an edge is 10^(1/40) = 1.059 times the one before.
 _PER_DECADE, _LOWEST, _HIGHEST = 40, -6, 3
 
 
 class Delays:
-    """Count delays in logarithmic bins.
+    """Counts delays in logarithmic bins.
 
-    A percentile is the upper edge of its bin: never below the true one, and at most 6 %
-    above it from 1 us on; all below counts as 1 us. The largest delay is exact.
+    A percentile is the upper edge of its bin: never below the true value, and at most
+    6 % above it. Delays below 1 us count as 1 us. The largest delay is exact.
     """
 
     def __init__(self) -> None:
@@ -32,8 +32,8 @@ class Delays:
         if seconds <= 1e-6:
             self._counts[0] += 1
             return
-        place = math.ceil((math.log10(seconds) - _LOWEST) * _PER_DECADE)
-        self._counts[min(place, len(self._counts) - 1)] += 1
+        index = math.ceil((math.log10(seconds) - _LOWEST) * _PER_DECADE)
+        self._counts[min(index, len(self._counts) - 1)] += 1
 
     def percentile(self, percent: float) -> float:
         """Return the delay that `percent` of all do not exceed, s; NaN without any.
@@ -49,5 +49,5 @@ class Delays:
         if not self.count:
             return math.nan
         rank = max(1, math.ceil(percent / 100 * self.count))
-        place = int(np.searchsorted(np.cumsum(self._counts), rank))
-        return min(10 ** (_LOWEST + place / _PER_DECADE), self.largest)
+        index = int(np.searchsorted(np.cumsum(self._counts), rank))
+        return min(10 ** (_LOWEST + index / _PER_DECADE), self.largest)

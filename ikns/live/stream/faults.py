@@ -1,4 +1,4 @@
-"""Faults on demand, for tests and desk work: exactly counted, the same for a seed."""
+"""Faults to inject into a stream: counted, and reproducible with a seed."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ __all__ = ["Faults", "Sent", "inject"]
 
 @dataclass(frozen=True)
 class Faults:
-    """How likely each fault is to strike a frame; a frame suffers one at most.
+    """Probability of each fault per frame; a frame gets one fault at most.
 
     Parameters
     ----------
     drop : float
         The frame is not sent.
     late : float
-        The frame is held up for `late_seconds`, and all behind it.
+        The frame and all after it are delayed by `late_seconds`.
     repeat : float
         The frame is sent twice.
     swap : float
         The frame is sent after its successor.
     freeze : float
-        The frame and those within `freeze_seconds` show the markers of the one before.
+        The frame and those within `freeze_seconds` repeat the markers before them.
     late_seconds, freeze_seconds : float
     """
 
@@ -57,7 +57,7 @@ class Faults:
 
     @classmethod
     def parse(cls, text: str) -> Faults:
-        """Read faults as the command line has them.
+        """Read faults from text, as on the command line.
 
         >>> Faults.parse("drop=0.01,late=0.002:0.3")
         Faults(drop=0.01, late=0.002, repeat=0.0, swap=0.0, freeze=0.0, \
@@ -85,7 +85,7 @@ late_seconds=0.3, freeze_seconds=0.5)
         return replace(cls(), **faults)
 
     def draw(self, rng: np.random.Generator) -> str | None:
-        """Draw the fault that strikes a frame, None for none."""
+        """Draw the fault of a frame; None for none."""
         left = rng.random()
         for kind in self.KINDS:
             left -= getattr(self, kind)
@@ -96,16 +96,16 @@ late_seconds=0.3, freeze_seconds=0.5)
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """What is sent.
+    """One frame to send.
 
     Parameters
     ----------
     frame : int
-        Whose number and time.
+        Index of the frame that gives number and time.
     content : int
-        Whose markers.
+        Index of the frame that gives the markers.
     hold : float
-        Seconds after it is due.
+        Delay after it is due, s.
     """
 
     frame: int
@@ -120,10 +120,10 @@ def inject(
     rng: np.random.Generator,
     tally: Counter[str],
 ) -> Iterator[Sent]:
-    """Strike a stream of frames.
+    """Inject faults into a stream of frames.
 
-    The first and the last frame are spared, for at the ends no receiver could tell a
-    frame that was dropped from one that never was.
+    The first and the last frame get none, because at the ends a receiver cannot
+    distinguish a dropped frame from one that never existed.
 
     Parameters
     ----------
@@ -134,12 +134,12 @@ def inject(
         Frames per second.
     rng : numpy.random.Generator
     tally : Counter
-        Frames struck so far, by kind; for ``swap`` pairs. Counted here.
+        Frames affected so far, by kind; pairs for ``swap``. Updated here.
 
     Yields
     ------
     Sent
-        In the order to be sent.
+        In the order of sending.
     """
     content = -1
     frozen = 0

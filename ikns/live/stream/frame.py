@@ -1,4 +1,4 @@
-"""One frame of markers on its way in, and what every source of them has."""
+"""A frame of markers, and the interface of every kind of source."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Frame:
     Parameters
     ----------
     number : int
-        Frame number of the device; a gap means frames that never came.
+        Frame number of the device; a gap means lost frames.
     device_time : float
         Seconds on the device's own clock.
     receive_time : float
-        When this process got hold of it, seconds of `time.monotonic`.
+        When this process received it, s of `time.monotonic`.
     markers : (M, 3) array
         Meters in the world frame; NaN where a marker was not seen.
     """
@@ -36,7 +36,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something worth telling about a source.
+    """Something that happened to a source.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ class Event:
 
 
 class Feed(Protocol):
-    """What a kind of source must offer; :class:`Source` does the rest.
+    """Interface of a kind of source; :class:`Source` adds the rest.
 
-    ``rate`` is the frames per second of the device's clock and ``speed`` how fast that
-    clock runs against this machine's (0: as fast as frames are asked for).
+    ``rate`` is in frames per second of the device's clock; ``speed`` is in device
+    seconds per second of this machine (0: as fast as frames are read).
     """
 
     name: str
@@ -65,12 +65,12 @@ class Feed(Protocol):
 
     @property
     def device(self) -> dict[str, float]:
-        """What the device reports of itself."""
+        """Values that the device reports."""
         ...
 
     @property
     def ended(self) -> bool:
-        """Whether no further frame will ever come."""
+        """Whether no more frames will come."""
         ...
 
     def poll(self, timeout: float) -> Frame | None:
@@ -78,5 +78,5 @@ class Feed(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of everything; calling it again does nothing."""
+        """Close the connection; harmless when repeated."""
         ...

@@ -1,4 +1,4 @@
-"""Frames between the thread that receives them and the one that reads them."""
+"""Queue between the thread that receives frames and the one that reads them."""
 
 from __future__ import annotations
 
@@ -12,46 +12,46 @@ __all__ = ["Inbox"]
 
 
 class Inbox:
-    """A bounded queue that forgets the oldest frame when it is full.
+    """A bounded queue that drops the oldest frame when it is full.
 
     Parameters
     ----------
     size : int
-        Frames it holds.
+        Largest number of frames.
 
     Attributes
     ----------
     overruns : int
-        Frames forgotten because nobody read them; the reader sees their numbers
+        Frames dropped because they were not read; the reader finds their numbers
         missing.
     """
 
     def __init__(self, size: int) -> None:
         self._frames: deque[Frame] = deque(maxlen=size)
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
         self._closed = False
         self.overruns = 0
 
     def put(self, frame: Frame) -> None:
-        """Add a frame; never waits."""
-        with self._news:
+        """Add a frame without waiting."""
+        with self._changed:
             self.overruns += len(self._frames) == self._frames.maxlen
             self._frames.append(frame)
-            self._news.notify()
+            self._changed.notify()
 
     def get(self, timeout: float) -> Frame | None:
         """Take the oldest frame, None after `timeout` seconds."""
         give_up = time.monotonic() + timeout
-        with self._news:
+        with self._changed:
             while not self._frames and not self._closed:
                 left = give_up - time.monotonic()
                 if left <= 0:
                     return None
-                self._news.wait(left)
+                self._changed.wait(left)
             return self._frames.popleft() if self._frames else None
 
     def close(self) -> None:
-        """Wake whoever waits."""
-        with self._news:
+        """Wake a waiting reader; frames in the queue can still be read."""
+        with self._changed:
             self._closed = True
-            self._news.notify_all()
+            self._changed.notify_all()

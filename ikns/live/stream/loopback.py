@@ -1,8 +1,8 @@
-"""Close sockets that listen on every network to all but this machine.
+"""Restrict sockets that listen on all networks to this machine.
 
-liblsl always listens for data on every network and has no setting for it, so a filter
-of the Linux kernel (a classic BPF program, no privileges needed) drops what does not
-come from 127.0.0.0/8, connection attempts included.
+liblsl always listens for data on all networks and has no setting for that, so a filter
+of the Linux kernel (a classic BPF program, which needs no privileges) drops every
+packet that is not from 127.0.0.0/8, including connection attempts.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 __all__ = ["only_from_this_machine"]
 
 _SO_ATTACH_FILTER = 26
-#: Offset of the IPv4 header, wherever the packet's data start (SKF_NET_OFF).
+#: Offset of the IPv4 header, relative to the network layer (SKF_NET_OFF).
 _NETWORK = 0xFFF00000
 _ACCEPT, _DROP = 0xFFFFFFFF, 0
 Line = tuple[int, int, int, int]  # code, jump if true, jump if false, operand
@@ -28,20 +28,20 @@ _FROM_THIS_MACHINE: tuple[Line, ...] = (
     (0x06, 0, 0, _ACCEPT),
     (0x06, 0, 0, _DROP),
 )
-_FROM_NOBODY: tuple[Line, ...] = ((0x06, 0, 0, _DROP),)
+_FROM_NONE: tuple[Line, ...] = ((0x06, 0, 0, _DROP),)
 
 
 @contextmanager
 def only_from_this_machine() -> Iterator[list[int]]:
-    """Filter every socket for all networks that this process opens inside the block.
+    """Restrict sockets that this process opens inside the block to this machine.
 
-    IPv6 ones are closed altogether: IPv4 is enough within a machine.
+    IPv6 sockets receive nothing at all: IPv4 is enough within a machine.
 
     Yields
     ------
     list of int
-        Filled on leaving: ports that remain open to other machines, because the system
-        knows no such filter.
+        Filled at the end of the block: ports that remain open to other machines because
+        the system has no such filter.
     """
     open_ports: list[int] = []
     before = _descriptors()
@@ -60,7 +60,7 @@ def only_from_this_machine() -> Iterator[list[int]]:
             if ours.getsockname()[0] in ("0.0.0.0", "::"):
                 version_4 = ours.family == socket.AF_INET
                 try:
-                    _filter(ours, _FROM_THIS_MACHINE if version_4 else _FROM_NOBODY)
+                    _filter(ours, _FROM_THIS_MACHINE if version_4 else _FROM_NONE)
                 except OSError:
                     open_ports.append(ours.getsockname()[1])
 

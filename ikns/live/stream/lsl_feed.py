@@ -11,29 +11,29 @@ from typing import Any
 
 from ikns.errors import StreamError
 from ikns.live.stream.frame import Event, Frame
-from ikns.live.stream.lsl_layout import Layout, read_layout
+from ikns.live.stream.lsl_layout import LslLayout, read_layout
 from ikns.live.stream.lsl_library import lsl
 from ikns.live.stream.lsl_numbers import Numbers
 
 __all__ = ["ANY_MOCAP", "LslFeed"]
 
-#: Query for streams of type MoCap in any case; XPath 1.0 knows no lower-case().
+#: Query for streams of type MoCap in any case; XPath 1.0 has no lower-case().
 ANY_MOCAP = "translate(type,'MOCAP','mocap')='mocap'"
 
-#: Seconds that one call into liblsl may take, so that Ctrl-C is heard.
+#: Longest call into liblsl, s, so that Ctrl-C is handled.
 _SLICE = 0.2
-#: Seconds of frames kept for a reader that is busy; more is lost, oldest first.
+#: Seconds of frames kept for a busy reader; the oldest frames beyond that are lost.
 _BUFFER = 10
-#: Seconds without a frame after which a stream must show that it is still there.
+#: After this many seconds without a frame a stream is checked for being alive.
 _SILENCE = 5.0
-#: Seconds it has to do so, over the network.
-_SIGN_OF_LIFE = 2.0
+#: Seconds it then has to respond over the network.
+_ALIVE_TIMEOUT = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Open:
     inlet: Any
-    layout: Layout
+    layout: LslLayout
     rate: float
     clock_offset: float
     search: str
@@ -41,21 +41,21 @@ class _Open:
 
 
 class LslFeed:
-    """Read one LSL stream, and find it again when it breaks off.
+    """Read one LSL stream, and reconnect to it after a break.
 
     Parameters
     ----------
     stream : str
-        Name of the stream; empty for the only MoCap stream there is.
+        Name of the stream; empty for any MoCap stream.
     timeout : float
         Seconds for the stream to answer.
     this_machine : bool
-        Look on this machine only.
+        Search on this machine only.
 
     Raises
     ------
     StreamError
-        When nobody serves it, it is no MoCap stream, or it has no rate.
+        When there is no such stream, it is not of type MoCap, or it has no rate.
     """
 
     speed = 1.0
@@ -87,7 +87,7 @@ class LslFeed:
 
     @property
     def ended(self) -> bool:
-        """Whether it was closed; a stream that broke off may come back."""
+        """Whether it was closed; an interrupted stream may come back."""
         return self._closed
 
     def poll(self, timeout: float) -> Frame | None:
@@ -103,7 +103,7 @@ class LslFeed:
                 try:
                     sample, stamp = opened.inlet.pull_sample(min(left, _SLICE))
                     received = time.monotonic()
-                except RuntimeError:  # LostError, or whatever else liblsl met
+                except RuntimeError:  # LostError, or any other error of liblsl
                     self._lose()
                     continue
                 if sample is not None:
@@ -120,10 +120,10 @@ class LslFeed:
     def _frame(
         self, opened: _Open, sample: Any, stamp: float, received: float
     ) -> Frame:
-        if opened is not self._reading:  # the stream came back since the last frame
+        if opened is not self._reading:  # reconnected since the last frame
             self._reading = opened
             self._numbers.bridge()
-            # It may come from another machine; times go on in the first one's clock.
+            # It may come from another machine; times continue in the first one's clock.
             self._ahead = opened.clock_offset - self._first_offset
         device_time = stamp + self._ahead
         number = self._numbers.next(device_time)
@@ -133,7 +133,7 @@ class LslFeed:
         return Frame(number, device_time, received, opened.layout.markers(sample))
 
     def close(self) -> None:
-        """Leave the stream."""
+        """Close the stream."""
         with self._found:
             self._closed = True
             self._open = self._reading = None
@@ -156,15 +156,15 @@ class LslFeed:
         )
 
     def _resolve(self, predicate: str, timeout: float) -> list[Any]:
-        # liblsl asks in waves 0.5 or 1.25 s apart; a time-out that falls on one is
-        # missed, and the call then takes 5 s longer.
+        # liblsl searches in waves 0.5 or 1.25 s apart; a timeout that coincides with
+        # one is missed, and the call then takes 5 s longer.
         return list(self._pylsl.resolve_bypred(predicate, 1, 0.97 * timeout))
 
     def _streams(self) -> list[Any]:
         return list(self._pylsl.resolve_streams(min(self._timeout, 1.0)))
 
     def _connect(self, found: Any) -> _Open:
-        """Open a stream; its frames flow from the end of this call on."""
+        """Open a stream; frames are buffered from the end of this call on."""
         if found.type().casefold() != "mocap":
             raise StreamError(
                 f"{self.name}: expected an LSL stream of type MoCap, found "
@@ -201,8 +201,8 @@ class LslFeed:
         return _Open(inlet, layout, rate, offset, search, found.uid())
 
     def _check(self, opened: _Open) -> None:
-        """Give a silent stream up unless it answers; a cut wire closes nothing."""
-        answers = self._resolve(f"uid='{opened.uid}'", _SIGN_OF_LIFE)
+        """Drop a silent stream unless it responds; a cut cable closes no connection."""
+        answers = self._resolve(f"uid='{opened.uid}'", _ALIVE_TIMEOUT)
         if not answers and opened is self._open:
             self._lose()
         self._silent_since = time.monotonic()
@@ -217,7 +217,7 @@ class LslFeed:
         threading.Thread(target=self._search_again, daemon=True).start()
 
     def _search_again(self) -> None:
-        """Look for the stream until it is back with the same markers."""
+        """Search for the stream until it is back with the same markers."""
         told = ""
         while not self._closed:
             for found in self._resolve(self._search, 1.0):
@@ -244,7 +244,7 @@ class LslFeed:
 
 
 def _quoted(text: str) -> str:
-    """Quote for XPath 1.0, which knows no escapes.
+    """Quote for XPath 1.0, which has no escapes.
 
     >>> print(_quoted("it's"))
     "it's"

@@ -1,6 +1,6 @@
-"""Which channels of an LSL stream are markers.
+"""Find the marker channels of an LSL stream.
 
-The convention is the MoCap meta-data of XDF (https://github.com/sccn/xdf/wiki), as
+The convention is the MoCap metadata of XDF (https://github.com/sccn/xdf/wiki), as
 written by the vendors' LSL apps: channels of type PositionX, PositionY and PositionZ
 that name their marker, in meters. Channels that name an object are rigid bodies.
 """
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ikns.errors import StreamError
 
-__all__ = ["Layout", "marker_channels", "read_layout"]
+__all__ = ["LslLayout", "marker_channels", "read_layout"]
 
 _UNITS = {
     **dict.fromkeys(["", "m", "meter", "meters", "metre", "metres"], 1.0),
@@ -26,8 +26,8 @@ _UNITS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """Where each marker's coordinates are.
+class LslLayout:
+    """Channels of each marker's coordinates.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def marker_channels(labels: Iterable[str]) -> Iterator[dict[str, str]]:
             }
 
 
-def read_layout(xml: str, source: str) -> Layout:
+def read_layout(xml: str, source: str) -> LslLayout:
     """Read a stream's description.
 
     Parameters
@@ -72,7 +72,7 @@ def read_layout(xml: str, source: str) -> Layout:
     Raises
     ------
     StreamError
-        When there are no markers, or one lacks a coordinate or has a strange unit.
+        When there are no markers, or one lacks a coordinate or has an unknown unit.
     """
     places: dict[str, dict[str, tuple[int, float]]] = {}
     types = []
@@ -110,4 +110,4 @@ def read_layout(xml: str, source: str) -> Layout:
                 f"{marker}, found only {', '.join(sorted(axes))}."
             )
     table = np.array([[axes[axis] for axis in "xyz"] for axes in places.values()])
-    return Layout(tuple(places), table[..., 0].astype(np.int64), table[..., 1])
+    return LslLayout(tuple(places), table[..., 0].astype(np.int64), table[..., 1])

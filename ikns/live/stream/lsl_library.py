@@ -1,7 +1,7 @@
-"""The LSL library: brought in late, quiet, and kept to this machine where asked.
+"""Load the LSL library on first use, quiet, and optionally for this machine only.
 
-liblsl reads its settings once, when it is first used; see
-https://labstreaminglayer.readthedocs.io/info/lslapicfg.html for their names and places.
+liblsl reads its settings once, on first use; see
+https://labstreaminglayer.readthedocs.io/info/lslapicfg.html for their names and files.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from ikns.live.stream.optional import bring_in
+from ikns.live.stream.optional import load_client
 
 __all__ = ["lsl", "lsl_settings"]
 
@@ -27,10 +27,10 @@ def lsl(needed_by: str, *, this_machine: bool = False) -> Any:
     Parameters
     ----------
     needed_by : str
-        For the message where pylsl is missing.
+        For the error message when pylsl is missing.
     this_machine : bool
-        Look for streams and announce them on this machine only. The first call in a
-        process decides, and a settings file that names a scope has the last word.
+        Search and announce streams on this machine only. The first call in a process
+        decides, and a scope in a settings file takes precedence.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def lsl(needed_by: str, *, this_machine: bool = False) -> Any:
     global _library
     with _once:
         if _library is None:
-            module = bring_in(
+            module = load_client(
                 "pylsl", needed_by=needed_by, remedy="pip install 'ikns[lsl]'"
             )
             module.set_config_content(lsl_settings(this_machine=this_machine))
@@ -51,11 +51,11 @@ def lsl(needed_by: str, *, this_machine: bool = False) -> Any:
 def lsl_settings(*, this_machine: bool) -> str:
     """Return the user's LSL settings, quiet unless they ask for a log.
 
-    A lost stream is told by us, in one sentence; liblsl would print it as well.
+    A lost stream is reported as an event; liblsl would print it too.
     """
     settings = configparser.ConfigParser(interpolation=None, strict=False)
     settings.optionxform = str  # type: ignore[assignment,method-assign]
-    for path in _places():
+    for path in _settings_files():
         if path.is_file():
             settings.read(path)
             break
@@ -65,7 +65,7 @@ def lsl_settings(*, this_machine: bool) -> str:
             ("multicast", "ResolveScope"): "machine",
             ("multicast", "ListenAddress"): "127.0.0.1",
             ("ports", "IPv6"): "disable",
-            # Eight probes of the clock's offset, here 10 ms apart and not 64.
+            # Eight probes of the clock offset, 10 instead of 64 ms apart.
             ("tuning", "TimeProbeInterval"): "0.01",
         }
     for (section, option), value in wanted.items():
@@ -78,8 +78,8 @@ def lsl_settings(*, this_machine: bool) -> str:
     return text.getvalue()
 
 
-def _places() -> list[Path]:
-    """Where liblsl itself would look, in its order."""
+def _settings_files() -> list[Path]:
+    """Return the settings files of liblsl, in its order."""
     named = os.environ.get("LSLAPICFG")
     return [
         *([Path(named)] if named else []),

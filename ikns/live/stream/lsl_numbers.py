@@ -1,4 +1,4 @@
-"""Frame numbers for LSL, which has none, from its time stamps."""
+"""Frame numbers for LSL, which has none, from time stamps."""
 
 from __future__ import annotations
 
@@ -6,19 +6,21 @@ import math
 
 __all__ = ["Numbers"]
 
-#: Stamps further than this from whole frame periods are uneven, in periods.
+#: Stamps farther than this from whole frame periods are uneven, in periods.
 _EVEN = 0.25
-#: Even stamps in a row that end a time of uneven ones; chance makes 2^-100 of it.
+#: Number of successive even stamps that end an uneven stretch; the probability that
+#: uneven stamps do so by chance is 2^-100.
 _RUN = 100
 
 
 class Numbers:
-    """Number frames by their stamps.
+    """Numbers frames by their time stamps.
 
-    While stamps lie on whole frame periods, as those of cameras do, a step of n periods
-    is n frames: 2 means one was lost, 0 repeated, -1 out of order. Stamps that a
-    program takes when it gets round to it are too uneven for that. Then frames are only
-    counted; one lost cannot be told from one stamped late, unless a second is missing.
+    While stamps are whole frame periods apart, as those of cameras are, a step of n
+    periods is n frames: 2 means that one was lost, 0 repeated, -1 out of order. Stamps
+    taken by a program on ordinary timers are too uneven for that. Then frames are only
+    counted, and a lost frame cannot be distinguished from a late stamp, unless a second
+    or more is missing.
 
     Parameters
     ----------
@@ -28,7 +30,7 @@ class Numbers:
     Attributes
     ----------
     uneven : bool
-        Whether frames are only counted, for now.
+        Whether frames are only counted at present.
     """
 
     def __init__(self, rate: float) -> None:
@@ -39,7 +41,7 @@ class Numbers:
         self.uneven = False
 
     def bridge(self) -> None:
-        """Take the next frame for a new one, numbered by its stamp alone."""
+        """Treat the next frame as the first after a break: only its stamp counts."""
         self._bridge = True
 
     def next(self, stamp: float) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Sequence
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -28,17 +27,16 @@ class LslOutlet:
     rate : float
         Frames per second.
     name : str
-        Name of the stream; the same name on the same machine is found again after a
-        break, as its source id is made of the two.
+        Name of the stream. Its source id contains name and machine, so readers find it
+        again after a break.
     everywhere : bool
-        Let other machines find and read the stream; markers are personal data, so this
-        is off unless asked for.
+        Let other machines find and read the stream; off by default, as markers are
+        personal data.
 
     Attributes
     ----------
     open_ports : list of int
-        Ports that other machines could reach although `everywhere` is off; empty on
-        Linux.
+        Ports that other machines can reach although `everywhere` is off; none on Linux.
 
     Raises
     ------
@@ -78,7 +76,7 @@ class LslOutlet:
         else:
             with only_from_this_machine() as self.open_ports:
                 self._outlet = self._pylsl.StreamOutlet(info)
-        # Both count seconds since the machine started, but may differ elsewhere.
+        # On some systems LSL's clock differs from time.monotonic.
         self._lsl_ahead = self._pylsl.local_clock() - time.monotonic()
 
     @property
@@ -98,7 +96,7 @@ class LslOutlet:
         markers : (M, 3) array
             Meters; NaN where a marker was not seen.
         at : float, optional
-            When it was seen, seconds of `time.monotonic`; now by default.
+            When it was recorded, s of `time.monotonic`; now by default.
         """
         sample = np.asarray(markers, dtype=np.float64)
         if sample.shape != (len(self.labels), 3):
@@ -109,19 +107,14 @@ class LslOutlet:
         self._outlet.push_sample(sample.ravel().tolist(), stamp)
 
     def close(self) -> None:
-        """Take the stream down; frames not yet read are lost."""
+        """Close the stream; frames not yet read are lost."""
         self._outlet = None
 
     def __enter__(self) -> LslOutlet:
         """Return itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
 

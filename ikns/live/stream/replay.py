@@ -14,7 +14,7 @@ __all__ = ["Replay", "frame_times", "wait_until"]
 
 
 def wait_until(due: float) -> float:
-    """Sleep until an instant of `time.monotonic` and return the time it is then."""
+    """Sleep until a time of `time.monotonic`; return the time after it."""
     while (now := time.monotonic()) < due:
         time.sleep(due - now)
     return now
@@ -23,13 +23,13 @@ def wait_until(due: float) -> float:
 def frame_times(recording: Recording) -> tuple[float, float]:
     """Return the recording's rate (frames/s) and the length of one loop (s).
 
-    A loop lasts one frame period longer than the recording, so that its first frame
-    follows the last one as any other.
+    A loop lasts one frame period longer than the recording, so that the first frame
+    follows the last one at the usual interval.
 
     Raises
     ------
     InvalidInput
-        With fewer than two frames there is no rate.
+        When there are fewer than two frames, hence no rate.
     """
     rate = recording.rate
     if not (math.isfinite(rate) and rate > 0):
@@ -41,19 +41,19 @@ def frame_times(recording: Recording) -> tuple[float, float]:
 
 
 class Replay:
-    """Hand out a recording's frames when they are due.
+    """Return a recording's frames when they are due.
 
-    Deadlines are absolute, counted from the first frame asked for: a late frame delays
-    no other and nothing drifts. No frame is left out, so a slow reader sees old frames,
-    and sees so in their receive times.
+    Deadlines are absolute, counted from the first read: a late frame delays no other,
+    and nothing drifts. No frame is left out, so a slow reader gets old frames, which
+    their receive times show.
 
     Parameters
     ----------
     recording : Recording
     speed : float
-        Device seconds per second; 0 for as fast as frames are asked for.
+        Device seconds per second; 0 for as fast as frames are read.
     loop : bool
-        Start over at the end. Frame numbers and device times go on.
+        Start over at the end; frame numbers and device times continue.
 
     Raises
     ------
@@ -83,12 +83,12 @@ class Replay:
 
     @property
     def device(self) -> dict[str, float]:
-        """A recording has no device."""
+        """Nothing: a recording has no device."""
         return {}
 
     @property
     def ended(self) -> bool:
-        """Whether every frame has been handed out."""
+        """Whether all frames have been read."""
         return not self._loop and self._number >= len(self._recording.time)
 
     def poll(self, timeout: float) -> Frame | None:

@@ -1,11 +1,10 @@
-"""A live source: frames one by one, with what went wrong counted and told."""
+"""A live source: frames one by one, with counts of faults and events."""
 
 from __future__ import annotations
 
 import time
 from collections import deque
 from collections.abc import Iterator
-from types import TracebackType
 
 from ikns.errors import StreamError
 from ikns.live.stream.continuity import Continuity
@@ -20,9 +19,9 @@ class Source:
     Parameters
     ----------
     feed : Feed
-        Where frames come from.
-    patience : float
-        Seconds without a frame after which iterating gives up.
+        Provides the frames.
+    read_timeout : float
+        Iterating raises an error after this time without a frame, s.
     late_after : float, optional
         See :class:`Continuity`.
     """
@@ -31,11 +30,11 @@ class Source:
         self,
         feed: Feed,
         *,
-        patience: float = 10.0,
+        read_timeout: float = 10.0,
         late_after: float | None = None,
     ) -> None:
         self._feed = feed
-        self._patience = patience
+        self._read_timeout = read_timeout
         self.continuity = Continuity(feed.rate, speed=feed.speed, late_after=late_after)
         period = 1 / (feed.rate * feed.speed) if feed.speed else 0.0
         self._silence = max(1.0, 10 * period)
@@ -64,17 +63,17 @@ class Source:
 
     @property
     def events(self) -> deque[Event]:
-        """Breaks, silences and returns, the newest last; at most 1000 are kept."""
+        """Breaks, pauses and reconnections, the newest last; at most 1000."""
         return self._feed.events
 
     @property
     def device(self) -> dict[str, float]:
-        """What the device reports of itself, such as the frames its cameras lost."""
+        """Values that the device reports, such as frames lost by the cameras."""
         return self._feed.device
 
     @property
     def ended(self) -> bool:
-        """Whether no further frame will ever come."""
+        """Whether no more frames will come."""
         return self._closed or self._feed.ended
 
     def read(self, timeout: float = 1.0) -> Frame | None:
@@ -89,16 +88,16 @@ class Source:
         now = time.monotonic()
         if frame is not None:
             if self._silent:
-                self._tell(f"frames again after {now - self._last:.1f} s.")
+                self._add_event(f"frames again after {now - self._last:.1f} s.")
                 self._silent = False
             self._last = now
             self.continuity.add(frame)
         elif not self._silent and not self.ended and now - self._last > self._silence:
             self._silent = True
-            self._tell(f"no frame for {now - self._last:.1f} s.")
+            self._add_event(f"no frame for {now - self._last:.1f} s.")
         return frame
 
-    def _tell(self, text: str) -> None:
+    def _add_event(self, text: str) -> None:
         self.events.append(Event(time.monotonic(), f"{self.name}: {text}"))
 
     def __iter__(self) -> Iterator[Frame]:
@@ -111,19 +110,21 @@ class Source:
         Raises
         ------
         StreamError
-            When none comes for the source's patience.
+            When no frame comes within the read timeout.
         """
-        give_up = time.monotonic() + self._patience
+        give_up = time.monotonic() + self._read_timeout
         while not self.ended:
             frame = self.read(max(0.0, min(0.5, give_up - time.monotonic())))
             if frame is not None:
                 return frame
             if time.monotonic() >= give_up:
-                raise StreamError(f"{self.name}: no frame for {self._patience:g} s.")
+                raise StreamError(
+                    f"{self.name}: no frame for {self._read_timeout:g} s."
+                )
         raise StopIteration
 
     def close(self) -> None:
-        """Let go of the source; calling it again does nothing."""
+        """Close the source; harmless when repeated."""
         if not self._closed:
             self._closed = True
             self._feed.close()
@@ -132,11 +133,6 @@ class Source:
         """Return itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()

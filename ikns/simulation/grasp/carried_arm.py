@@ -16,7 +16,7 @@ from ikns._kernels.body.tree import place_joints
 from ikns.errors import InvalidInput
 from ikns.live.control.controller import Controller
 from ikns.live.control.frame import FrameSolver
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.simulation.artifacts import occlusions
 from ikns.simulation.grasp.route import Route
 from ikns.simulation.movement import Unsteadiness
@@ -53,7 +53,7 @@ class CarriedArm:
     seed : int or numpy.random.Generator
     latency : float
         From a posture to what the finger is told, s.
-    settings : Settings, optional
+    settings : ControlSettings, optional
         Of the controller.
 
     Attributes
@@ -73,7 +73,7 @@ class CarriedArm:
         rate: float,
         seed: int | np.random.Generator,
         latency: float = 0.05,
-        settings: Settings | None = None,
+        settings: ControlSettings | None = None,
     ) -> None:
         self.route, self.rate, self.frame, self.c = route, rate, 0, math.nan
         run, subject = participant.protocol, participant.subject

@@ -17,7 +17,7 @@ from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.live.control.controller import Controller
 from ikns.live.control.frame import ControlFrame, FrameSolver
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 from ikns.simulation.arm import Arm
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.movement import Unsteadiness
@@ -70,7 +70,7 @@ class ArmLoop:
         How still the hand is held.
     latency : float
         From a posture to its c on the screen, s, in whole frames.
-    settings : Settings, optional
+    settings : ControlSettings, optional
         Smoothing of the live controller; the operator then sees its flexion. Default:
         the map's c as it is.
 
@@ -97,7 +97,7 @@ class ArmLoop:
         skin: SoftTissue | None = None,
         unsteadiness: Unsteadiness | None = None,
         latency: float = 0.03,
-        settings: Settings | None = None,
+        settings: ControlSettings | None = None,
     ) -> None:
         if place.motion is None or len(place.motion.swivel) < 4:
             raise InvalidInput("expected a place with room to swivel the elbow.")

@@ -15,7 +15,7 @@ from ikns.view.scene.live import LiveView
 from ikns.view.scene.map_scene import map_scene
 
 if TYPE_CHECKING:
-    from ikns.live.runtime import Status
+    from ikns.live.runtime import LoopStatus
 
 __all__ = ["body_view"]
 
@@ -23,7 +23,7 @@ __all__ = ["body_view"]
 @contextmanager
 def body_view(
     subject: Subject, *, simulated: bool
-) -> Iterator[tuple[LiveView, Callable[[Status], None]]]:
+) -> Iterator[tuple[LiveView, Callable[[LoopStatus], None]]]:
     """Serve the 3-D view of a subject with a finger.
 
     Statuses are drawn by a thread of its own, the newest only.
@@ -49,7 +49,7 @@ def body_view(
         title="Live",
     )
     scene = with_finger(scene, subject.skeleton, chain_sides(subject.chain)[-1])
-    newest: list[Status] = []
+    newest: list[LoopStatus] = []
     came, closing = threading.Event(), threading.Event()
 
     def draw(view: LiveView) -> None:
@@ -66,7 +66,7 @@ def body_view(
                     flexion=status.flexion if math.isnan(moved) else moved,
                 )
 
-    def take(status: Status) -> None:
+    def take(status: LoopStatus) -> None:
         newest.append(status)
         came.set()
 

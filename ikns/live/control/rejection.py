@@ -1,4 +1,4 @@
-"""Why a frame does not count: what a person who looks after the markers can act on."""
+"""Why a frame is rejected, so that the experimenter can act on it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from ikns.calibration import say_apart, segment_pairs, sight_needs
 from ikns.live.control.frame import ControlFrame, FrameSolver
-from ikns.live.control.settings import Settings
+from ikns.live.control.settings import ControlSettings
 
-__all__ = ["explains", "refusal"]
+__all__ = ["fits_markers", "rejection_reason"]
 
 
-def explains(solved: ControlFrame, settings: Settings) -> bool:
-    """Whether a pose explains the markers; without a number nothing is explained."""
+def fits_markers(solved: ControlFrame, settings: ControlSettings) -> bool:
+    """Whether a pose fits the markers; an error of NaN does not fit."""
     return (
         solved.residual <= settings.max_residual
         and solved.worst_residual <= settings.max_worst_residual
@@ -21,26 +21,26 @@ def explains(solved: ControlFrame, settings: Settings) -> bool:
     )
 
 
-def refusal(
+def rejection_reason(
     solver: FrameSolver,
-    settings: Settings,
+    settings: ControlSettings,
     markers: NDArray[np.float64],
     solved: ControlFrame,
     *,
     new: bool,
 ) -> str:
-    """Say why a frame does not count; nothing if it does.
+    """Say why a frame is rejected; empty if it is valid.
 
     Parameters
     ----------
     solver : FrameSolver
-        What solved it.
-    settings : Settings
+        The solver of the frame.
+    settings : ControlSettings
     markers : (M, 3) array
-        What was seen, m in the world.
+        Positions in the world, m; NaN = not seen.
     solved : ControlFrame
     new : bool
-        Whether it shows anything new.
+        Whether it is newer than and different from the last frame.
     """
     if not new:
         return "the same picture again"
@@ -65,7 +65,7 @@ def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
 
 
 def _apart(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
-    """Name the two markers whose distance is farthest off."""
+    """Name the two markers of a segment whose distance is farthest off."""
     pairs, worn = segment_pairs(solver.skeleton, solver.chain)
     first, second = markers[pairs.T]
     change = np.linalg.norm(first - second, axis=1) - worn
@@ -76,7 +76,7 @@ def _apart(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
 def _astray(
     solver: FrameSolver, markers: NDArray[np.float64], solved: ControlFrame
 ) -> str:
-    """Name the marker that is farthest from where the pose has it."""
+    """Name the marker that is farthest from its position in the pose."""
     away = np.linalg.norm(solver.skeleton.markers_in_world(solved.q) - markers, axis=1)
     needs = sight_needs(solver.skeleton, solver.chain).values()
     columns = np.concatenate([own for own, _ in needs])

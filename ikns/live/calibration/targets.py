@@ -17,7 +17,7 @@ from ikns.nullspace.clustering import (
     minimum_bounding_box,
 )
 
-__all__ = ["Guide", "HandTracker", "in_words", "suggested_places"]
+__all__ = ["TargetPoints", "HandTracker", "direction_in_words", "target_points"]
 
 Array = NDArray[np.float64]
 
@@ -28,12 +28,12 @@ _WAYS = (("forward", "back"), ("up", "down"), ("to the right", "to the left"))
 _ORDER = (1, 0, 2)
 
 
-def in_words(way: ArrayLike) -> str:
+def direction_in_words(way: ArrayLike) -> str:
     """Say a way in the thorax frame as the person would.
 
     Examples
     --------
-    >>> in_words([0.2, 0.3, 0.15]), in_words([0.01, -0.2, 0.0])
+    >>> direction_in_words([0.2, 0.3, 0.15]), direction_in_words([0.01, -0.2, 0.0])
     ('up, forward, to the right', 'down')
     """
     parts = np.asarray(way, dtype=np.float64)
@@ -46,7 +46,7 @@ def in_words(way: ArrayLike) -> str:
     return ", ".join(said) or "stay"
 
 
-def suggested_places(explored: ArrayLike, box: BoundingBox, n: int) -> Array:
+def target_points(explored: ArrayLike, box: BoundingBox, n: int) -> Array:
     """Places that the hand reached, each nearest to a place on the box around all.
 
     The box is that of minimum volume; its vertices come first, then the centers of its
@@ -102,7 +102,7 @@ class HandTracker:
         return np.asarray(hands[self._sides].mean(axis=0))
 
 
-class Guide:
+class TargetPoints:
     """Suggest a place for each point.
 
     Parameters
@@ -114,9 +114,9 @@ class Guide:
 
     def __init__(self, explored: Array, n_points: int) -> None:
         box = minimum_bounding_box(explored)
-        self.places = suggested_places(explored, box, n_points)
+        self.places = target_points(explored, box, n_points)
         self._middle = box.center
 
     def words(self, point: int) -> str:
         """Where point number `point` (from 0) is, seen from the middle of the box."""
-        return in_words(self.places[point] - self._middle)
+        return direction_in_words(self.places[point] - self._middle)

@@ -9,10 +9,10 @@ import numpy as np
 from ikns.live.stream import Frame
 from ikns.recording.recording import Recording
 
-__all__ = ["take_recording"]
+__all__ = ["recording_from_frames"]
 
 
-def take_recording(
+def recording_from_frames(
     frames: Sequence[Frame], labels: Sequence[str], rate: float, source: str
 ) -> Recording | None:
     """Return the recording that frames make up.

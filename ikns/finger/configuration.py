@@ -1,4 +1,4 @@
-"""How flexion becomes a servo's numbers: ticks, limits, speeds."""
+"""Conversion of flexion to a servo's registers: ticks, limits, speeds."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from dataclasses import dataclass
 from ikns.finger.limiter import Limits
 from ikns.finger.models import Model
 
-__all__ = ["ANSWER_ALL", "Plan"]
+__all__ = ["RESPOND_TO_ALL", "ServoConfiguration"]
 
-#: The servo's own profile stays out of the way of the limiter's by this factor.
+#: The servo's own profile is faster than the limiter by this factor, so as not to slow
+#: the motion down.
 _PROFILE_MARGIN = 1.5
 _POSITION_MODE, _CURRENT_POSITION_MODE = 3, 5
-#: Status return level at which a servo answers everything.
-ANSWER_ALL = 2
+#: Status return level at which a servo responds to every instruction.
+RESPOND_TO_ALL = 2
 
 
 @dataclass(frozen=True)
-class Plan:
-    """How flexion becomes ticks, and how hard and fast the servo may push.
+class ServoConfiguration:
+    """How flexion maps to ticks, and how hard and fast the servo may push.
 
     Parameters
     ----------
@@ -43,27 +44,27 @@ class Plan:
         return self.closed_ticks - self.open_ticks
 
     def ticks(self, flexion: float) -> int:
-        """Position of a flexion."""
+        """Position of a flexion, ticks."""
         return round(self.open_ticks + flexion * self.span)
 
     def flexion(self, ticks: float) -> float:
-        """Flexion at a position."""
+        """Flexion at a position in ticks."""
         return (ticks - self.open_ticks) / self.span
 
     def sent(self, flexion: float) -> float:
-        """Flexion as the servo is told, in whole ticks; NaN stays NaN."""
+        """Flexion that the servo gets, a whole number of ticks; NaN stays NaN."""
         return flexion if math.isnan(flexion) else self.flexion(self.ticks(flexion))
 
-    def kept(self, model: Model) -> dict[str, int]:
-        """Return what has to be in the servo's permanent memory.
+    def eeprom_registers(self, model: Model) -> dict[str, int]:
+        """Return values for the servo's permanent memory (EEPROM).
 
-        With current-based position control a servo limits its current, but heeds no
-        position limits; then only the limiter does.
+        In current-based position control a servo limits its current but ignores its
+        position limits; then only the limiter keeps the range.
         """
         ends = sorted(map(self.ticks, (self.limits.lower, self.limits.upper)))
         values = {"min_position_limit": ends[0], "max_position_limit": ends[1]}
         if model.protocol == 2:
-            # Forward, profiles by velocity, and no torque by goal alone.
+            # Normal direction, velocity-based profile, no torque by a goal alone.
             values["drive_mode"] = 0
             values["operating_mode"] = _POSITION_MODE
         if "current_limit" in model:
@@ -71,21 +72,21 @@ class Plan:
             values["current_limit"] = self._share(model, "current_limit")
         else:
             values["pwm_limit"] = self._share(model, "pwm_limit")
-        # Let it switch off by itself when overheated, shocked or overloaded.
+        # The servo switches itself off after overheating, a shock or an overload.
         values["shutdown"] = model["shutdown"].initial
         return values
 
-    def volatile(self, model: Model) -> dict[str, int]:
-        """Return what has to be in its memory while it runs."""
+    def ram_registers(self, model: Model) -> dict[str, int]:
+        """Return values for the servo's volatile memory (RAM)."""
         speed = self.limits.rate * abs(self.span) * _PROFILE_MARGIN
         values = {
-            "profile_velocity": _whole(model, "profile_velocity", speed),
+            "profile_velocity": _register_value(model, "profile_velocity", speed),
         }
         if model.protocol == 2:
-            values["status_return_level"] = ANSWER_ALL
+            values["status_return_level"] = RESPOND_TO_ALL
         if "profile_acceleration" in model:
             change = self.limits.acceleration * abs(self.span) * _PROFILE_MARGIN
-            values["profile_acceleration"] = _whole(
+            values["profile_acceleration"] = _register_value(
                 model, "profile_acceleration", change
             )
         if "current_limit" in model:
@@ -98,8 +99,8 @@ class Plan:
         return max(round(self.effort * model[name].upper), 1)
 
 
-def _whole(model: Model, name: str, value: float) -> int:
-    """Round up to a register's unit; its zero would mean no limit at all."""
+def _register_value(model: Model, name: str, value: float) -> int:
+    """Round up to the unit of a register, whose zero would mean no limit."""
     velocity = name == "profile_velocity"
     unit = model.velocity_unit if velocity else model.acceleration_unit
     top = min(model[name].upper, 1023 if model.protocol == 1 else model[name].upper)

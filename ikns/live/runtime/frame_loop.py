@@ -1,0 +1,200 @@
+"""State of one run of the live loop, and what it does with each frame."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import asdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.finger import Finger
+from ikns.live.control.controller import Controller, Decision
+from ikns.live.control.safety import Changes
+from ikns.live.runtime.cache_warmer import CacheWarmer
+from ikns.live.runtime.report import LoopStatus, Report
+from ikns.live.runtime.session_log import write_frame, write_stop, write_transition
+from ikns.live.session import RunWriter, micro
+from ikns.live.stream import Frame, Source
+
+__all__ = ["FrameLoop"]
+
+#: Longest time between two commands to the finger and checks of the watchdog, s.
+_KEEP_ALIVE = 0.02
+#: Command with which the finger brakes and stays where it is.
+_HOLD = math.nan
+
+
+class FrameLoop:
+    """One run of the live loop.
+
+    Parameters
+    ----------
+    source : Source
+    controller : Controller
+        Drives the finger.
+    twin : Controller
+        One like it, for warming the caches.
+    columns : (M,) integer array
+        Where the markers of the subject's set are among the source's; -1 where missing.
+    finger : Finger, optional
+    session : RunWriter, optional
+
+    Attributes
+    ----------
+    report : Report
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        controller: Controller,
+        twin: Controller,
+        columns: NDArray[np.int64],
+        finger: Finger | None,
+        session: RunWriter | None,
+    ) -> None:
+        self._source, self._controller = source, controller
+        self._columns, self._absent = columns, np.flatnonzero(columns < 0)
+        self._finger, self._session = finger, session
+        pace = source.rate * source.speed
+        self._period = 1 / pace if pace else math.inf
+        self._warmer = CacheWarmer(twin, self._period)
+        self._unknown_q = np.full(len(controller.solver.skeleton.neutral()), np.nan)
+        self._measured = math.nan
+        self._first_device_time = math.nan
+        self._last: Decision | None = None
+        self._status_time, self._status_frames = 0.0, 0
+        self.report = Report()
+
+    def arm(self) -> None:
+        """Start the clock and arm the safety machine."""
+        self._start = time.monotonic()
+        self._apply(self._controller.machine.arm(0.0))
+
+    def elapsed(self) -> float:
+        """Time since the start, s."""
+        return time.monotonic() - self._start
+
+    def process(self, frame: Frame) -> Decision:
+        """Turn a frame into a command to the finger, then write it to the session."""
+        report, received = self.report, frame.receive_time
+        if math.isnan(self._first_device_time):
+            self._first_device_time = frame.device_time
+        # Rounded as on disk, so that a replay computes with the same numbers.
+        markers = micro(frame.markers[self._columns])
+        markers[self._absent] = np.nan
+        device_time = round(frame.device_time - self._first_device_time, 6)
+        receive_time = round(received - self._start, 6)
+        began = time.monotonic()
+        decision = self._controller.frame(markers, device_time, receive_time)
+        decided = time.monotonic()
+        self._apply(decision.changes)
+        if decision.valid and decision.state == "armed":
+            self._apply(self._controller.machine.activate(receive_time, "poses come"))
+        sent = self._command()
+        done = time.monotonic()
+        self._check_finger(receive_time)
+        report.frames += 1
+        report.misses += done - received > self._period
+        report.stages["solve"].add(decided - began)
+        report.stages["command"].add(done - decided)
+        report.stages["total"].add(done - received)
+        self._last = decision
+        self._warmer.frame(markers, device_time, received)
+        if self._session:
+            write_frame(
+                self._session,
+                (frame.number, device_time, receive_time),
+                markers,
+                decision,
+                sent=sent,
+                measured=self._measured,
+                durations=(decided - began, done - received),
+            )
+        report.stages["loop"].add(time.monotonic() - began)
+        return decision
+
+    def read_timeout(self) -> float:
+        """How long to wait for a frame before something else is to be done, s."""
+        left = self._controller.machine.deadline - self.elapsed()
+        left = min(left, self._warmer.time_left())
+        return min(max(left, 0.0), _KEEP_ALIVE)
+
+    def warm_caches(self) -> bool:
+        """Warm the caches if a frame is due shortly; return whether that was done."""
+        warmed = self._warmer.warm_caches()
+        self.report.warm_ups = self._warmer.count
+        return warmed
+
+    def keep_alive(self) -> None:
+        """Without a frame: check the watchdog and command the finger."""
+        now = time.monotonic() - self._start
+        self._apply(self._controller.check(now))
+        self._command()
+        self._check_finger(now)
+
+    def disarm(self, reason: str) -> None:
+        """Disarm the safety machine and complete the report."""
+        now = time.monotonic() - self._start
+        self._apply(self._controller.machine.disarm(now, reason))
+        self.report.seconds = now
+        self.report.source = asdict(self._source.continuity.counts)
+        if self._session:
+            self.report.lost_rows = self._session.lost
+
+    def status_due(self, every: float) -> bool:
+        """Whether it is time for the next status."""
+        return self.elapsed() - self._status_time >= every
+
+    def status(self) -> LoopStatus:
+        """Return the present status."""
+        now, report, last = self.elapsed(), self.report, self._last
+        new_frames = report.frames - self._status_frames
+        rate = new_frames / max(now - self._status_time, 1e-9)
+        self._status_time, self._status_frames = now, report.frames
+        return LoopStatus(
+            time=now,
+            rate=rate,
+            frames=report.frames,
+            misses=report.misses,
+            latency=report.stages["total"].percentile(99),
+            residual=math.nan if last is None else last.solved.residual,
+            worst_residual=math.nan if last is None else last.solved.worst_residual,
+            rejection="" if last is None else last.rejection,
+            inside=last is not None and last.solved.inside,
+            c=math.nan if last is None else float(last.solved.c[0]),
+            flexion=self._controller.flexion,
+            measured=self._measured,
+            state=self._controller.machine.state,
+            q=self._unknown_q if last is None else last.solved.q,
+        )
+
+    def _command(self) -> float:
+        """Command the finger, which limits what it does; return what was sent."""
+        if self._finger is None:
+            return math.nan
+        moving = self._controller.machine.state in ("active", "holding")
+        return self._finger.command(self._controller.flexion if moving else _HOLD)
+
+    def _check_finger(self, now: float) -> None:
+        """Stop when the finger has gone to its safe state by itself."""
+        if self._finger is None:
+            return
+        state = self._finger.state()
+        self._measured = state.flexion
+        if state.mode == "safe" and self._controller.machine.state != "safe":
+            if self._session:
+                write_stop(self._session, now, state.alert)
+            self._apply(self._controller.machine.stop(now, f"finger: {state.alert}"))
+
+    def _apply(self, changes: Changes) -> None:
+        """Report state transitions, and make the finger safe where they say so."""
+        for change in changes:
+            self.report.transitions.append(change)
+            del self.report.transitions[:-1000]
+            if change.after == "safe" and self._finger is not None:
+                self._finger.make_safe(change.reason)
+            if self._session:
+                write_transition(self._session, change)

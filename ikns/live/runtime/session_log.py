@@ -1,0 +1,71 @@
+"""Rows that the live loop writes into a session."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.live.control.controller import Decision
+from ikns.live.control.safety import Transition
+from ikns.live.session import RunWriter
+from ikns.live.session.channels import STATES
+
+__all__ = ["write_frame", "write_stop", "write_transition"]
+
+
+def write_frame(
+    session: RunWriter,
+    timing: tuple[int, float, float],
+    markers: NDArray[np.float64],
+    decision: Decision,
+    *,
+    sent: float,
+    measured: float,
+    durations: tuple[float, float],
+) -> None:
+    """Write the two rows of a frame: what came in, and the results.
+
+    Parameters
+    ----------
+    session : RunWriter
+    timing : (int, float, float)
+        Frame number, device time and receive time, s.
+    markers : (M, 3) array
+        m in the world.
+    decision : Decision
+    sent, measured : float
+        Flexion that was sent to the finger, and that it measured.
+    durations : (float, float)
+        Of solving, and from receipt to command, s.
+    """
+    solved = decision.solved
+    session.row("markers", [*timing, *markers.ravel().tolist()])
+    session.row(
+        "model",
+        [
+            *solved.q[:7].tolist(),
+            *np.degrees(solved.q[7:]).tolist(),
+            *solved.hand_in_thorax.tolist(),
+            *solved.c.tolist(),
+            decision.flexion,
+            sent,
+            measured,
+            solved.residual,
+            solved.worst_residual,
+            solved.intermarker_error,
+            float(solved.inside),
+            float(STATES.index(decision.state)),
+            *durations,
+        ],
+    )
+
+
+def write_stop(session: RunWriter, time: float, alert: str) -> None:
+    """Write a stop that the finger asked for, so that a replay repeats it."""
+    session.row("events", [time, 0.0, "stop", alert])
+
+
+def write_transition(session: RunWriter, change: Transition) -> None:
+    """Write a state transition as an event."""
+    words = f"{change.before} to {change.after}: {change.reason}"
+    session.row("events", [max(0.0, change.time), 0.0, change.after, words])
