@@ -1,10 +1,12 @@
 """Learned against analytic null spaces: how alike, and what the difference costs.
 
-`samples` does it all on plain arrays and is read first; `fronts` feeds it a motion and
-a skeleton, or any robot; `maps` compares two maps on a motion. What is measured has its
-own file: `subspaces` (angles and variance), `leak`, `bending`, `reaching` (crosstalk);
-`chance` is what random subspaces would show, `coordinates` what other joint angles
-make of the same movement.
+`samples` runs the whole comparison on plain arrays and is read first; `from_motion` and
+`from_robot` call it with a person's motion and with a robot's recording; `maps`
+compares two maps on a motion; `rows` makes one row a PCA point, and `combinations`
+repeats a comparison for several tasks, chains and shoulder coordinates. Each quantity
+has its own file: `subspaces` (angles and variance), `leak`, `curvature`, `reaching`
+(crosstalk). `chance` is what random subspaces would show; `coordinates` are other joint
+angles for the same movement.
 """
 
 from ikns.analysis.compare.chance import chance_angles, chance_inside
@@ -19,14 +21,14 @@ from ikns.analysis.compare.from_motion import (
     motion_crosstalk,
 )
 from ikns.analysis.compare.kinematics import Kinematics
-from ikns.analysis.compare.maps import Comparison, compare
+from ikns.analysis.compare.maps import MapComparison, compare
 from ikns.analysis.compare.reaching import Crosstalk, crosstalk, find_reaches
 from ikns.analysis.compare.samples import NullSpaceComparison, compare_samples
 from ikns.analysis.compare.subspaces import learned_directions
 
 __all__ = [
     "COORDINATES",
-    "Comparison",
+    "MapComparison",
     "Coordinates",
     "Crosstalk",
     "Kinematics",

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from ikns.analysis.compare.coordinates import Coordinates
 from ikns.analysis.compare.kinematics import Kinematics
 
-__all__ = ["recast"]
+__all__ = ["change_coordinates"]
 
 Array = NDArray[np.float64]
 
 
-def recast(
+def change_coordinates(
     there: Coordinates,
     columns: list[int],
     labels: NDArray[np.int64],

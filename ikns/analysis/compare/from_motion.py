@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns.analysis.compare.change_coordinates import recast
+from ikns.analysis.compare.change_coordinates import change_coordinates
 from ikns.analysis.compare.coordinates import shoulder_coordinates
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.reaching import Crosstalk, crosstalk
@@ -306,7 +306,7 @@ def _compared(
         for columns in shoulders:
             middle = q[used][:, columns].mean(axis=0)
             there = shoulder_coordinates(coordinates, middle)
-            q, jacobians, directions, kinematics = recast(
+            q, jacobians, directions, kinematics = change_coordinates(
                 there, columns, labels, q, jacobians, directions, kinematics
             )
     lower, upper = ranges

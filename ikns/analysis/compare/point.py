@@ -27,7 +27,7 @@ from ikns.numerics.subspace import null_space, null_spaces
 if TYPE_CHECKING:
     from ikns.analysis.compare.kinematics import Kinematics
 
-__all__ = ["Parts", "PointFindings", "look_at"]
+__all__ = ["Parts", "PointFindings", "compare_point"]
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ class PointFindings(NamedTuple):
     parts: Parts
 
 
-def look_at(
+def compare_point(
     data: CheckedSamples,
     point: int,
     kinematics: Kinematics | None,
