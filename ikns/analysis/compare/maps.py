@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.analysis.compare.leak import hand_turns, slope_scores, slopes
-from ikns.analysis.compare.subspaces import draw
+from ikns.analysis.compare.resampling import draw
 from ikns.body.chains import SIDES, chain_sides
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
