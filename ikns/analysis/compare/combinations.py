@@ -70,13 +70,13 @@ def compare_combinations(
     Examples
     --------
     >>> import ikns
-    >>> person = ikns.virtual_subject(1)
     >>> run = ikns.simulate_protocol(
-    ...     person, seed=1, rate=50, static_seconds=1, free_seconds=1, point_seconds=1
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
     ... )
+    >>> body = run.subject.skeleton
     >>> motion = run.points.truth
     >>> learned = ikns.NullSpaceMap(10).fit(*ikns.null_space_samples(motion))
-    >>> compared = compare_combinations(learned, person.skeleton, motion, resamples=0)
+    >>> compared = compare_combinations(learned, body, motion, resamples=0)
     >>> [(task, found.null_dim) for (_, task, _), found in compared.found.items()]
     [('pose', 1), ('position', 4)]
     """

@@ -74,13 +74,13 @@ def compare_visited(
     Examples
     --------
     >>> import ikns
-    >>> person = ikns.virtual_subject(1)
     >>> run = ikns.simulate_protocol(
-    ...     person, seed=1, rate=50, static_seconds=1, free_seconds=1, point_seconds=1
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
     ... )
+    >>> body = run.subject.skeleton
     >>> motion = run.points.truth
     >>> learned = ikns.NullSpaceMap(10).fit(*ikns.null_space_samples(motion))
-    >>> found = compare_visited(learned, person.skeleton, motion)
+    >>> found = compare_visited(learned, body, motion)
     >>> found.points.tolist(), bool(found.comparison.angles.max() < np.radians(20))
     ([0, 1, 2, 3, 4, 5, 6, 7, 8, 9], True)
     """
