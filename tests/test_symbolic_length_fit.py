@@ -10,7 +10,7 @@ from ikns.calibration.scaling import MARKER_SD, POSE_SD, size_covariance
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
 from ikns.recording.recording import Recording
 from ikns.symbolic import fit_lengths, markers_in_world
-from ikns.symbolic.length_program import Frames, LengthProgram
+from ikns.symbolic.length_program import FrameData, LengthProgram
 
 FACTORS = dict(
     zip(SEGMENTS, [1.03, 0.97, 1.06, 0.95, 1.04, 0.98, 1.05, 0.96, 1.03], strict=True)
@@ -149,7 +149,7 @@ def small(generic):
     weights = rng.uniform(0.5, 1, (2, 24)) / MARKER_SD**2
     weights[1, 3] = 0
     markers[1, 3] = np.nan
-    return Frames(q, markers, weights, np.full(2, 1 / POSE_SD**2))
+    return FrameData(q, markers, weights, np.full(2, 1 / POSE_SD**2))
 
 
 def written_out(generic, frames, found):

@@ -10,6 +10,8 @@ import small_person
 from ikns.analysis.ucm import (
     across_trials,
     aligned_angles,
+    analyze_points,
+    analyze_trials,
     movement,
     variance_split,
     within_trial,
@@ -89,6 +91,52 @@ def test_motions_that_cannot_be_split_are_refused() -> None:
         within_trial(skeleton, motion, [True])
     with pytest.raises(NotEnoughData, match="empty selection"):
         within_trial(skeleton, motion, motion.time < 0)
+
+
+def test_an_analysis_of_trials_holds_their_split_and_how_long_they_took() -> None:
+    skeleton, motion = truth()
+    trials = repeated(9)
+    found = analyze_trials(skeleton, trials, n_surrogates=19)
+    split = across_trials(skeleton, trials)
+    np.testing.assert_array_equal(found.over_time.split.v_ucm, split.v_ucm)
+    assert found.over_time.interval.low.shape == split.v_ucm.shape
+    assert found.over_time.surrogates.surrogates.shape == (19, *split.v_ucm.shape)
+    cut = movement(motion.time, motion.hand_speed("right_arm"))
+    assert found.durations.tolist() == [np.ptp(motion.time[cut])] * 9
+    assert found.overall.low < split.delta_vz.mean() < found.overall.high
+
+
+def test_errors_name_the_trial() -> None:
+    skeleton, motion = truth()
+    still = replace(motion, hand_velocity_in_thorax=0 * motion.hand_velocity_in_thorax)
+    trials = [*repeated(8), still]
+    with pytest.raises(NotEnoughData, match=r"^trial 9: expected a movement"):
+        analyze_trials(skeleton, trials)
+    names = [f"reach {i}" for i in range(9)]
+    with pytest.raises(NotEnoughData, match=r"^reach 8: expected a movement"):
+        analyze_trials(skeleton, trials, names=names)
+    with pytest.raises(InvalidInput, match="one name a trial, found 1 for 9"):
+        analyze_trials(skeleton, trials, names=["reach"])
+
+
+def test_an_analysis_of_points_splits_the_still_samples_near_each() -> None:
+    skeleton, motion = truth()
+    learned = small_person.subject().null_space_map
+    found = analyze_points(skeleton, motion, learned, task="pose", n_surrogates=19)
+    x = motion.task_position("right_arm")
+    far = np.linalg.norm(x[:, None] - learned.centers_, axis=2)
+    for k, analysis in found.points.items():
+        near = still_mask(motion) & (far.argmin(axis=1) == k)
+        near &= far[:, k] <= learned.radius_
+        assert found.counts[k] == near.sum()
+        split = within_trial(skeleton, motion, near, task="pose")
+        assert analysis.split.v_ucm == split.v_ucm
+        assert analysis.surrogates.surrogates.shape == (19,)
+    # Points are held for 1.5 s at 50 Hz; one that asks for more than the longest rest
+    # near it is left out.
+    longest = found.counts.max() / 50
+    with pytest.raises(NotEnoughData, match=f"found {found.counts.max()} at most"):
+        analyze_points(skeleton, motion, learned, min_still=longest + 0.1)
 
 
 @pytest.mark.parametrize("name", ["ADL001", "ADL005"])

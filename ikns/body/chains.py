@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ikns.errors import InvalidInput
 
-__all__ = ["CHAINS", "SIDES", "chain_joints", "chain_sides"]
+__all__ = ["CHAINS", "SIDES", "chain_joints", "chain_sides", "clavicle_counterpart"]
 
 #: Order of the side axis of every per-hand array.
 SIDES = ("right", "left")
@@ -54,3 +54,19 @@ def chain_sides(chain: str) -> tuple[str, ...]:
     """Return the sides whose hands carry out the chain's task."""
     joints = chain_joints(chain)
     return tuple(side for side in SIDES if any(j.startswith(side) for j in joints))
+
+
+def clavicle_counterpart(chain: str) -> str | None:
+    """Return the same arm with the clavicle, or without it where the chain has it.
+
+    None for a chain that has no such counterpart.
+
+    Examples
+    --------
+    >>> clavicle_counterpart("right_arm"), clavicle_counterpart("both_arms")
+    ('right_arm_clavicle', None)
+    """
+    suffix = "_clavicle"
+    bare = chain.removesuffix(suffix)
+    other = bare if bare != chain else chain + suffix
+    return other if other in CHAINS else None

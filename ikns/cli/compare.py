@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["compare", "comparison_rows", "comparison_table"]
 
-_CLAVICLE = "_clavicle"
-
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
 
@@ -74,7 +72,7 @@ def compare(
     the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
     line along Z leads the hand; how far the null space bends; and crosstalk.
     """
-    from ikns.analysis.compare import COORDINATES, motion_crosstalk
+    from ikns.analysis.compare import motion_crosstalk
     from ikns.calibration import track_chain
 
     refuse_picture(figure, force=force)
@@ -93,17 +91,17 @@ def compare(
     rows, warned = comparison_rows(
         calibrated, motion, source=str(recording), task=first
     )
-    options = {"resamples": intervals, "seed": seed}
-    found, untold = _findings(
+    options: dict[str, Any] = {"resamples": intervals, "seed": seed}
+    found, left_out = _combinations(
         calibrated,
         motion,
         source=str(recording),
         tasks=("pose", "position") if task == "both" else (first,),
-        chains=(own, *(_other(own) if chain == "both" else ())),
-        coordinates=COORDINATES if coordinates == "all" else (coordinates,),
+        chain=chain,
+        coordinates=coordinates,
         options=options,
     )
-    warned += untold
+    warned += left_out
     across = None
     with naming(str(reaches or recording)):
         try:
@@ -155,58 +153,38 @@ def compare(
     )
 
 
-def _other(chain: str) -> tuple[str, ...]:
-    """Return the same arm with the clavicle, or without where the chain has it."""
-    from ikns.body.chains import CHAINS
-
-    other = (
-        chain.removesuffix(_CLAVICLE)
-        if chain.endswith(_CLAVICLE)
-        else chain + _CLAVICLE
-    )
-    return (other,) if other in CHAINS else ()
-
-
-def _findings(
+def _combinations(
     subject: ikns.Subject,
     motion: ikns.Motion,
     *,
     source: str,
     tasks: tuple[Literal["pose", "position"], ...],
-    chains: tuple[str, ...],
-    coordinates: tuple[str, ...],
+    chain: str,
+    coordinates: str,
     options: dict[str, Any],
 ) -> tuple[list[Named], list[str]]:
-    """Compare in every combination; tell of other chains that cannot be compared."""
-    from ikns.analysis.compare import compare_motion
+    """Return the comparisons asked for, and warnings of chains that have none."""
+    from ikns.analysis.compare import COORDINATES, compare_combinations
+    from ikns.body.chains import clavicle_counterpart
 
-    found: list[Named] = []
-    untold: list[str] = []
-    for chain in chains:
-        for task in tasks:
-            for name in coordinates:
-                try:
-                    with naming(source):
-                        each = compare_motion(
-                            subject.null_space_map,
-                            subject.skeleton,
-                            motion,
-                            chain=subject.chain,
-                            analyzed=chain,
-                            task=task,
-                            coordinates=name,
-                            **options,
-                        )
-                except NotEnoughData as error:
-                    if chain == subject.chain:
-                        raise
-                    untold.append(f"{chain} left out: {error}")
-                    break
-                found.append(((chain, task, name), each))
-            else:
-                continue
-            break
-    return found, untold
+    own = subject.chain
+    other = clavicle_counterpart(own) if chain == "both" else None
+    with naming(source):
+        compared = compare_combinations(
+            subject.null_space_map,
+            subject.skeleton,
+            motion,
+            chain=own,
+            chains=(own,) if other is None else (own, other),
+            tasks=tasks,
+            coordinates=COORDINATES if coordinates == "all" else (coordinates,),
+            **options,
+        )
+    reasons = compared.left_out.items()
+    return (
+        list(compared.found.items()),
+        [f"{name} left out: {source}: {reason}" for name, reason in reasons],
+    )
 
 
 def _draw(path: Path, found: list[Named], across: Any, *, simulated: bool) -> None:
@@ -233,49 +211,32 @@ def comparison_rows(
     """
     import numpy as np
 
-    from ikns.nullspace.clustering import nearest_center
+    from ikns.analysis.compare import compare_visited
     from ikns.nullspace.map import MapWarning
 
-    learned, chain = subject.null_space_map, subject.chain
     with naming(source), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
-        x, _ = ikns.null_space_samples(motion, chain)
-        near, _ = nearest_center(x, learned.centers_, radius=learned.radius_)
-        counts = np.bincount(near[near >= 0], minlength=len(learned.centers_))
-        # The analytic map needs samples at each of its points.
-        visited = np.flatnonzero(counts > 0)
-        if not visited.size:
-            raise NotEnoughData("expected still samples near a PCA point, found none.")
-        some = ikns.NullSpaceMap.from_arrays(
-            learned.centers_[visited],
-            learned.directions_[visited],
-            learned.lower_[visited],
-            learned.upper_[visited],
-        )
-        some.radius_ = learned.radius_
-        analytic = ikns.analytic_map(
+        visited = compare_visited(
+            subject.null_space_map,
             subject.skeleton,
             motion,
-            some.centers_,
-            chain=chain,
+            chain=subject.chain,
             task=task,
-            radius=learned.radius_,
-            n_dof=learned.n_dof,
-            reference=some.directions_.sum(axis=0),
         )
-        found = ikns.compare(some, analytic, motion, chain=chain)
+    found = visited.comparison
     rows: list[dict[str, Any]] = [
-        {"point": k + 1, "samples": int(count)} for k, count in enumerate(counts)
+        {"point": k + 1, "samples": int(count)}
+        for k, count in enumerate(visited.counts)
     ]
-    for i, k in enumerate(visited):
+    for i, k in enumerate(visited.points):
         rows[k] |= {
             "angle_deg": np.degrees(found.angles[i]).tolist(),
             "inside": float(found.inside[i]),
             "learned_leak_m": float(found.learned_leak[i]),
             "analytic_leak_m": float(found.analytic_leak[i]),
             "agreement": float(found.agreement[i]),
-            "learned_direction": some.directions_[i].tolist(),
-            "analytic_direction": analytic.directions_[i].tolist(),
+            "learned_direction": visited.learned.directions_[i].tolist(),
+            "analytic_direction": visited.analytic.directions_[i].tolist(),
         }
     return rows, [f"analytic map: {warning.message}" for warning in caught]
 

@@ -18,7 +18,7 @@ from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
     from ikns.statistics.assumed_spread import AssumedSpread
-    from ikns.statistics.plan import Plan
+    from ikns.statistics.plan import SamplingPlan
     from ikns.statistics.power import Power
 
 __all__ = ["plan"]
@@ -186,7 +186,7 @@ def _assumption(found: AssumedSpread, design: Planned) -> str:
     )
 
 
-def _curve_table(made: Plan, title: str) -> Any:
+def _curve_table(made: SamplingPlan, title: str) -> Any:
     needed, declared = made.size.subjects, made.declared
 
     def mark(power: Power) -> str:
@@ -214,7 +214,7 @@ def _result(
     pilot: Path | None,
     design: Planned,
     assumed: Assumed,
-    made: Plan,
+    made: SamplingPlan,
 ) -> dict[str, Any]:
     quantity, unit, _ = _VALUE[design.experiment]
     size = made.size
@@ -258,7 +258,13 @@ def _result(
 
 
 def _draw(
-    path: Path, made: Plan, assumed: Assumed, *, aim: str, target: float, said: str
+    path: Path,
+    made: SamplingPlan,
+    assumed: Assumed,
+    *,
+    aim: str,
+    target: float,
+    said: str,
 ) -> None:
     from ikns.view.power import power_figure
 

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import ikns
 from ikns.cli.output import table
-from ikns.errors import NotEnoughData, naming
+from ikns.errors import naming
 
 if TYPE_CHECKING:
-    from ikns.analysis.ucm import Interval, SurrogateTest, VarianceSplit
+    from ikns.analysis.ucm import SplitAnalysis
 
 __all__ = ["Found", "over_points", "over_time"]
 
-#: A held hand shows something from this time of still samples on, s; as in calibration.
-_LEAST_STILL = 0.5
 #: Which normalized times the table shows, %; JSON has all.
 _SHOWN = range(0, 101, 10)
 
@@ -53,30 +51,25 @@ def over_time(
     """Split the variance over repetitions, at each normalized time."""
     import numpy as np
 
-    from ikns.analysis.ucm import (
-        across_trials,
-        confidence_interval,
-        movement,
-        surrogate_test,
-    )
+    from ikns.analysis.ucm import analyze_trials
 
     chain = subject.chain
-    durations = []
-    for motion, source in zip(motions, sources, strict=True):
-        with naming(source):
-            cut = movement(motion.time, motion.hand_speed(chain), threshold=speed)
-        durations.append(float(np.ptp(motion.time[cut])))
-    with naming(f"{len(sources)} recordings"):
-        split = across_trials(
-            subject.skeleton, motions, chain=chain, task=task, threshold=speed
-        )
-    test = surrogate_test(split, n_surrogates=surrogates, seed=seed)
-    each = confidence_interval(split)
-    overall = confidence_interval(split, overall=True)
+    found = analyze_trials(
+        subject.skeleton,
+        motions,
+        chain=chain,
+        task=task,
+        threshold=speed,
+        n_surrogates=surrogates,
+        seed=seed,
+        names=sources,
+    )
+    analysis, overall = found.over_time, found.overall
+    split, test = analysis.split, analysis.surrogates
     percent = np.linspace(0, 100, len(split.v_ucm))
     rows = [
         {"time_percent": float(at)} | row
-        for at, row in zip(percent, _rows(split, test, each), strict=True)
+        for at, row in zip(percent, _rows(analysis), strict=True)
     ]
     lost = int(split.rank_lost.sum())
     warned = [
@@ -86,11 +79,11 @@ def over_time(
     result = {
         "design": "across trials",
         "trials": len(motions),
-        "movement_s": durations,
+        "movement_s": found.durations.tolist(),
         "overall": {
             "delta_vz": overall.estimate,
             "delta_vz_interval": [overall.low, overall.high],
-            "delta_vz_no_structure": _no_structure(split),
+            "delta_vz_no_structure": split.no_structure,
             "surrogates_mean": np.nanmean(test.mean),
             "p": test.p_overall,
         },
@@ -101,11 +94,11 @@ def over_time(
     shown = [
         _table(title, "time %", "time_percent", ".0f", [rows[i] for i in _SHOWN]),
         f"dVz over the whole movement {overall.estimate:.2f} "
-        f"({overall.low:.2f} to {overall.high:.2f}; {_no_structure(split):.2f} is no "
+        f"({overall.low:.2f} to {overall.high:.2f}; {split.no_structure:.2f} is no "
         f"structure), with joints shuffled {np.nanmean(test.mean):.2f}, "
         f"p = {test.p_overall:.3g}",
     ]
-    return Found(result, shown, {"at": percent} | _drawn(split, test, each))
+    return Found(result, shown, {"at": percent} | _drawn(analysis))
 
 
 def over_points(
@@ -121,60 +114,46 @@ def over_points(
     """Split the variance over the still samples at each PCA point."""
     import numpy as np
 
-    from ikns.analysis.ucm import confidence_interval, surrogate_test, within_trial
-    from ikns.nullspace.clustering import nearest_center
-    from ikns.nullspace.map import still_mask
+    from ikns.analysis.ucm import analyze_points
 
     (motion,), (source,) = motions, sources
-    chain, learned = subject.chain, subject.null_space_map
-    gate = still_mask(motion, chain, max_hand_speed=speed)
-    near = np.full(len(gate), -1)
-    if gate.any():
-        places = motion.task_position(chain)[gate]
-        near[gate] = nearest_center(places, learned.centers_, radius=learned.radius_)[0]
-    n_points, n_joints = len(learned.centers_), learned.directions_.shape[-1]
-    counts = np.bincount(near[near >= 0], minlength=n_points)
-    step = float(np.median(np.diff(motion.time)))
-    least = max(n_joints + 1, int(np.ceil(_LEAST_STILL / step)))
-    rows: list[dict[str, Any]] = [
-        {"point": k + 1, "samples": int(count)} for k, count in enumerate(counts)
-    ]
-    if counts.max() < least:
-        raise NotEnoughData(
-            f"{source}: expected at least {least} samples with the hand slower than "
-            f"{speed:g} m/s near a PCA point, found {counts.max()} at most."
+    with naming(source):
+        found = analyze_points(
+            subject.skeleton,
+            motion,
+            subject.null_space_map,
+            chain=subject.chain,
+            task=task,
+            max_hand_speed=speed,
+            n_surrogates=surrogates,
+            seed=seed,
         )
-    results = []
-    for k in np.flatnonzero(counts >= least).tolist():
-        with naming(f"{source}: PCA point {k + 1}"):
-            split = within_trial(
-                subject.skeleton, motion, near == k, chain=chain, task=task
-            )
-        test = surrogate_test(split, n_surrogates=surrogates, by="shift", seed=seed)
-        each = confidence_interval(split, method="bootstrap", seed=seed)
-        rows[k] |= _rows(split, test, each)[0]
-        results.append({"at": k + 1} | _drawn(split, test, each))
+    rows: list[dict[str, Any]] = [
+        {"point": k + 1, "samples": int(count)} for k, count in enumerate(found.counts)
+    ]
+    for k, analysis in found.points.items():
+        rows[k] |= _rows(analysis)[0]
     warned = [
         "samples with a still hand are chosen by the task, which by itself makes V_ORT "
         "small; compare people, points and tasks, not with zero."
     ]
     result = {"design": "within a trial", "points": rows, "warnings": warned}
-    title = f"{source}: still samples of {chain} at each PCA point, hand {task}"
+    title = f"{source}: still samples of {subject.chain} at each PCA point, hand {task}"
+    points = [{"at": k + 1} | _drawn(each) for k, each in found.points.items()]
     drawn: dict[str, Any] = {
-        key: np.stack([one[key] for one in results], axis=-1)
-        for key in results[0]
+        key: np.stack([one[key] for one in points], axis=-1)
+        for key in points[0]
         if key != "no_structure"
     }
-    drawn |= {"no_structure": results[0]["no_structure"], "over": "points"}
+    drawn |= {"no_structure": points[0]["no_structure"], "over": "points"}
     shown = [_table(title, "point", "point", "d", rows)]
     return Found(result, shown, drawn)
 
 
-def _rows(
-    split: VarianceSplit, test: SurrogateTest, interval: Interval
-) -> list[dict[str, Any]]:
+def _rows(analysis: SplitAnalysis) -> list[dict[str, Any]]:
     import numpy as np
 
+    split, interval, test = analysis.split, analysis.interval, analysis.surrogates
     columns = {
         "samples": split.trials,
         "rank": split.rank,
@@ -193,23 +172,18 @@ def _rows(
     return [dict(zip(columns, row, strict=True)) for row in zip(*arrays, strict=True)]
 
 
-def _drawn(
-    split: VarianceSplit, test: SurrogateTest, interval: Interval
-) -> dict[str, Any]:
+def _drawn(analysis: SplitAnalysis) -> dict[str, Any]:
     import numpy as np
 
+    split, interval = analysis.split, analysis.interval
     return {
         "v_ucm": split.v_ucm,
         "v_ort": split.v_ort,
         "delta_vz": split.delta_vz,
         "interval": np.stack([interval.low, interval.high]),
-        "surrogates": test.band(),
-        "no_structure": _no_structure(split),
+        "surrogates": analysis.surrogates.band(),
+        "no_structure": split.no_structure,
     }
-
-
-def _no_structure(split: VarianceSplit) -> float:
-    return math.log((split.n_joints - split.n_task) / split.n_task) / 2
 
 
 def _table(

@@ -9,7 +9,7 @@ from ikns.errors import InvalidInput
 from ikns.statistics.power import Design, Power, Spread, simulated_power
 from ikns.statistics.sample_size import SampleSize, sample_size
 
-__all__ = ["Plan", "plan_participants"]
+__all__ = ["SamplingPlan", "plan_participants"]
 
 #: At most how many numbers of participants the curve has, and in which steps.
 _PLACES = 14
@@ -17,7 +17,7 @@ _STEPS = [k * 10**power for power in range(7) for k in (1, 2, 5)]
 
 
 @dataclass(frozen=True)
-class Plan:
+class SamplingPlan:
     """How many participants reach what.
 
     Parameters
@@ -47,7 +47,7 @@ def plan_participants(
     most: int = 500,
     simulations: int = 10_000,
     seed: int = 0,
-) -> Plan:
+) -> SamplingPlan:
     """Power of ever more participants, up to half more than are needed.
 
     Parameters
@@ -100,7 +100,7 @@ def plan_participants(
             seed=seed + n,
             **aim,  # type: ignore[arg-type]
         )
-    return Plan(
+    return SamplingPlan(
         tuple(known[n] for n in sorted(numbers)),
         size,
         known[participants] if participants else None,

@@ -38,7 +38,7 @@ from ikns.calibration.scaling import (
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.marker_ik import MarkerIK
 from ikns.recording.recording import Recording
-from ikns.symbolic.length_program import Frames, LengthProgram, Solution
+from ikns.symbolic.length_program import FrameData, LengthProgram, Solution
 
 __all__ = ["LengthFit", "fit_lengths"]
 
@@ -172,7 +172,7 @@ def fit_lengths(
     sd = marker_sd or _spread(scaled, q, markers)
     q = np.vstack([first.q, q])
     for _ in range(_ROUNDS):
-        frames = Frames(
+        frames = FrameData(
             q=q,
             markers=np.concatenate([target[None], every]),
             weights=np.vstack([in_static, worth * trust / sd**2]),

@@ -21,7 +21,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.scaling import size_covariance
 from ikns.symbolic.kinematics import sized_markers
 
-__all__ = ["Frames", "LengthProgram", "Solution"]
+__all__ = ["FrameData", "LengthProgram", "Solution"]
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ _IPOPT: dict[str, Any] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Frames:
+class FrameData:
     """What was seen, and where each posture starts.
 
     Parameters
@@ -172,7 +172,7 @@ class LengthProgram:
         }
         self._solver = ca.nlpsol("lengths", "ipopt", problem, options)
 
-    def solve(self, frames: Frames, log_sizes: Array, offsets: Array) -> Solution:
+    def solve(self, frames: FrameData, log_sizes: Array, offsets: Array) -> Solution:
         """Minimize from these sizes (S,), offsets (M, 3) m and postures."""
         n, f = self._n, self._frames
         x = np.hstack([frames.q[:, :3], np.zeros((f, 3)), frames.q[:, 7:]])

@@ -5,57 +5,58 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.analysis.compare.coordinates import Coordinates
+from ikns.analysis.compare.coordinates import Coordinates, shoulder_coordinates
 from ikns.analysis.compare.kinematics import Kinematics
+from ikns.analysis.compare.map_samples import MapSamples
 
-__all__ = ["recast"]
+__all__ = ["change_coordinates"]
 
 Array = NDArray[np.float64]
 
 
-def recast(
-    there: Coordinates,
-    columns: list[int],
-    labels: NDArray[np.int64],
-    q: Array,
-    jacobians: Array,
-    directions: Array,
-    kinematics: list[Kinematics],
-) -> tuple[Array, Array, Array, list[Kinematics]]:
-    """Write one shoulder in other coordinates; arguments are left as they are.
+def change_coordinates(
+    samples: MapSamples, name: str, columns: list[int]
+) -> MapSamples:
+    """Write one shoulder in other coordinates.
 
     Parameters
     ----------
-    there : Coordinates
+    samples : MapSamples
+        In internal angles.
+    name : str
+        One of :data:`ikns.analysis.compare.COORDINATES`; a rotation vector starts from
+        the mean posture of all samples.
     columns : list of 3 int
         The shoulder's joints.
-    labels : (N,) integer array
-        PCA point of each sample, -1 for none.
-    q, jacobians, directions, kinematics
-        As for :func:`ikns.analysis.compare.compare_samples`, in internal angles.
 
     Returns
     -------
-    q : (N, n) array
-        Without jumps of a full turn among the samples of a point.
-    jacobians : (N, k, n) array
-        By the chain rule.
-    directions : (P, d, n) array
-        By the rates at each point's mean posture; unit length, not orthogonal.
-    kinematics : list of Kinematics
+    MapSamples
+        `q` without jumps of a full turn among the samples of a point; `jacobians` by
+        the chain rule; `directions` by the rates at each point's mean posture, of unit
+        length but not orthogonal. Ranges are those of the internal angles.
     """
-    turned = np.array(directions)
-    for k in range(len(turned)):
+    q, labels = samples.q, samples.labels
+    there = shoulder_coordinates(name, q[:, columns].mean(axis=0))
+    Z = np.array(samples.directions)
+    for k in range(len(Z)):
         B = there.rates(q[labels == k][:, columns].mean(axis=0))
-        turned[k][:, columns] = np.linalg.solve(B, turned[k][:, columns].T).T
-    turned /= np.linalg.norm(turned, axis=2, keepdims=True)
-    J, y = np.array(jacobians), np.array(q)
+        Z[k][:, columns] = np.linalg.solve(B, Z[k][:, columns].T).T
+    Z /= np.linalg.norm(Z, axis=2, keepdims=True)
+    J, y = np.array(samples.jacobians), np.array(q)
     J[:, :, columns] = J[:, :, columns] @ there.rates(q[:, columns])
     y[:, columns] = _unwrapped(there.from_internal(q[:, columns]), labels)
-    return y, J, turned, [_seen_in(there, columns, own) for own in kinematics]
+    return samples._replace(
+        q=y,
+        jacobians=J,
+        directions=Z,
+        kinematics=[_in_coordinates(there, columns, own) for own in samples.kinematics],
+    )
 
 
-def _seen_in(there: Coordinates, columns: list[int], own: Kinematics) -> Kinematics:
+def _in_coordinates(
+    there: Coordinates, columns: list[int], own: Kinematics
+) -> Kinematics:
     """Kinematics that takes joint vectors in other coordinates."""
 
     def internal(y: Array) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.analysis.compare.kinematics import Kinematics
 from ikns.numerics.subspace import mean_null_direction, principal_angles
 
 __all__ = ["null_turn", "straight_departure"]
@@ -45,22 +46,32 @@ def null_turn(c: Array, jacobians: Array, null_dim: int) -> float:
 
 
 def straight_departure(
-    place: tuple[Array, Array], ends: tuple[Array, Array]
+    kinematics: Kinematics | None, mean: Array, Z: Array, lower: Array, upper: Array
 ) -> tuple[float, float]:
     """How far the hand strays when the joints go straight along Z to its ends.
 
     Parameters
     ----------
-    place : ((3,) array, (3, 3) array)
-        Hand position, m, and orientation at the mean posture.
-    ends : ((E, 3) array, (E, 3, 3) array)
-        The same at the ends of the straight lines.
+    kinematics : Kinematics, optional
+    mean : (n,) array
+        Mean posture, where the lines start, rad.
+    Z : (d, n) array
+        Directions.
+    lower, upper : (d,) array
+        m and M, rad.
 
     Returns
     -------
     (float, float)
-        At the worst end: m and rad.
+        At the worst end: m and rad; NaN without kinematics.
     """
-    away = np.linalg.norm(ends[0] - place[0], axis=1)
-    turned = Rotation.from_matrix(ends[1]) * Rotation.from_matrix(place[1]).inv()
+    if kinematics is None:
+        return float("nan"), float("nan")
+    now = Z @ mean
+    steps = np.concatenate([lower - now, upper - now])
+    ends = mean + steps[:, None] * np.concatenate([Z, Z])
+    place, rotation = kinematics.pose(mean)
+    places, rotations = kinematics.pose(ends)
+    away = np.linalg.norm(places - place, axis=1)
+    turned = Rotation.from_matrix(rotations) * Rotation.from_matrix(rotation).inv()
     return float(away.max()), float(turned.magnitude().max())

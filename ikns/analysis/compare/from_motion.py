@@ -1,28 +1,30 @@
-"""From a motion and a skeleton, or a robot's recording, to plain arrays."""
+"""Compare a map with the null spaces of an arm, from a motion and a skeleton."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ikns.analysis.compare.change_coordinates import recast
-from ikns.analysis.compare.coordinates import shoulder_coordinates
+from ikns.analysis.compare.change_coordinates import change_coordinates
 from ikns.analysis.compare.kinematics import Kinematics
+from ikns.analysis.compare.map_samples import (
+    MapSamples,
+    compare_map_samples,
+    learn_again,
+    visited_points,
+)
 from ikns.analysis.compare.reaching import Crosstalk, crosstalk
-from ikns.analysis.compare.samples import NullSpaceComparison, compare_samples
-from ikns.analysis.compare.subspaces import learned_directions
+from ikns.analysis.compare.samples import NullSpaceComparison
 from ikns.body.chains import SIDES, chain_joints, chain_sides
-from ikns.body.skeleton import Robot, Skeleton
-from ikns.errors import InvalidInput, NotEnoughData
+from ikns.body.skeleton import Skeleton
+from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
-from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap, still_mask
 
-__all__ = ["compare_motion", "compare_robot", "motion_crosstalk"]
+__all__ = ["compare_motion", "motion_crosstalk"]
 
 Array = NDArray[np.float64]
 
@@ -84,133 +86,44 @@ def compare_motion(
         When no point has enough still samples, or see :func:`compare_samples`.
     """
     whole = chain if analyzed is None else analyzed
-    if chain_sides(whole) != chain_sides(chain):
-        raise InvalidInput(
-            f"expected a chain that ends in the {' and '.join(chain_sides(chain))} "
-            f"hand as the map's {chain} does, found {whole}."
-        )
-    if learned.directions_.shape[2] != len(chain_joints(chain)):
-        raise InvalidInput(
-            f"expected a map of {chain} with {len(chain_joints(chain))} joints, found "
-            f"one of {learned.directions_.shape[2]}."
-        )
+    _check_chains(learned, chain, whole)
+    names = chain_joints(whole)
     gate = still_mask(
         motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration
     )
     gate &= np.isfinite(motion.chain_angles(whole)).all(axis=1)
-    x, angles = motion.task_position(chain)[gate], motion.angles[gate]
-    q = motion.chain_angles(whole)[gate]
-    if not len(x):
-        raise NotEnoughData(
-            f"expected samples with the hand slower than {max_hand_speed:g} m/s, found "
-            "none."
-        )
-    labels, points = _visited(learned, x, q.shape[1])
-    names = chain_joints(whole)
-    columns = [motion.joint_names.index(name) for name in names]
-    sides = [SIDES.index(side) for side in chain_sides(whole)]
-
-    def kinematics(point: int) -> Kinematics:
-        rest = angles[labels == point].mean(axis=0)
-
-        def posture(given: Array) -> Array:
-            full = np.broadcast_to(rest, (*given.shape[:-1], len(rest))).copy()
-            full[..., columns] = given
-            return full
-
-        def pose(given: Array) -> tuple[Array, Array]:
-            place, turn = skeleton.hands_in_thorax(posture(given))
-            return place[..., sides, :].mean(axis=-2), turn[..., sides[0], :, :]
-
-        return Kinematics(
-            pose, lambda y: skeleton.chain_jacobian(posture(y), whole, task=task)
-        )
-
-    reference = _embedded(learned.directions_[points], chain_joints(chain), names)
-    return _compared(
-        motion.time[gate],
-        q,
-        skeleton.chain_jacobian(angles, whole, task=task),
-        x,
-        motion.hand_rotation_in_thorax[gate][:, sides[0]],
-        labels,
-        points,
-        reference,
-        (learned.lower_[points], learned.upper_[points]),
-        [kinematics(k) for k in range(len(points))],
-        shoulders=_shoulders(names),
-        coordinates=coordinates,
-        again=whole != chain,
-        variance=learned.variance,
-        options=options,
+    still = np.flatnonzero(gate)
+    labels, points = visited_points(
+        learned,
+        motion.task_position(chain)[still],
+        len(names),
+        max_hand_speed=max_hand_speed,
     )
-
-
-def compare_robot(
-    learned: NullSpaceMap,
-    robot: Robot,
-    time: ArrayLike,
-    q: ArrayLike,
-    *,
-    task: Literal["pose", "position"] = "pose",
-    max_hand_speed: float = 0.05,
-    **options: Any,
-) -> NullSpaceComparison:
-    """Compare a map learned from a robot's joint angles with its null spaces.
-
-    Parameters
-    ----------
-    learned : NullSpaceMap
-        Of all the robot's joints.
-    robot : Robot
-    time : (T,) array
-        s, increasing.
-    q : (T, n) array
-        Joint angles, rad.
-    task : {"pose", "position"}
-        What is held.
-    max_hand_speed : float
-        Gate on the frame's speed, m/s.
-    **options
-        Of :func:`ikns.analysis.compare.compare_samples`.
-
-    Raises
-    ------
-    InvalidInput, NotEnoughData
-        As :func:`compare_motion`.
-    """
-    t, angles = (np.asarray(given, dtype=np.float64) for given in (time, q))
-    n = len(robot.joint_names)
-    if angles.shape != (len(t), n) or learned.directions_.shape[2] != n:
-        raise InvalidInput(
-            f"expected joint angles (T, {n}) and a map of {n} joints, found "
-            f"{angles.shape} and {learned.directions_.shape[2]}."
-        )
-    x, R = robot.pose(angles)
-    speed = np.linalg.norm(np.gradient(x, t, axis=0), axis=1)
-    gate = np.isfinite(x).all(axis=1) & (speed < max_hand_speed)
-    if not gate.any():
-        raise NotEnoughData(
-            f"expected samples with the hand slower than {max_hand_speed:g} m/s, found "
-            "none."
-        )
-    labels, points = _visited(learned, x[gate], n)
-    return _compared(
-        t[gate],
-        angles[gate],
-        robot.jacobian(angles[gate], task=task),
-        x[gate],
-        R[gate],
-        labels,
-        points,
-        learned.directions_[points],
-        (learned.lower_[points], learned.upper_[points]),
-        [Kinematics(robot.pose, lambda y: robot.jacobian(y, task=task))] * len(points),
-        shoulders=[],
-        coordinates="internal",
-        again=False,
-        variance=learned.variance,
-        options=options,
+    used, labels = still[labels >= 0], labels[labels >= 0]
+    angles = motion.angles[used]
+    columns = [motion.joint_names.index(name) for name in names]
+    rest = [angles[labels == k].mean(axis=0) for k in range(len(points))]
+    samples = MapSamples(
+        time=motion.time[used],
+        q=motion.chain_angles(whole)[used],
+        jacobians=skeleton.chain_jacobian(angles, whole, task=task),
+        position=motion.task_position(chain)[used],
+        rotation=motion.hand_rotation_in_thorax[used][
+            :, SIDES.index(chain_sides(whole)[0])
+        ],
+        labels=labels,
+        directions=_embedded(learned.directions_[points], chain_joints(chain), names),
+        lower=learned.lower_[points],
+        upper=learned.upper_[points],
+        kinematics=[_kinematics(skeleton, whole, task, columns, q) for q in rest],
+    )
+    if coordinates != "internal":
+        for shoulder in _shoulders(names):
+            samples = change_coordinates(samples, coordinates, shoulder)
+    if whole != chain or coordinates != "internal":
+        samples = learn_again(samples, variance=learned.variance)
+    return compare_map_samples(
+        samples, points, variance=learned.variance, options=options
     )
 
 
@@ -246,22 +159,37 @@ def motion_crosstalk(
     )
 
 
-def _visited(
-    learned: NullSpaceMap, x: Array, n: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Label samples by the points that have enough of them; and those points."""
-    radius = getattr(learned, "radius_", None)
-    near, _ = nearest_center(x, learned.centers_, radius=radius)
-    counts = np.bincount(near[near >= 0], minlength=len(learned.centers_))
-    points = np.flatnonzero(counts >= 2 * n)
-    if not points.size:
-        raise NotEnoughData(
-            f"expected {2 * n} still samples or more near a PCA point, found "
-            f"{counts.max()}."
+def _check_chains(learned: NullSpaceMap, chain: str, whole: str) -> None:
+    if chain_sides(whole) != chain_sides(chain):
+        raise InvalidInput(
+            f"expected a chain that ends in the {' and '.join(chain_sides(chain))} "
+            f"hand as the map's {chain} does, found {whole}."
         )
-    number = np.full(len(counts) + 1, -1)  # the last stands for none
-    number[points] = np.arange(len(points))
-    return number[near], points
+    if learned.directions_.shape[2] != len(chain_joints(chain)):
+        raise InvalidInput(
+            f"expected a map of {chain} with {len(chain_joints(chain))} joints, found "
+            f"one of {learned.directions_.shape[2]}."
+        )
+
+
+def _kinematics(
+    skeleton: Skeleton, chain: str, task: str, columns: list[int], rest: Array
+) -> Kinematics:
+    """Kinematics of a chain's hands; the other joints stay as in `rest` (18,) rad."""
+    sides = [SIDES.index(side) for side in chain_sides(chain)]
+
+    def posture(given: Array) -> Array:
+        full = np.broadcast_to(rest, (*given.shape[:-1], len(rest))).copy()
+        full[..., columns] = given
+        return full
+
+    def pose(given: Array) -> tuple[Array, Array]:
+        place, turn = skeleton.hands_in_thorax(posture(given))
+        return place[..., sides, :].mean(axis=-2), turn[..., sides[0], :, :]
+
+    return Kinematics(
+        pose, lambda y: skeleton.chain_jacobian(posture(y), chain, task=task)
+    )
 
 
 def _embedded(Z: Array, own: Sequence[str], names: Sequence[str]) -> Array:
@@ -280,59 +208,3 @@ def _shoulders(names: Sequence[str]) -> list[list[int]]:
         for side in SIDES
         if f"{side}_{_SHOULDER[0]}" in names
     ]
-
-
-def _compared(
-    time: Array,
-    q: Array,
-    jacobians: Array,
-    position: Array,
-    rotation: Array,
-    labels: NDArray[np.int64],
-    points: NDArray[np.int64],
-    directions: Array,
-    ranges: tuple[Array, Array],
-    kinematics: list[Kinematics],
-    *,
-    shoulders: list[list[int]],
-    coordinates: str,
-    again: bool,
-    variance: float,
-    options: dict[str, Any],
-) -> NullSpaceComparison:
-    used = labels >= 0
-    if coordinates != "internal":
-        again = True
-        for columns in shoulders:
-            middle = q[used][:, columns].mean(axis=0)
-            there = shoulder_coordinates(coordinates, middle)
-            q, jacobians, directions, kinematics = recast(
-                there, columns, labels, q, jacobians, directions, kinematics
-            )
-    lower, upper = ranges
-    if again:
-        rows = [q[labels == k] for k in range(len(points))]
-        directions = np.stack(
-            [
-                learned_directions(own, Z, variance=variance)
-                for own, Z in zip(rows, directions, strict=True)
-            ]
-        )
-        along = [own @ Z.T for own, Z in zip(rows, directions, strict=True)]
-        lower = np.stack([c.min(axis=0) for c in along])
-        upper = np.stack([c.max(axis=0) for c in along])
-    found = compare_samples(
-        time[used],
-        q[used],
-        jacobians[used],
-        position[used],
-        rotation[used],
-        labels[used],
-        directions,
-        lower,
-        upper,
-        kinematics=kinematics,
-        variance=variance,
-        **options,
-    )
-    return dataclasses.replace(found, points=points)

@@ -2,13 +2,65 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-__all__ = ["hand_turns", "slope_scores", "slopes"]
+from ikns.analysis.compare.resampling import draw
+from ikns.numerics.bootstrap import length_interval
+
+__all__ = ["HandSlope", "hand_slope", "hand_turns", "slope_scores", "slopes"]
 
 Array = NDArray[np.float64]
+
+
+class HandSlope(NamedTuple):
+    """How the hand moves per unit of each control signal.
+
+    Parameters
+    ----------
+    slope : (d, 3) array
+        m or rad; NaN where a signal has no range.
+    replicates : (B, d, 3) array
+        The same from resamples; empty without an interval.
+    interval : (d, 2) array
+        Of the slopes' lengths; NaN without.
+    blocks : float
+        Blocks that fit into the samples; 0 without an interval.
+    """
+
+    slope: Array
+    replicates: Array
+    interval: Array
+    blocks: float
+
+
+def hand_slope(
+    c: Array,
+    hand: Array,
+    *,
+    resamples: int,
+    level: float,
+    rng: np.random.Generator,
+) -> HandSlope:
+    """Slopes of the hand (N, 3) on the control signals (N, d), with their intervals."""
+    d = c.shape[1]
+    if np.isnan(c).any():
+        slope = np.full((d, hand.shape[1]), np.nan)
+    else:
+        slope = slopes(c, hand)
+    if not resamples or np.isnan(slope).any():
+        none = np.empty((0, *slope.shape))
+        return HandSlope(slope, none, np.full((d, 2), np.nan), 0.0)
+    drawn = draw(slope_scores(c, hand), resamples, rng)
+    replicates = slopes(c, hand, drawn.counts)
+    interval = [
+        length_interval(slope[i], replicates[:, i], drawn.blocks, level=level, rng=rng)
+        for i in range(d)
+    ]
+    return HandSlope(slope, replicates, np.array(interval), drawn.blocks)
 
 
 def slopes(c: Array, hand: Array, counts: Array | None = None) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.analysis.compare.leak import hand_turns, slope_scores, slopes
-from ikns.analysis.compare.subspaces import draw
+from ikns.analysis.compare.resampling import draw
 from ikns.body.chains import SIDES, chain_sides
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
@@ -17,7 +17,7 @@ from ikns.nullspace.map import NullSpaceMap, null_space_samples, still_mask
 from ikns.numerics.bootstrap import length_interval
 from ikns.numerics.subspace import principal_angles
 
-__all__ = ["Comparison", "compare"]
+__all__ = ["MapComparison", "compare"]
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _LEAST = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class MapComparison:
     """What :func:`compare` found, one entry a PCA point.
 
     Parameters
@@ -74,7 +74,7 @@ def compare(
     max_hand_speed: float = 0.05,
     resamples: int = 400,
     seed: int | np.random.Generator = 0,
-) -> Comparison:
+) -> MapComparison:
     """Compare two maps with the same PCA points on a motion.
 
     :func:`ikns.analysis.compare.compare_motion` goes on where this ends: with a
@@ -99,7 +99,7 @@ def compare(
 
     Returns
     -------
-    Comparison
+    MapComparison
 
     Raises
     ------
@@ -142,7 +142,7 @@ def compare(
             inside[i] = float(np.sum(along**2)) / total
         if own.sum() > 2 and all(np.ptp(c) > 0 for c in signals):
             agreement[i] = float(np.corrcoef(signals[0], signals[1])[0, 1])
-    return Comparison(
+    return MapComparison(
         centers=learned.centers_,
         counts=np.bincount(labels[labels >= 0], minlength=n),
         angles=principal_angles(learned.directions_, analytic.directions_),

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.analysis.compare.chance import chance_angles
 from ikns.analysis.compare.checks import checked_samples
 from ikns.analysis.compare.kinematics import Kinematics
-from ikns.analysis.compare.point import PointFindings, look_at
+from ikns.analysis.compare.point import PointFindings, compare_point
 from ikns.analysis.compare.pooling import pool
 
 __all__ = ["NullSpaceComparison", "compare_samples"]
@@ -211,7 +211,7 @@ def compare_samples(
         else list(kinematics)
     )
     points = [
-        look_at(
+        compare_point(
             data,
             k,
             own,

@@ -7,39 +7,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns.numerics.bootstrap import (
-    block_counts,
-    block_length,
-    length_interval,
-    student_interval,
-)
+from ikns.numerics.bootstrap import length_interval, student_interval
 from ikns.numerics.subspace import principal_angles
 
 __all__ = [
-    "Resampled",
     "Subspaces",
     "angle_interval",
     "compare_subspaces",
     "learned_directions",
+    "share_interval",
     "span_covariance",
 ]
 
 Array = NDArray[np.float64]
-
-
-class Resampled(NamedTuple):
-    """Blocks drawn from the samples of a point.
-
-    Parameters
-    ----------
-    counts : (B, N) array
-        How often each sample was drawn.
-    blocks : float
-        Blocks that fit into the samples.
-    """
-
-    counts: Array
-    blocks: float
 
 
 class Subspaces(NamedTuple):
@@ -108,31 +88,6 @@ def span_covariance(S: Array, reference: Array, variance: float = 0.8) -> Array:
     return np.asarray(total / np.linalg.norm(total, axis=-1, keepdims=True))[
         ..., None, :
     ]
-
-
-def covariances(q: Array, counts: Array) -> tuple[Array, Array]:
-    """Means (B, n) and scatter matrices (B, n, n) of resampled rows (N, n)."""
-    centered = q - q.mean(axis=0)
-    share = counts / counts.sum(axis=1, keepdims=True)
-    mean = share @ centered
-    second = share @ (centered[:, :, None] * centered[:, None, :]).reshape(len(q), -1)
-    n = q.shape[1]
-    scatter = second.reshape(-1, n, n) - mean[:, :, None] * mean[:, None, :]
-    return mean + q.mean(axis=0), scatter
-
-
-def draw(scores: Array, resamples: int, rng: np.random.Generator) -> Resampled:
-    """Draw blocks as long as these scores (N, m) ask for."""
-    n, length = len(scores), block_length(scores)
-    counts = block_counts(n, length, resamples, rng)
-    return Resampled(counts, n / length)
-
-
-def direction_scores(q: Array, directions: Array) -> Array:
-    """How much each sample turns the directions: along times across, (N, n)."""
-    centered = q - q.mean(axis=0)
-    along = centered @ directions.T
-    return along[:, :1] * (centered - along @ directions)
 
 
 def compare_subspaces(

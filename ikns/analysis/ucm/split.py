@@ -17,6 +17,7 @@ Without structure (V_UCM = V_ORT) it is ln(d/k)/2, not zero; ``delta_vz_correcte
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -102,6 +103,11 @@ class VarianceSplit:
     def delta_vz_corrected(self) -> Array:
         """`delta_vz` less its value without structure, ln(d/k)/2, (...)."""
         return half_log_ratio(self.v_ucm, self.v_ort)
+
+    @property
+    def no_structure(self) -> float:
+        """`delta_vz` of equal V_UCM and V_ORT, ln(d/k)/2."""
+        return math.log((self.n_joints - self.n_task) / self.n_task) / 2
 
     @property
     def rank_lost(self) -> NDArray[np.bool_]:

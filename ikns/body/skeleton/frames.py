@@ -14,12 +14,12 @@ from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton.tree import joint_tree
 from ikns.errors import FileError, InvalidInput
 
-__all__ = ["Frames"]
+__all__ = ["LinkFrames"]
 
 Array = NDArray[np.float64]
 
 
-class Frames:
+class LinkFrames:
     """The links of a model whose joint 0 carries the thorax.
 
     Parameters

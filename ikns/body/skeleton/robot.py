@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from ikns._kernels.body.tree import Tree
-from ikns.body.skeleton.frames import Frames
+from ikns.body.skeleton.frames import LinkFrames
 from ikns.errors import FileError, InvalidInput
 from ikns.numerics.subspace import null_spaces
 
@@ -79,7 +79,7 @@ class Robot:
                 f"{', '.join(links[:_NAMED])}{more}."
             )
         self.frame = frame
-        self._frames = Frames(model)
+        self._frames = LinkFrames(model)
         carrier, rotation, translation = self._frames.in_tree(frame)
         self.end: tuple[int, Array, Array] = (carrier, rotation, translation)
         way = self._frames.way(carrier)

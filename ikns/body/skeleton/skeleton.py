@@ -32,7 +32,7 @@ from ikns.body.model_file import (
     segment_lengths,
     urdf_folder,
 )
-from ikns.body.skeleton.frames import Frames
+from ikns.body.skeleton.frames import LinkFrames
 from ikns.body.skeleton.markers import Markers, part_along
 from ikns.errors import FileError, InvalidInput
 from ikns.numerics.subspace import null_spaces
@@ -269,8 +269,8 @@ class Skeleton:
         return self._frames.paths(tuple(f"{side}_knuckle" for side in SIDES))
 
     @cached_property
-    def _frames(self) -> Frames:
-        return Frames(self._model)
+    def _frames(self) -> LinkFrames:
+        return LinkFrames(self._model)
 
     # --- markers in the world -------------------------------------------------------
 

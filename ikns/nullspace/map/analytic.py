@@ -11,9 +11,9 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map.assembly import assemble
-from ikns.nullspace.map.checks import at, checked_settings
+from ikns.nullspace.map.checks import checked_settings, format_point
 from ikns.nullspace.map.estimator import NullSpaceMap
-from ikns.nullspace.map.interpolator import between
+from ikns.nullspace.map.interpolator import make_interpolator
 from ikns.nullspace.map.samples import null_space_samples, still_mask
 from ikns.numerics.subspace import mean_null_direction
 
@@ -92,7 +92,8 @@ def analytic_map(
     for k, r in enumerate(rows):
         if not r.size:
             raise NotEnoughData(
-                f"expected still samples at the point {at(places, k)} m, found none."
+                f"expected still samples at the point {format_point(places, k)} m, "
+                "found none."
             )
     jacobians = skeleton.chain_jacobian(visited, chain, task=task)
     spans = [mean_null_direction(jacobians[r], settings.n_dof)[0] for r in rows]
@@ -102,7 +103,7 @@ def analytic_map(
         [np.ones(settings.n_dof)] * len(places),
         [q[r] for r in rows],
         settings=settings,
-        edges=between(places, made.outside).edges,
+        edges=make_interpolator(places, made.outside).edges,
     )
     counts = np.array([r.size for r in rows])
     return NullSpaceMap.from_arrays(places, *arrays, counts=counts, **parameters)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.nullspace.map.alignment import align
-from ikns.nullspace.map.checks import MapWarning, Settings, at
+from ikns.nullspace.map.checks import MapSettings, MapWarning, format_point
 
 __all__ = ["assemble"]
 
@@ -27,7 +27,7 @@ def assemble(
     weights: Sequence[Floats],
     samples: Sequence[Floats],
     *,
-    settings: Settings,
+    settings: MapSettings,
     edges: NDArray[np.int64],
 ) -> tuple[Floats, Floats, Floats]:
     """Directions and ranges of all points.
@@ -42,7 +42,7 @@ def assemble(
         Weight of each component in the sum, for one degree of freedom.
     samples : sequence of P (N_i, n) arrays
         Joint vectors at each point, rad.
-    settings : Settings
+    settings : MapSettings
     edges : (E, 2) integer array
         Which points are neighbors, as a connected graph.
 
@@ -91,7 +91,8 @@ def _warn_of_disagreement(
         cosine = float((directions[i] * directions[j]).sum(axis=1).min())
         least = _WEAK if (i, j) in tree or (j, i) in tree else 0.0
         if cosine < least:
-            weak.append(f"{at(centers, i)} and {at(centers, j)} (cosine {cosine:.2f})")
+            both_ends = f"{format_point(centers, i)} and {format_point(centers, j)}"
+            weak.append(f"{both_ends} (cosine {cosine:.2f})")
     if weak:
         warnings.warn(
             "the directions of neighboring points differ so much that their signs, and "

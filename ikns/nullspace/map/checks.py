@@ -13,8 +13,8 @@ from ikns.nullspace.clustering import BoundingBoxKMeans
 
 __all__ = [
     "MapWarning",
-    "Settings",
-    "at",
+    "MapSettings",
+    "format_point",
     "checked_map",
     "checked_rows",
     "checked_settings",
@@ -38,7 +38,7 @@ class MapWarning(UserWarning):
     """The map was made, but a person should look at what the sentence says."""
 
 
-class Settings(NamedTuple):
+class MapSettings(NamedTuple):
     """Checked parameters of a map.
 
     Parameters
@@ -57,7 +57,7 @@ class Settings(NamedTuple):
     min_samples: int
 
 
-def checked_settings(parameters: Any, shape: tuple[int, int]) -> Settings:
+def checked_settings(parameters: Any, shape: tuple[int, int]) -> MapSettings:
     """Return what a map's parameters mean for samples (N, n), or say what is wrong."""
     p = parameters
     if len(p.quantiles) != 2 or p.n_points < 1:
@@ -96,7 +96,7 @@ def checked_settings(parameters: Any, shape: tuple[int, int]) -> Settings:
                 f"expected a reference with {p.n_dof} independent rows, found "
                 f"{np.linalg.matrix_rank(reference)}."
             )
-    return Settings(p.n_dof, p.variance, (low, high), reference, least)
+    return MapSettings(p.n_dof, p.variance, (low, high), reference, least)
 
 
 def checked_rows(rows: ArrayLike, width: int, what: str) -> Floats:
@@ -133,7 +133,8 @@ def checked_map(
     if (m > M).any():
         k = int(np.argwhere(m > M)[0, 0])
         raise InvalidInput(
-            f"expected lower <= upper, found {m[k]} and {M[k]} at {at(places, k)}."
+            f"expected lower <= upper, found {m[k]} and {M[k]} at "
+            f"{format_point(places, k)}."
         )
     return places, z, m, M
 
@@ -179,9 +180,10 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
         _check_volume(2 * found.box_.half_lengths, f"the {counts.sum()} samples")
     used = np.flatnonzero(counts >= need).tolist()
     few = [k for k in range(len(centers)) if k not in used]
+    listed = "; ".join(f"{format_point(centers, k)} has {counts[k]}" for k in few)
     sentence = (
         f"{len(few)} of {len(centers)} PCA points have fewer than {need} samples and "
-        f"are left out: {'; '.join(f'{at(centers, k)} has {counts[k]}' for k in few)}"
+        f"are left out: {listed}"
     )
     if len(used) < (4 if natural else 1):
         raise NotEnoughData(
@@ -224,7 +226,9 @@ def warn_of_components(
     centers: Floats, n_components: NDArray[np.int64], n_dof: int
 ) -> None:
     """Name the points where no joint moves, and those where too much does."""
-    none = [at(centers, k) for k in np.flatnonzero(n_components == 0).tolist()]
+    none = [
+        format_point(centers, k) for k in np.flatnonzero(n_components == 0).tolist()
+    ]
     if none:
         warnings.warn(
             f"no joint moves at {'; '.join(none)}, so these points have no say in c.",
@@ -232,7 +236,7 @@ def warn_of_components(
             stacklevel=3,
         )
     more = [
-        f"{at(centers, k)} took {n_components[k]} components"
+        f"{format_point(centers, k)} took {n_components[k]} components"
         for k in np.flatnonzero(n_components > n_dof).tolist()
     ]
     if more:
@@ -244,6 +248,6 @@ def warn_of_components(
         )
 
 
-def at(centers: Floats, k: int) -> str:
+def format_point(centers: Floats, k: int) -> str:
     """Name a point by its place, for messages: numbers change when points drop out."""
     return f"({', '.join(f'{x:.3f}' for x in centers[k])})"

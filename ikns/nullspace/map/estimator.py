@@ -31,7 +31,7 @@ from ikns.nullspace.map.checks import (
     usable_points,
     warn_of_components,
 )
-from ikns.nullspace.map.interpolator import between
+from ikns.nullspace.map.interpolator import make_interpolator
 from ikns.numerics.subspace import principal_components
 
 __all__ = ["NullSpaceMap"]
@@ -186,7 +186,7 @@ class NullSpaceMap(BaseEstimator):
         ).fit(x)
         used = usable_points(found, settings.min_samples)
         centers = found.cluster_centers_[used]
-        interpolator = between(centers, self.outside)
+        interpolator = make_interpolator(centers, self.outside)
         rows = [np.flatnonzero(found.labels_ == k) for k in used]
 
         parts = [principal_components(moves[r], centered=centered) for r in rows]
@@ -252,7 +252,7 @@ class NullSpaceMap(BaseEstimator):
         made.n_features_in_ = places.shape[1]
         made.centers_, made.directions_, made.lower_, made.upper_ = places, z, m, M
         made.counts_ = np.full(len(places), counts, dtype=np.int64)
-        made.interpolator_ = between(places, made.outside)
+        made.interpolator_ = make_interpolator(places, made.outside)
         return made
 
     def control_signal(self, q: ArrayLike, x: ArrayLike) -> Any:

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
-__all__ = ["NearestPoint", "between"]
+__all__ = ["NearestPoint", "make_interpolator"]
 
 
-def between(
+def make_interpolator(
     points: NDArray[np.float64], outside: Literal["nearest", "project", "nan"]
 ) -> NaturalNeighborInterpolator | NearestPoint:
     """Interpolator between points (P, d): natural neighbors from 4 points in space on.

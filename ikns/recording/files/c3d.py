@@ -25,7 +25,7 @@ from ikns.recording.files.border import (
     meters_per,
     to_recording,
 )
-from ikns.recording.files.c3d_layout import Layout, floats, read_layout
+from ikns.recording.files.c3d_layout import C3dLayout, floats, read_layout
 from ikns.recording.recording import Recording
 
 __all__ = ["read_c3d"]
@@ -82,7 +82,7 @@ def _bare(label: str) -> str:
     return label.rsplit(":", 1)[-1]
 
 
-def _points(path: Path, layout: Layout, rate: float) -> NDArray[np.float32]:
+def _points(path: Path, layout: C3dLayout, rate: float) -> NDArray[np.float32]:
     """Return x, y, z and residual (negative: not seen), (T, points, 4), scaled."""
     n_points, n_analog, *_ = layout.header
     used = layout.number("POINT:USED", n_points) % (_WORD + 1)
@@ -124,7 +124,7 @@ def _points(path: Path, layout: Layout, rate: float) -> NDArray[np.float32]:
     return frames[:, : 4 * n_points].reshape(n_frames, n_points, 4) * np.float32(scale)
 
 
-def _frame_count(layout: Layout, fitting: int) -> int:
+def _frame_count(layout: C3dLayout, fitting: int) -> int:
     """Return the number of frames, also where it does not fit into 16 bits.
 
     Then Vicon writes first and last frame as pairs of words, others write a
@@ -144,12 +144,12 @@ def _frame_count(layout: Layout, fitting: int) -> int:
     return int(count) if math.isfinite(count) and count > 0 else 0
 
 
-def _first_frame(layout: Layout) -> int:
+def _first_frame(layout: C3dLayout) -> int:
     """Return the number of the first frame, counted from 1."""
     return _long(layout, "TRIAL:ACTUAL_START_FIELD") or max(layout.header[2], 1)
 
 
-def _long(layout: Layout, name: str) -> int:
+def _long(layout: C3dLayout, name: str) -> int:
     """Return a 32-bit number kept as two words, low word first; 0 when missing."""
     value = layout.parameters.get(name)
     if not isinstance(value, np.ndarray) or len(value) != 2:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ikns.errors import FileError
 from ikns.recording.files.border import existing_file, shown
 
-__all__ = ["Layout", "floats", "read_layout"]
+__all__ = ["C3dLayout", "floats", "read_layout"]
 
 _BLOCK = 512
 _KEY = 0x50
@@ -31,7 +31,7 @@ Value = list[str] | NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Layout:
+class C3dLayout:
     """What a C3D file says about itself.
 
     Parameters
@@ -77,7 +77,7 @@ class Layout:
             number += 1
 
 
-def read_layout(path: Path) -> Layout:
+def read_layout(path: Path) -> C3dLayout:
     """Read header and parameters of a C3D file.
 
     Raises
@@ -115,7 +115,7 @@ def read_layout(path: Path) -> Layout:
             raise _cut(path, data_start, size)
         file.seek(section_start)
         section = file.read(data_start - section_start)
-    return Layout(
+    return C3dLayout(
         machine=machine,
         header=words[:4],
         scale=float(floats(words[4], machine)[0]),

@@ -11,11 +11,18 @@ import pytest
 import small_person
 from example_robot_data import robots_loader
 
-from ikns.analysis.compare import compare_motion, compare_robot, motion_crosstalk
+from ikns.analysis.compare import (
+    compare,
+    compare_combinations,
+    compare_motion,
+    compare_robot,
+    compare_visited,
+    motion_crosstalk,
+)
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.nullspace.map import NullSpaceMap, null_space_samples
+from ikns.nullspace.map import NullSpaceMap, analytic_map, null_space_samples
 from ikns.numerics.subspace import null_space
 from ikns.simulation import explore_null_space
 
@@ -89,9 +96,10 @@ def test_other_coordinates_describe_the_same_hand(found):
     assert (found["vector"].agreement > 0.99).all()
 
 
-def test_points_that_were_not_visited_are_left_out(learned):
-    here = small_person.protocol().points.point == 4
-    part = dataclasses.replace(
+def at_point(point):
+    """The truth while the hand is held at one point."""
+    here = small_person.protocol().points.point == point
+    return dataclasses.replace(
         TRUTH,
         **{
             field.name: getattr(TRUTH, field.name)[here]
@@ -99,11 +107,74 @@ def test_points_that_were_not_visited_are_left_out(learned):
             if isinstance(getattr(TRUTH, field.name), np.ndarray)
         },
     )
+
+
+def test_points_that_were_not_visited_are_left_out(learned):
+    part = at_point(4)
     found = compare_motion(learned, BODY, part, resamples=0)
     assert len(found.points) == 1
     place = part.task_position("right_arm").mean(axis=0)
     # The point of the map that lies where the hand was held, half a meter from others.
     assert np.linalg.norm(learned.centers_[found.points[0]] - place) < 0.05
+
+
+def test_a_map_is_compared_with_the_analytic_one_at_the_visited_points(learned):
+    every = compare_visited(learned, BODY, TRUTH)
+    assert every.points.tolist() == list(range(10))
+    reference = learned.directions_.sum(axis=0)
+    analytic = analytic_map(
+        BODY,
+        TRUTH,
+        learned.centers_,
+        radius=learned.radius_,
+        reference=reference,
+    )
+    expected = compare(learned, analytic, TRUTH)
+    np.testing.assert_array_equal(every.comparison.angles, expected.angles)
+    np.testing.assert_array_equal(every.comparison.counts, every.counts)
+    part = compare_visited(learned, BODY, at_point(4))
+    assert len(part.points) == 1
+    assert part.counts.sum() == part.counts[part.points[0]] > 0
+    np.testing.assert_array_equal(
+        part.learned.directions_, learned.directions_[part.points]
+    )
+
+
+def test_combinations_are_the_comparisons_one_by_one(learned, found):
+    made = compare_combinations(
+        learned,
+        BODY,
+        TRUTH,
+        chains=("right_arm", "right_arm_clavicle"),
+        tasks=("pose",),
+        coordinates=("internal", "isb"),
+        resamples=0,
+    )
+    chains = ("right_arm", "right_arm_clavicle")
+    assert list(made.found) == [
+        (chain, "pose", name) for chain in chains for name in ("internal", "isb")
+    ]
+    assert not made.left_out
+    for chain, name, key in (
+        ("right_arm", "internal", "pose"),
+        ("right_arm", "isb", "isb"),
+        ("right_arm_clavicle", "internal", "clavicle"),
+    ):
+        one = made.found[chain, "pose", name]
+        np.testing.assert_array_equal(one.angles, found[key].angles)
+
+
+def test_a_chain_that_cannot_be_compared_is_left_out_unless_it_is_the_maps(learned):
+    q = np.array(TRUTH.q)
+    joint = chain_joints("right_arm_clavicle")[0]
+    q[:, 7 + TRUTH.joint_names.index(joint)] = 0.1
+    stuck = dataclasses.replace(TRUTH, q=q)
+    chains = ("right_arm", "right_arm_clavicle")
+    made = compare_combinations(learned, BODY, stuck, chains=chains, resamples=0)
+    assert [chain for chain, _, _ in made.found] == ["right_arm"] * 2
+    assert "the 1. of 9 constant" in made.left_out["right_arm_clavicle"]
+    with pytest.raises(NotEnoughData, match="slower than 1e-09 m/s"):
+        compare_combinations(learned, BODY, TRUTH, max_hand_speed=1e-9)
 
 
 def test_crosstalk_is_that_of_the_map_on_the_reaches(learned):
