@@ -123,7 +123,7 @@ def pick(
     )
     steps = pick_schedule(identity.number, **design)
 
-    def make_desk(rows: Sequence[Mapping[str, Any]]) -> Desk:
+    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Desk:
         return PickingDesk(steps, rows)
 
     conduct(
@@ -142,7 +142,7 @@ def pick(
         PageOptions(host, port, browser, _RATE),
         conditions=design["conditions"],
         about={"experiment": "picking", "design": design},
-        make_desk=make_desk,
+        make_experiment=make_experiment,
         rest=float(design["rest"]),
         seed=int(design["seed"]),
         as_json=as_json,

@@ -147,7 +147,7 @@ def track(
             f"{design['rest']:g}."
         )
 
-    def make_desk(rows: Sequence[Mapping[str, Any]]) -> Desk:
+    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Desk:
         return TrackingDesk(steps, rows, align=wait)
 
     conduct(
@@ -166,7 +166,7 @@ def track(
         PageOptions(host, port, browser, rate, stick),
         conditions=design["conditions"],
         about={"experiment": "tracking", "design": design, "align": wait},
-        make_desk=make_desk,
+        make_experiment=make_experiment,
         rest=float(design["rest"]),
         seed=int(design["seed"]),
         as_json=as_json,

@@ -47,7 +47,7 @@ def conduct(
     *,
     conditions: Sequence[str],
     about: Mapping[str, Any],
-    make_desk: Callable[[Sequence[Mapping[str, Any]]], Desk],
+    make_experiment: Callable[[Sequence[Mapping[str, Any]]], Desk],
     rest: float,
     seed: int,
     as_json: bool,
@@ -62,7 +62,7 @@ def conduct(
     conditions : sequence of str
     about : mapping
         Entries of ``visit.json`` that are particular to the experiment.
-    make_desk : callable
+    make_experiment : callable
         Makes the experiment, given the attempts so far.
     rest : float
         Break between conditions, s.
@@ -81,7 +81,7 @@ def conduct(
             # A source that does not answer is reported before anything is written.
             with open_arm_source(arm, subject):
                 ikns.warm_up()
-        book = VisitBook(
+        log = VisitBook(
             identity.folder,
             {
                 "participant": identity.participant,
@@ -101,11 +101,13 @@ def conduct(
             from ikns.experiments.study import keep_declared
 
             keep_declared(identity.folder.parents[1], identity.study)
-        desk: Any = make_desk(book.attempts)  # tracking's has a trial to follow
+        experiment: Any = make_experiment(
+            log.attempts
+        )  # tracking's has a trial to follow
         virtual = "virtual" in conditions
         conductor = Conductor(
-            desk,
-            book,
+            experiment,
+            log,
             borne={*PAGE, "ring"},
             rest=rest,
             auto=_VIRTUAL_WAIT if virtual else None,
@@ -116,7 +118,9 @@ def conduct(
             from ikns.experiments.conduct.virtual import virtual_input
 
             drivers["virtual"] = lambda: nullcontext(
-                virtual_input(desk.trial, rate=pages.rate, seed=[seed, identity.number])
+                virtual_input(
+                    experiment.trial, rate=pages.rate, seed=[seed, identity.number]
+                )
             )
         address = ""
         if subject is not None:
