@@ -10,7 +10,7 @@ import pytest
 # floor do not know each other.
 FLOORS = (
     "errors",
-    "_kernels output_folder",
+    "_kernels output_file output_folder",
     "numerics",
     "recording finger statistics",
     "body",

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from ikns.errors import FileError, InvalidInput
 from ikns.view.directions import principal_angle_figure
-from ikns.view.parts import KeyNumber, Picture, Section, Step, Table
+from ikns.view.parts import KeyNumber, NextStep, Picture, Section, Table
 from ikns.view.render import png, svg
 from ikns.view.report import report_html, write_report
 from ikns.view.residuals import residual_figure
@@ -85,7 +85,9 @@ def page(**changes: object) -> str:
             ),
             Section("Only words", text=["Nothing else."]),
         ],
-        "next_steps": [Step("ikns control --subject me/ trial.c3d", "Try a trial.")],
+        "next_steps": [
+            NextStep("ikns control --subject me/ trial.c3d", "Try a trial.")
+        ],
     }
     return report_html(**(parts | changes))
 
@@ -188,7 +190,7 @@ def test_hostile_text_stays_text(text: str) -> None:
         sections=[
             Section(attack, [attack], tables=[Table([attack], [[attack]], attack)])
         ],
-        next_steps=[Step(attack, attack)],
+        next_steps=[NextStep(attack, attack)],
     )
     reader = Reader(html)
     assert not reader.tags("script")

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
 import ikns
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
-from ikns.cli.output import (
-    finite_median,
-    progress,
-    refuse_overwriting,
-    show,
-    table,
-    write_csv,
-)
+from ikns.cli.output import progress, show, table
+from ikns.output_file import refuse_overwriting, write_csv
 
-__all__ = ["control", "write_control"]
+__all__ = ["control"]
 
 
 def control(
@@ -40,6 +34,7 @@ def control(
     frames that do not count.
     """
     from ikns.calibration import track_chain
+    from ikns.live.control.recorded import control_table
 
     refuse_overwriting(out, force=force)
     calibrated = ikns.Subject.load(subject)
@@ -48,7 +43,9 @@ def control(
         motion = track_chain(
             calibrated.skeleton, frames, calibrated.chain, progress=report
         )
-    result = write_control(out, calibrated, motion, mode=mode)
+    found = control_table(calibrated, motion, mode=mode)
+    write_csv(out, found.columns, found.rows)
+    result = found.summary
     show(
         {"recording": recording, "csv": out} | result,
         table(
@@ -69,51 +66,6 @@ def control(
         f"Wrote {out}",
         as_json=as_json,
     )
-
-
-def write_control(
-    path: Path, subject: ikns.Subject, motion: ikns.Motion, *, mode: str = "position"
-) -> dict[str, Any]:
-    """Write ``control.csv`` and return what it holds in short.
-
-    The columns are time_s; c, clipped to 0 to 1 (c_1, c_2, ... for several degrees of
-    freedom), empty while the chain is not in sight; hand_speed_m_s in the thorax frame;
-    inside (1 within the volume of the PCA points); residual_m of the markers. In rate
-    mode c is held out of sight, empty only before the arm was first seen, and counts
-    as cut off while it is at 0 or 1.
-    """
-    import numpy as np
-
-    from ikns.live.control import RateControl
-
-    learned, chain = subject.null_space_map, subject.chain
-    place = motion.task_position(chain)
-    if mode == "rate":
-        raw = RateControl(learned, subject.skeleton, chain).track(motion)
-    else:
-        raw = learned.control_signal(motion.chain_angles(chain), place)
-    raw = raw.reshape(len(place), -1)
-    c = np.clip(raw, 0.0, 1.0)
-    inside = learned.inside(place)
-    names = ["c"] if c.shape[1] == 1 else [f"c_{k + 1}" for k in range(c.shape[1])]
-    write_csv(
-        path,
-        ["time_s", *names, "hand_speed_m_s", "inside", "residual_m"],
-        np.column_stack(
-            [motion.time, c, motion.hand_speed(chain), inside, motion.residual]
-        ),
-    )
-    known = np.isfinite(raw).all(axis=1)
-    cut = (raw <= 0) | (raw >= 1) if mode == "rate" else (raw < 0) | (raw > 1)
-    beyond = cut.any(axis=1)
-    return {
-        "frames": len(c),
-        "frames_without_signal": int((~known).sum()),
-        "inside_share": float((inside & known).sum() / max(known.sum(), 1)),
-        "c_median": finite_median(c[:, 0]),
-        "clipped_share": float(beyond.sum() / max(known.sum(), 1)),
-        "residual_median_m": finite_median(motion.residual),
-    }
 
 
 def _percent(share: float) -> float:

@@ -9,19 +9,11 @@ import typer
 
 import ikns
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
-from ikns.cli.output import (
-    finite_median,
-    progress,
-    refuse_overwriting,
-    show,
-    table,
-    write_csv,
-)
+from ikns.cli.output import progress, show, table
 from ikns.errors import naming
+from ikns.output_file import refuse_overwriting, write_csv
 
 __all__ = ["ik"]
-
-_THORAX = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
 
 
 def ik(
@@ -32,7 +24,7 @@ def ik(
     as_json: AsJson = False,
 ) -> None:
     """Write joint angles (deg), the pose of the thorax and residuals per frame."""
-    import numpy as np
+    from ikns.motion.table import motion_table
 
     refuse_overwriting(out, force=force)
     skeleton = ikns.Subject.load(subject).skeleton
@@ -41,53 +33,19 @@ def ik(
         motion = ikns.MarkerIK(skeleton).track(
             frames, progress=lambda done, total: report("joint angles", done, total)
         )
-    degrees = np.degrees(motion.angles)
-    write_csv(
-        out,
-        [
-            "time_s",
-            *(f"{joint}_deg" for joint in motion.joint_names),
-            *(f"thorax_{part}" for part in _THORAX),
-            "residual_m",
-            "converged",
-        ],
-        np.column_stack(
-            [
-                motion.time,
-                degrees,
-                motion.q[:, : len(_THORAX)],
-                motion.residual,
-                motion.converged,
-            ]
-        ),
-    )
-    median = finite_median(motion.residual)
-    converged = int(motion.converged.sum())
-    span = np.ptp(degrees, axis=0)
+    found = motion_table(motion)
+    write_csv(out, found.columns, found.rows)
+    summary = found.summary
     show(
-        {
-            "recording": recording,
-            "csv": out,
-            "frames": len(motion.time),
-            "frames_converged": converged,
-            "frames_without_markers": int(np.isnan(motion.residual).sum()),
-            "residual_median_m": median,
-            "held_joints": motion.held,
-            "moved_deg": dict(zip(motion.joint_names, span, strict=True)),
-        },
-        f"{recording}: {converged} of {len(motion.time)} frames solved, "
-        f"median marker residual {1000 * median:.1f} mm",
+        {"recording": recording, "csv": out} | summary,
+        f"{recording}: {summary['frames_converged']} of {summary['frames']} frames "
+        f"solved, median marker residual {1000 * summary['residual_median_m']:.1f} mm",
         table(
             "Joint angles",
             {"joint": "s", "lowest deg": ".1f", "highest deg": ".1f", "note": "s"},
             [
                 [name, low, high, "held: no marker shows it" * (name in motion.held)]
-                for name, low, high in zip(
-                    motion.joint_names,
-                    degrees.min(axis=0).tolist(),
-                    degrees.max(axis=0).tolist(),
-                    strict=True,
-                )
+                for name, (low, high) in found.range_deg.items()
             ],
         ),
         f"Wrote {out}",

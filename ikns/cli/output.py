@@ -1,32 +1,21 @@
-"""What a command leaves behind: a table or JSON on stdout, files that appear whole."""
+"""What a command prints: tables or JSON on stdout, progress on stderr."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
-import os
-import statistics
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import InvalidInput
-
 __all__ = [
-    "finite_median",
     "json_text",
     "notes",
     "progress",
-    "refuse_overwriting",
     "show",
     "table",
-    "write_bytes",
-    "write_csv",
-    "write_text",
 ]
 
 #: Columns of a table where nobody says how many there are.
@@ -107,12 +96,6 @@ def notes(sentences: Iterable[str]) -> list[str]:
     return [f"Note: {sentence}" for sentence in sentences]
 
 
-def finite_median(values: Any) -> float:
-    """Median of the values that are finite; NaN without any."""
-    finite = [value for value in values.tolist() if math.isfinite(value)]
-    return float(statistics.median(finite)) if finite else math.nan
-
-
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
     """Bars on stderr while it is a terminal; call with (step, done, total)."""
@@ -143,46 +126,3 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
         if not compiled_before():
             warm_up(report)
         yield report
-
-
-def refuse_overwriting(path: Path, *, force: bool) -> None:
-    """Make sure, before any work, that a file may be written.
-
-    Raises
-    ------
-    InvalidInput
-        When it exists and `force` is not set, or its folder does not exist.
-    """
-    if path.is_dir():
-        raise InvalidInput(f"{path}: expected the name of a file, found a folder.")
-    if path.exists() and not force:
-        raise InvalidInput(f"{path}: exists already; use --force to overwrite it.")
-    if not path.absolute().parent.is_dir():
-        raise InvalidInput(f"{path}: expected an existing folder to write into.")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file that appears whole or not at all."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file that appears whole or not at all."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def write_csv(
-    path: Path, columns: Sequence[str], rows: Iterable[Sequence[float]]
-) -> None:
-    """Write a table of numbers; an empty cell where there is none."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    for row in rows:
-        writer.writerow(["" if v != v else f"{v:.9g}" for v in row])
-    write_text(path, text.getvalue())

@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from ikns.cli.options import AsJson
-from ikns.cli.visit import chosen, conduct, names, whose
-from ikns.cli.visit_drivers import Arm, Screens
+from ikns.cli.visit import conduct
+from ikns.cli.visit_drivers import ArmOptions, PageOptions
+from ikns.cli.visit_identity import find_visit, resolve_design, split_names
 from ikns.cli.visit_options import (
     Browser,
     ForIkns,
@@ -26,11 +27,22 @@ from ikns.cli.visit_options import (
     View,
     VisitFolder,
 )
-from ikns.errors import InvalidInput
 
 __all__ = ["pick"]
 
 _INPUTS = ("ikns", "ring")
+#: Design of experiment 2 of the paper.
+_DEFAULTS = {
+    "conditions": ["ikns", "ring"],
+    "objects": "all",
+    "repeats": 1,
+    "seed": 0,
+    "limit": 20.0,
+    "training": 10,
+    "rest": 120.0,
+}
+#: How often the control signal of a page is recorded, Hz.
+_RATE = 100.0
 
 
 def pick(
@@ -90,47 +102,33 @@ def pick(
     from ikns.experiments.conduct import Desk, PickingDesk
     from ikns.experiments.picking import OBJECT_IDS, pick_schedule
 
-    who = whose(
+    identity = find_visit(
         visit, study, experiment="picking", participant=participant, number=number
     )
-    codes = list(OBJECT_IDS) if objects == "all" else names(objects or "")
-    given = {
-        "conditions": None if conditions is None else names(conditions),
-        "objects": None if objects is None else codes,
-        "repeats": repeats,
-        "seed": seed,
-        "limit": limit,
-        "training": training,
-        "rest": rest,
-    }
-    before = who.stored.get("design", {})
-    design = {
-        name: chosen(given[name], before, name, default)
-        for name, default in {
-            "conditions": ["ikns", "ring"],
-            "objects": list(OBJECT_IDS),
-            "repeats": 1,
-            "seed": 0,
-            "limit": 20.0,
-            "training": 10,
-            "rest": 120.0,
-        }.items()
-    }
-    if who.study is not None:
-        design = _declared(who.study, given)
-    strangers = [name for name in design["conditions"] if name not in _INPUTS]
-    if strangers:
-        raise InvalidInput(
-            f"expected conditions of {', '.join(_INPUTS)}, found '{strangers[0]}'."
-        )
-    steps = pick_schedule(who.number, **design)
+    every = list(OBJECT_IDS)
+    codes = every if objects == "all" else split_names(objects or "")
+    design = resolve_design(
+        identity,
+        {
+            "conditions": None if conditions is None else split_names(conditions),
+            "objects": None if objects is None else codes,
+            "repeats": repeats,
+            "seed": seed,
+            "limit": limit,
+            "training": training,
+            "rest": rest,
+        },
+        _DEFAULTS | {"objects": every},
+        inputs=_INPUTS,
+    )
+    steps = pick_schedule(identity.number, **design)
 
-    def make_desk(rows: Sequence[Mapping[str, Any]]) -> Desk:
+    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Desk:
         return PickingDesk(steps, rows)
 
     conduct(
-        who,
-        Arm(
+        identity,
+        ArmOptions(
             subject,
             source,
             finger,
@@ -141,24 +139,11 @@ def pick(
             view=view,
             realtime=realtime,
         ),
-        Screens(host, port, browser, 100.0),
+        PageOptions(host, port, browser, _RATE),
         conditions=design["conditions"],
         about={"experiment": "picking", "design": design},
-        make_desk=make_desk,
+        make_experiment=make_experiment,
         rest=float(design["rest"]),
         seed=int(design["seed"]),
         as_json=as_json,
     )
-
-
-def _declared(study: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the design of a study; nothing of it is chosen on the day."""
-    if study.picking is None:
-        raise InvalidInput("expected a table [picking] in the study file, found none.")
-    chosen_anew = [name for name, value in given.items() if value is not None]
-    if chosen_anew:
-        raise InvalidInput(
-            f"the study declares everything; expected no --{chosen_anew[0]} with "
-            "--study."
-        )
-    return dict(study.picking.arguments(seed=study.seed))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ikns.cli.output import refuse_overwriting, write_bytes
 from ikns.errors import InvalidInput
+from ikns.output_file import refuse_overwriting, write_bytes
 
 __all__ = ["refuse_picture", "write_picture"]
 

@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal
 import typer
 
 from ikns.cli.options import AsJson
-from ikns.cli.visit import chosen, conduct, names, whose
-from ikns.cli.visit_drivers import Arm, Screens
+from ikns.cli.visit import conduct
+from ikns.cli.visit_drivers import ArmOptions, PageOptions
+from ikns.cli.visit_identity import find_visit, resolve_design, split_names
 from ikns.cli.visit_options import (
     Browser,
     ForIkns,
@@ -32,6 +33,17 @@ from ikns.errors import InvalidInput
 __all__ = ["track"]
 
 _INPUTS = ("ikns", "gamepad", "keyboard", "mouse", "virtual")
+#: Design of experiment 1 of the paper.
+_DEFAULTS = {
+    "conditions": ["ikns", "gamepad"],
+    "profiles": ["T1", "T2", "T3"],
+    "repeats": 3,
+    "seed": 0,
+    "seconds": 25.0,
+    "training": 10,
+    "rest": 120.0,
+    "align": 5.0,
+}
 
 
 def track(
@@ -102,49 +114,31 @@ def track(
     from ikns.experiments.conduct import Desk, TrackingDesk
     from ikns.experiments.tracking import draw_profile, schedule
 
-    who = whose(
+    identity = find_visit(
         visit, study, experiment="tracking", participant=participant, number=number
     )
-    given = {
-        "conditions": None if conditions is None else names(conditions),
-        "profiles": None if profiles is None else names(profiles),
-        "repeats": repeats,
-        "seed": seed,
-        "seconds": seconds,
-        "training": training,
-        "rest": rest,
-        "align": align,
-    }
-    before = dict(who.stored.get("design", {}))
-    if "align" in who.stored:
-        before["align"] = who.stored["align"]
-    design = {
-        name: chosen(given[name], before, name, default)
-        for name, default in {
-            "conditions": ["ikns", "gamepad"],
-            "profiles": ["T1", "T2", "T3"],
-            "repeats": 3,
-            "seed": 0,
-            "seconds": 25.0,
-            "training": 10,
-            "rest": 120.0,
-            "align": 5.0,
-        }.items()
-    }
-    if who.study is not None:
-        design = _declared(who.study, given)
+    design = resolve_design(
+        identity,
+        {
+            "conditions": None if conditions is None else split_names(conditions),
+            "profiles": None if profiles is None else split_names(profiles),
+            "repeats": repeats,
+            "seed": seed,
+            "seconds": seconds,
+            "training": training,
+            "rest": rest,
+            "align": align,
+        },
+        _DEFAULTS,
+        inputs=_INPUTS,
+    )
     wait = float(design.pop("align"))
-    strangers = [name for name in design["conditions"] if name not in _INPUTS]
-    if strangers:
-        raise InvalidInput(
-            f"expected conditions of {', '.join(_INPUTS)}, found '{strangers[0]}'."
-        )
     if not 0 <= design["seed"] < 2**32:
         raise InvalidInput(
             f"expected a --seed from 0 to below 2**32, found {design['seed']}."
         )
-    steps = schedule(who.number, **design)
-    for step in steps:  # whatever is impossible is told before anything is written
+    steps = schedule(identity.number, **design)
+    for step in steps:  # an impossible profile is refused before anything is written
         if step.kind != "rest":
             draw_profile(step.profile, step.seed, seconds=step.seconds)
     if not (0 <= wait < math.inf and 0 <= design["rest"] < math.inf):
@@ -153,12 +147,12 @@ def track(
             f"{design['rest']:g}."
         )
 
-    def make_desk(rows: Sequence[Mapping[str, Any]]) -> Desk:
+    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Desk:
         return TrackingDesk(steps, rows, align=wait)
 
     conduct(
-        who,
-        Arm(
+        identity,
+        ArmOptions(
             subject,
             source,
             finger,
@@ -169,25 +163,11 @@ def track(
             view=view,
             realtime=realtime,
         ),
-        Screens(host, port, browser, rate, stick),
+        PageOptions(host, port, browser, rate, stick),
         conditions=design["conditions"],
         about={"experiment": "tracking", "design": design, "align": wait},
-        make_desk=make_desk,
+        make_experiment=make_experiment,
         rest=float(design["rest"]),
         seed=int(design["seed"]),
         as_json=as_json,
     )
-
-
-def _declared(study: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the design of a study; nothing of it is chosen on the day."""
-    if study.tracking is None:
-        raise InvalidInput("expected a table [tracking] in the study file, found none.")
-    chosen_anew = [name for name, value in given.items() if value is not None]
-    if chosen_anew:
-        raise InvalidInput(
-            f"the study declares everything; expected no --{chosen_anew[0]} with "
-            "--study."
-        )
-    design = dict(study.tracking.arguments(seed=study.seed))
-    return design | {"align": study.tracking.align}

@@ -11,16 +11,10 @@ import typer
 
 import ikns
 from ikns.cli.options import AsJson, Force
-from ikns.cli.output import (
-    progress,
-    refuse_overwriting,
-    show,
-    table,
-    write_bytes,
-    write_text,
-)
+from ikns.cli.output import progress, show, table
 from ikns.cli.simulated import is_simulated
 from ikns.errors import InvalidInput
+from ikns.output_file import refuse_overwriting, write_bytes, write_text
 
 __all__ = ["view"]
 

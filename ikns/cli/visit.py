@@ -1,12 +1,12 @@
-"""What ``ikns track`` and ``ikns pick`` share: whose visit it is, how it goes."""
+"""Conduct a visit for ``ikns track`` and ``ikns pick`` and print its attempts."""
 
 from __future__ import annotations
 
+import os
 import sys
 import webbrowser
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -16,23 +16,23 @@ from ikns.cli.live_session import software, stopped_by_signals
 from ikns.cli.output import show, table
 from ikns.cli.visit_drivers import (
     PAGE,
-    Arm,
-    Screens,
+    ArmOptions,
+    PageOptions,
     arm_driver,
     arm_is_simulated,
     arm_subject,
+    describe_input,
     finger_opener,
-    input_said,
     open_arm_source,
-    virtual_driver,
 )
+from ikns.cli.visit_identity import VisitIdentity
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.experiments.conduct import Conductor, Desk, Driver
+    from ikns.experiments.conduct import Conductor, Desk, Driver, HeldInput
     from ikns.live.runtime import LoopStatus
 
-__all__ = ["Whose", "chosen", "conduct", "names", "whose"]
+__all__ = ["conduct"]
 
 #: A virtual operator begins after this long, s.
 _VIRTUAL_WAIT = 2.0
@@ -40,125 +40,137 @@ _VIRTUAL_WAIT = 2.0
 Drivers = dict[str, Callable[[], AbstractContextManager["Driver"]]]
 
 
-@dataclass(frozen=True)
-class Whose:
-    """Whose visit it is, and of which study.
-
-    Parameters
-    ----------
-    folder : Path
-    participant : str
-    number : int
-        Of the participant, from 0: the order of everything depends on it.
-    stored : dict
-        ``visit.json`` of a visit that goes on; empty of a new one.
-    study : Study or None
-    """
-
-    folder: Path
-    participant: str
-    number: int
-    stored: dict[str, Any]
-    study: Any = None
-
-
-def names(text: str) -> list[str]:
-    """Split a list of names at its commas.
-
-    >>> names("ikns, gamepad")
-    ['ikns', 'gamepad']
-    """
-    return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def chosen(given: Any, before: Mapping[str, Any], name: str, default: Any) -> Any:
-    """Return what was given, else what the visit was begun with, else the default."""
-    return before.get(name, default) if given is None else given
-
-
-def whose(
-    visit: Path | None,
-    study: Path | None,
-    *,
-    experiment: str,
-    participant: str | None,
-    number: int | None,
-) -> Whose:
-    """Find the visit's folder and what it was begun with.
-
-    Raises
-    ------
-    InvalidInput
-        When both or neither of visit and study are named.
-    """
-    if (visit is None) == (study is None):
-        raise InvalidInput(
-            "expected the folder of a visit or --study, found "
-            f"{'neither' if visit is None else 'both'}."
-        )
-    declared = None
-    if study is not None:
-        from ikns.experiments.study import check_declared, read_study
-
-        declared = read_study(study)
-        check_declared(study, declared)
-        if participant is None:
-            raise InvalidInput("--study needs the --participant whose visit it is.")
-        visit = study / "visits" / f"sub-{participant}_{experiment}"
-    assert visit is not None
-    stored: dict[str, Any] = {}
-    if (visit / "visit.json").exists():
-        from ikns.experiments.visits import read_visit
-
-        stored = read_visit(visit, experiment=experiment).about
-    who = str(chosen(participant, stored, "participant", "01"))
-    if not (who.isascii() and who.isalnum()):
-        raise InvalidInput(
-            f"expected a participant of letters and digits, found '{who}'."
-        )
-    place = chosen(number, stored, "participant_number", None)
-    if place is None:
-        if not who.isdigit() or int(who) < 1:
-            raise InvalidInput(
-                f"expected --number, from 0, for participant '{who}', found none."
-            )
-        place = int(who) - 1
-    return Whose(visit, who, int(place), stored, declared)
-
-
 def conduct(
-    who: Whose,
-    arm: Arm,
-    screens: Screens,
+    identity: VisitIdentity,
+    arm: ArmOptions,
+    pages: PageOptions,
     *,
     conditions: Sequence[str],
     about: Mapping[str, Any],
-    make_desk: Callable[[Sequence[Mapping[str, Any]]], Desk],
+    make_experiment: Callable[[Sequence[Mapping[str, Any]]], Desk],
     rest: float,
     seed: int,
     as_json: bool,
 ) -> None:
-    """Go through a visit and say how it went.
+    """Conduct a visit and print its attempts.
 
     Parameters
     ----------
-    who : Whose
-    arm : Arm
-    screens : Screens
+    identity : VisitIdentity
+    arm : ArmOptions
+    pages : PageOptions
     conditions : sequence of str
     about : mapping
-        What of ``visit.json`` is particular to the experiment.
-    make_desk : callable
-        Makes the experiment of the attempts that are there already.
+        Entries of ``visit.json`` that are particular to the experiment.
+    make_experiment : callable
+        Makes the experiment, given the attempts so far.
     rest : float
-        Of a break, s.
+        Break between conditions, s.
     seed : int
         Of a virtual operator.
     as_json : bool
     """
-    from ikns.experiments.cockpit import Cockpit, check_port
+    from ikns.experiments.cockpit import Cockpit
     from ikns.experiments.conduct import Conductor, HeldInput, VisitBook, carry_out
-    from ikns.experiments.conduct.ring import ring_driver
+
+    subject, simulated = _checked(identity, arm, pages, conditions)
+    session = arm.session or identity.folder / "session"
+    with ExitStack() as stack:
+        stop = stack.enter_context(stopped_by_signals())
+        if subject is not None:
+            # A source that does not answer is reported before anything is written.
+            with open_arm_source(arm, subject):
+                ikns.warm_up()
+        log = VisitBook(
+            identity.folder,
+            {
+                "participant": identity.participant,
+                "simulated": simulated,
+                "study": "" if identity.study is None else identity.study.name,
+                "variation": "",
+                "variation_settings": {},
+                "participant_number": identity.number,
+                "seed": seed,
+                "input": {x: describe_input(x, arm, pages) for x in conditions},
+                "session": _relative(session, identity.folder) if subject else None,
+                "versions": software(),
+            }
+            | dict(about),
+        )
+        if identity.study is not None:
+            from ikns.experiments.study import keep_declared
+
+            keep_declared(identity.folder.parents[1], identity.study)
+        experiment: Any = make_experiment(
+            log.attempts
+        )  # tracking's has a trial to follow
+        virtual = "virtual" in conditions
+        conductor = Conductor(
+            experiment,
+            log,
+            borne={*PAGE, "ring"},
+            rest=rest,
+            auto=_VIRTUAL_WAIT if virtual else None,
+        )
+        held = {name: HeldInput() for name in PAGE if name in conditions}
+        drivers = _page_drivers(held)
+        if virtual:
+            from ikns.experiments.conduct.virtual import virtual_input
+
+            drivers["virtual"] = lambda: nullcontext(
+                virtual_input(
+                    experiment.trial, rate=pages.rate, seed=[seed, identity.number]
+                )
+            )
+        address = ""
+        if subject is not None:
+            shown: list[Callable[[LoopStatus], None]] = []
+            if arm.view:
+                address = _open_view(stack, subject, shown, simulated=simulated)
+            drivers["ikns"] = lambda: arm_driver(
+                arm, subject, session, identity.participant, shown
+            )
+        presses: SimpleQueue[None] = SimpleQueue()
+        if "ring" in conditions:
+            from ikns.experiments.conduct.ring import ring_driver
+
+            drivers["ring"] = lambda: ring_driver(presses, finger_opener(arm))
+        cockpit = stack.enter_context(
+            Cockpit(
+                conductor,
+                held,
+                on_press=lambda: presses.put(None),
+                host=pages.host,
+                port=pages.port,
+                about={
+                    "participant": identity.participant,
+                    "simulated": simulated,
+                    "stick": pages.stick,
+                    "view": address,
+                },
+            )
+        )
+        _announce(cockpit.url, cockpit.panel_url, browser=pages.browser)
+        carry_out(conductor, drivers, stop=stop, rate=pages.rate)
+    _show_attempts(identity, conductor, as_json=as_json)
+
+
+def _checked(
+    identity: VisitIdentity,
+    arm: ArmOptions,
+    pages: PageOptions,
+    conditions: Sequence[str],
+) -> tuple[ikns.Subject | None, bool]:
+    """Check everything that can be checked before the visit is opened.
+
+    Returns
+    -------
+    subject : Subject or None
+        Of the condition "ikns".
+    simulated : bool
+        Whether the visit is.
+    """
+    from ikns.experiments.cockpit import check_port
 
     virtual = "virtual" in conditions
     if virtual and len(conditions) > 1:
@@ -168,121 +180,72 @@ def conduct(
         )
     subject = arm_subject(arm) if "ikns" in conditions else None
     finger_opener(arm)
-    check_port(screens.host, screens.port)
+    check_port(pages.host, pages.port)
     simulated = virtual or (subject is not None and arm_is_simulated(subject, arm))
-    if who.study is not None and who.study.simulated != simulated:
+    if identity.study is not None and identity.study.simulated != simulated:
         words = {True: "simulated", False: "with people"}
         raise InvalidInput(
-            f"expected a visit that is {words[who.study.simulated]}, as the study "
+            f"expected a visit that is {words[identity.study.simulated]}, as the study "
             f"declares, found one that is {words[simulated]}."
         )
-    session = arm.session or who.folder / "session"
-    with ExitStack() as stack:
-        stop = stack.enter_context(stopped_by_signals())
-        shown: list[Callable[[LoopStatus], None]] = []
-        address = ""
-        if subject is not None:
-            # Sources that do not answer are told before anything is written.
-            with open_arm_source(arm, subject):
-                ikns.warm_up()
-        book = VisitBook(
-            who.folder,
-            {
-                "participant": who.participant,
-                "simulated": simulated,
-                "study": "" if who.study is None else who.study.name,
-                "variation": "",
-                "variation_settings": {},
-                "participant_number": who.number,
-                "seed": seed,
-                "input": {name: input_said(name, arm, screens) for name in conditions},
-                "session": _relative(session, who.folder) if subject else None,
-                "versions": software(),
-            }
-            | dict(about),
-        )
-        if who.study is not None:
-            from ikns.experiments.study import keep_declared
+    return subject, simulated
 
-            keep_declared(who.folder.parents[1], who.study)
-        desk = make_desk(book.attempts)
-        conductor = Conductor(
-            desk,
-            book,
-            borne={*PAGE, "ring"},
-            rest=rest,
-            auto=_VIRTUAL_WAIT if virtual else None,
-        )
-        held = {name: HeldInput() for name in PAGE if name in conditions}
-        drivers: Drivers = {}
-        for name, one in held.items():
-            drivers[name] = lambda one=one: nullcontext(one)  # type: ignore[misc]
-        if virtual:
-            drivers["virtual"] = lambda: nullcontext(
-                virtual_driver(desk, rate=screens.rate, seed=[seed, who.number])
-            )
-        if subject is not None:
-            if arm.view:
-                from ikns.view.scene import body_view
 
-                window, take = stack.enter_context(
-                    body_view(subject, simulated=simulated)
-                )
-                address = window.url
-                shown.append(take)
-            drivers["ikns"] = lambda: arm_driver(
-                arm, subject, session, who.participant, shown
-            )
-        presses: SimpleQueue[None] = SimpleQueue()
-        if "ring" in conditions:
-            drivers["ring"] = lambda: ring_driver(presses, finger_opener(arm))
-        cockpit = stack.enter_context(
-            Cockpit(
-                conductor,
-                held,
-                on_press=lambda: presses.put(None),
-                host=screens.host,
-                port=screens.port,
-                about={
-                    "participant": who.participant,
-                    "simulated": simulated,
-                    "stick": screens.stick,
-                    "view": address,
-                },
-            )
-        )
-        sys.stderr.write(
-            f"ikns: the participant's page is at {cockpit.url}\n"
-            f"ikns: the experimenter's panel is at {cockpit.panel_url}\n"
-        )
-        sys.stderr.flush()
-        if screens.browser:
-            webbrowser.open(cockpit.panel_url)
-            webbrowser.open(cockpit.url)
-        carry_out(conductor, drivers, stop=stop, rate=screens.rate)
-    _tell(who, conductor, as_json=as_json)
+def _page_drivers(held: Mapping[str, HeldInput]) -> Drivers:
+    """Return the drivers of the conditions that the participant's page provides."""
+
+    def opener(one: HeldInput) -> Callable[[], AbstractContextManager[Driver]]:
+        return lambda: nullcontext(one)
+
+    return {name: opener(one) for name, one in held.items()}
+
+
+def _open_view(
+    stack: ExitStack,
+    subject: ikns.Subject,
+    shown: list[Callable[[LoopStatus], None]],
+    *,
+    simulated: bool,
+) -> str:
+    """Serve the 3-D view; `shown` gets what draws a status. Returns its address."""
+    from ikns.view.scene import body_view
+
+    window, draw = stack.enter_context(body_view(subject, simulated=simulated))
+    shown.append(draw)
+    return window.url
+
+
+def _announce(page: str, panel: str, *, browser: bool) -> None:
+    sys.stderr.write(
+        f"ikns: the participant's page is at {page}\n"
+        f"ikns: the experimenter's panel is at {panel}\n"
+    )
+    sys.stderr.flush()
+    if browser:
+        webbrowser.open(panel)
+        webbrowser.open(page)
 
 
 def _relative(path: Path, folder: Path) -> str:
-    import os.path
-
     return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
 
 
-def _tell(who: Whose, conductor: Conductor, *, as_json: bool) -> None:
+def _show_attempts(
+    identity: VisitIdentity, conductor: Conductor, *, as_json: bool
+) -> None:
     from ikns.statistics.wording import counted
 
     results, left = conductor.results, conductor.shown["left"]
-    figures = "time" if conductor.desk.experiment == "picking" else "rmse"
+    figures = "time" if identity.experiment == "picking" else "rmse"
     result = {
-        "visit": who.folder,
-        "participant": who.participant,
+        "visit": identity.folder,
+        "participant": identity.participant,
         "simulated": conductor.book.simulated,
         "left": left,
         "stopped": conductor.emergency.is_set(),
         "attempts": results,
     }
-    title = f"Visit of participant {who.participant}"
+    title = f"Visit of participant {identity.participant}"
     show(
         result,
         table(
@@ -301,6 +264,6 @@ def _tell(who: Whose, conductor: Conductor, *, as_json: bool) -> None:
         f"{counted(left, 'trial')} left; the same command goes on."
         if left
         else "All trials are done.",
-        f"Wrote {who.folder}",
+        f"Wrote {identity.folder}",
         as_json=as_json,
     )

@@ -1,4 +1,4 @@
-"""What drives a visit: the arm, a page, a ring button or a virtual operator."""
+"""What provides the control signal of a visit: the arm, a page or a ring button."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import ikns
 from ikns.cli.live_session import live_session, software
@@ -23,18 +23,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PAGE",
-    "Arm",
-    "Screens",
+    "ArmOptions",
+    "PageOptions",
     "arm_driver",
     "arm_is_simulated",
     "arm_subject",
     "finger_opener",
-    "input_said",
+    "describe_input",
     "open_arm_source",
-    "virtual_driver",
 ]
 
-#: What a page can drive, and how the visit names it.
+#: Inputs that come from the participant's page, and their descriptions.
 PAGE = {
     "gamepad": "gamepad at the participant's page",
     "keyboard": "keyboard at the participant's page, 0.5 per second",
@@ -44,8 +43,8 @@ _RING = "button that types a space at the participant's page"
 
 
 @dataclass(frozen=True)
-class Arm:
-    """What the condition "ikns" needs.
+class ArmOptions:
+    """Options of the condition "ikns".
 
     Parameters
     ----------
@@ -53,14 +52,14 @@ class Arm:
     source, finger : str or None
         Addresses; without a finger nothing moves.
     session : Path or None
-        Where its runs go; by default into the visit's folder.
+        Folder of its runs; by default in the visit's folder.
     smooth : bool
     safe_state : str
     hold_speed : float or None
     view : bool
         Whether the panel shows the body.
     realtime : bool
-        Whether its loop runs before other programs.
+        Whether the control loop has real-time priority.
     """
 
     subject: Path | None
@@ -75,8 +74,8 @@ class Arm:
 
 
 @dataclass(frozen=True)
-class Screens:
-    """Where the pages are served."""
+class PageOptions:
+    """Where and how the pages are served."""
 
     host: str
     port: int
@@ -85,15 +84,15 @@ class Screens:
     stick: str = "left"
 
     def __post_init__(self) -> None:
-        """Refuse a rate that is none."""
+        """Refuse a rate outside the range."""
         if not 0 < self.rate <= 1000:
             raise InvalidInput(
                 f"expected a --rate above 0 and up to 1000 Hz, found {self.rate:g}."
             )
 
 
-def arm_subject(arm: Arm) -> ikns.Subject:
-    """Load whose arm it is.
+def arm_subject(arm: ArmOptions) -> ikns.Subject:
+    """Load the subject.
 
     Raises
     ------
@@ -114,7 +113,7 @@ def arm_subject(arm: Arm) -> ikns.Subject:
     return ikns.Subject.load(arm.subject)
 
 
-def arm_is_simulated(subject: ikns.Subject, arm: Arm) -> bool:
+def arm_is_simulated(subject: ikns.Subject, arm: ArmOptions) -> bool:
     """Whether the subject, or the recording that is played, is simulated."""
     assert arm.subject is not None
     assert arm.source is not None
@@ -123,8 +122,10 @@ def arm_is_simulated(subject: ikns.Subject, arm: Arm) -> bool:
     return is_simulated(subject, arm.subject, played)
 
 
-def open_arm_source(arm: Arm, subject: ikns.Subject) -> AbstractContextManager[Source]:
-    """Connect to where markers come from; all that the subject has must be there."""
+def open_arm_source(
+    arm: ArmOptions, subject: ikns.Subject
+) -> AbstractContextManager[Source]:
+    """Connect to the source; it must have every marker of the subject."""
     from ikns.live.stream import open_source
 
     assert arm.source is not None
@@ -132,13 +133,16 @@ def open_arm_source(arm: Arm, subject: ikns.Subject) -> AbstractContextManager[S
 
 
 def arm_driver(
-    arm: Arm,
+    arm: ArmOptions,
     subject: ikns.Subject,
     session: Path,
     participant: str,
     shown: Sequence[Callable[[LoopStatus], None]],
 ) -> AbstractContextManager[Driver]:
-    """Make the live loop drive, with a session of its own; every status is shown."""
+    """Run the live loop as driver, with a session of its own.
+
+    Every status goes to each callable in `shown`.
+    """
     from ikns.experiments.conduct.live import live_driver
     from ikns.live.control.settings import ControlSettings
 
@@ -179,36 +183,27 @@ def arm_driver(
     )
 
 
-def finger_opener(arm: Arm) -> Callable[[], Finger] | None:
-    """Return what makes the finger, if there is one; nothing is connected yet."""
+def finger_opener(arm: ArmOptions) -> Callable[[], Finger] | None:
+    """Return a callable that opens the finger, or None without one.
+
+    Nothing is connected yet, but the address is checked.
+    """
     from ikns.finger import Safety, open_finger
 
     if arm.finger is None:
         return None
     address, safety = arm.finger, Safety(safe_state=arm.safe_state)
-    open_finger(address, safety=safety)  # an address that is none is told now
+    open_finger(address, safety=safety)
     return lambda: open_finger(address, safety=safety)
 
 
-def virtual_driver(desk: Any, *, rate: float, seed: Sequence[int]) -> Driver:
-    """Make a virtual operator with a stick, practised."""
-    import numpy as np
-
-    from ikns.experiments.conduct import VirtualInput
-    from ikns.simulation.operator import Delay, Operator, typical
-
-    rng = np.random.default_rng(seed)
-    operator = Operator(typical("gamepad").practised(9), rate=rate, seed=rng)
-    return VirtualInput(operator, Delay(0.05, rate=rate), desk.trial)
-
-
-def input_said(condition: str, arm: Arm, screens: Screens) -> str:
-    """Say what drives a condition, for those who read the visit later."""
+def describe_input(condition: str, arm: ArmOptions, pages: PageOptions) -> str:
+    """Describe the input of a condition, for ``visit.json``."""
     if condition == "ikns":
         smooth = ", smoothed" if arm.smooth else ""
         return f"{arm.source}{smooth}"
     if condition == "gamepad":
-        stick = "right trigger" if screens.stick == "trigger" else "left stick, up"
+        stick = "right trigger" if pages.stick == "trigger" else "left stick, up"
         return f"{PAGE[condition]}, {stick}"
     if condition == "ring":
         return _RING

@@ -21,10 +21,10 @@ from ikns.view.style import PAGE_WIDTH
 __all__ = [
     "Cell",
     "KeyNumber",
-    "Page",
+    "ReportPage",
     "Picture",
     "Section",
-    "Step",
+    "NextStep",
     "Table",
     "facts_html",
     "inline",
@@ -72,14 +72,14 @@ class KeyNumber:
 
 
 @dataclass(frozen=True)
-class Step:
+class NextStep:
     """A command to run next, and what it does."""
 
     command: str
     does: str
 
 
-class Page:
+class ReportPage:
     """Sets parts as HTML and numbers figures and tables while the page grows.
 
     Parameters
@@ -182,7 +182,7 @@ def facts_html(facts: Mapping[str, Cell]) -> str:
     return f'<dl class="facts">{items}</dl>'
 
 
-def steps_html(steps: Sequence[Step]) -> str:
+def steps_html(steps: Sequence[NextStep]) -> str:
     """Numbered list of commands."""
     if not steps:
         return ""

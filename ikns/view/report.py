@@ -11,10 +11,10 @@ from ikns.errors import FileError
 from ikns.view.parts import (
     Cell,
     KeyNumber,
-    Page,
+    NextStep,
     Picture,
+    ReportPage,
     Section,
-    Step,
     Table,
     facts_html,
     inline,
@@ -25,7 +25,7 @@ __all__ = [
     "KeyNumber",
     "Picture",
     "Section",
-    "Step",
+    "NextStep",
     "Table",
     "report_html",
     "write_report",
@@ -41,7 +41,7 @@ def write_report(
     lead: str = "",
     facts: Mapping[str, Cell] | None = None,
     key_numbers: Sequence[KeyNumber] = (),
-    next_steps: Sequence[Step] = (),
+    next_steps: Sequence[NextStep] = (),
 ) -> None:
     """Write a report; an earlier file stays as it was until the new one is complete.
 
@@ -62,7 +62,7 @@ def write_report(
         Subject and provenance for the header: side, chain, seed, versions.
     key_numbers : sequence of KeyNumber
         Results to see first.
-    next_steps : sequence of Step
+    next_steps : sequence of NextStep
         Commands for the end of the page.
 
     Raises
@@ -100,10 +100,10 @@ def report_html(
     lead: str = "",
     facts: Mapping[str, Cell] | None = None,
     key_numbers: Sequence[KeyNumber] = (),
-    next_steps: Sequence[Step] = (),
+    next_steps: Sequence[NextStep] = (),
 ) -> str:
     """Return the page that :func:`write_report` writes; same input, same text."""
-    page = Page(simulated)
+    page = ReportPage(simulated)
     style = files("ikns.view").joinpath("report.css").read_text(encoding="utf-8")
     badge = '<p class="badge">Simulated subject</p>' if simulated else ""
     parts = [

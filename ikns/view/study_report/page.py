@@ -13,7 +13,15 @@ from ikns.experiments.study.summary.answers import (
     picking_answer,
     tracking_answer,
 )
-from ikns.view.parts import Cell, Page, Section, Step, facts_html, inline, steps_html
+from ikns.view.parts import (
+    Cell,
+    NextStep,
+    ReportPage,
+    Section,
+    facts_html,
+    inline,
+    steps_html,
+)
 from ikns.view.study_report.texts import BANNER, CANNOT
 
 __all__ = ["Part", "study_html"]
@@ -32,7 +40,7 @@ def study_html(
     *,
     about_paper: Section,
     left_out: Section | None,
-    next_steps: Sequence[Step],
+    next_steps: Sequence[NextStep],
 ) -> str:
     """Return the page; same input, same text."""
     css = "".join(
@@ -86,7 +94,7 @@ def study_html(
     return "\n".join(part for part in [*head, *body, *tail] if part) + "\n"
 
 
-class _StudyPage(Page):
+class _StudyPage(ReportPage):
     """A page whose parts differ in whether they are simulated."""
 
     def __init__(self) -> None:
@@ -94,7 +102,7 @@ class _StudyPage(Page):
 
     def of(self, *, simulated: bool) -> None:
         """Label what follows."""
-        self.suffix = Page(simulated).suffix
+        self.suffix = ReportPage(simulated).suffix
 
     def section(self, section: Section) -> str:
         """Say in the heading too that it is simulated."""
@@ -156,7 +164,7 @@ def _answers(group: Group, *, several: bool) -> str:
         *tracking_answer(group.tracking, simulated=group.simulated),
         *picking_answer(group.picking, simulated=group.simulated),
     ]
-    tag = Page(group.simulated).suffix
+    tag = ReportPage(group.simulated).suffix
     whose = ""
     if several:
         whose = ": simulated participants" if group.simulated else ": people"

@@ -10,7 +10,7 @@ from typing import Any
 
 from ikns.experiments.study.summary import Group, StudySummary
 from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_csv
-from ikns.view.parts import Section, Step
+from ikns.view.parts import NextStep, Section
 from ikns.view.render import pdf, svg
 from ikns.view.study_report.map_section import map_drawn, map_section
 from ikns.view.study_report.other_sections import (
@@ -138,14 +138,14 @@ def _sections(group: Group, drawn: list[tuple[str, Drawn]]) -> Iterator[Section]
     yield methods_section(group)
 
 
-def _next_steps(summary: StudySummary) -> list[Step]:
+def _next_steps(summary: StudySummary) -> list[NextStep]:
     if all(group.simulated for group in summary.groups):
         return [
-            Step(
+            NextStep(
                 "ikns study plan",
                 "How many people a study needs to find, or to exclude, a difference:",
             ),
-            Step(
+            NextStep(
                 "ikns track --help",
                 "The same experiment with people, into the same study folder:",
             ),

@@ -1,0 +1,131 @@
+"""The whole line on a virtual subject, from C3D files to a control signal."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ikns.calibration import calibrate, track_chain
+from ikns.calibration.subject import Subject
+from ikns.calibration.swivel_check import SwivelSamples, swivel_samples
+from ikns.live.control.recorded import ControlTable, control_table
+from ikns.motion.motion import Motion
+from ikns.recording.files import read
+from ikns.recording.recording import Recording
+from ikns.simulation import (
+    Protocol,
+    simulate_protocol,
+    virtual_subject,
+    write_protocol,
+)
+
+__all__ = ["Demo", "demo_summary", "run_demo"]
+
+
+class Demo(NamedTuple):
+    """A calibrated virtual subject, and the truth.
+
+    Parameters
+    ----------
+    seed : int
+    quick : bool
+    protocol : Protocol
+        What was simulated.
+    subject : Subject
+        Calibrated from the files alone; its motion is the exploration of the points.
+    points : Recording
+        The exploration of the points, as read.
+    reaching : Motion
+        The free exploration, which the map has not seen.
+    control : ControlTable
+        Control signal during the free exploration.
+    still : SwivelSamples
+        Control signal and true swivel on the samples that the map was learned from.
+    """
+
+    seed: int
+    quick: bool
+    protocol: Protocol
+    subject: Subject
+    points: Recording
+    reaching: Motion
+    control: ControlTable
+    still: SwivelSamples
+
+
+def run_demo(
+    folder: Path,
+    *,
+    seed: int = 1,
+    quick: bool = False,
+    progress: Callable[[str, int, int], None] = lambda step, done, total: None,
+) -> Demo:
+    """Simulate a calibration as files, calibrate from them, and compare with the truth.
+
+    Parameters
+    ----------
+    folder : Path
+        Existing folder; gets ``recordings`` and ``subject``.
+    seed : int
+        Which virtual subject.
+    quick : bool
+        3 s a point instead of 5 s.
+    progress : callable
+        Called with (step, done, total).
+    """
+    progress("simulating", 0, 1)
+    protocol = simulate_protocol(virtual_subject(seed), seed=seed, quick=quick)
+    files = write_protocol(folder / "recordings", protocol)
+    progress("simulating", 1, 1)
+
+    # From here on as with a real person: nothing but the files is used.
+    static, free, points = (read(path) for path in files)
+    subject = calibrate(static, [points], progress=progress)
+    report = subject.report | {"simulated": True}
+    subject = dataclasses.replace(subject, report=report)
+    subject.save(folder / "subject")
+    reaching = track_chain(subject.skeleton, free, subject.chain, progress=progress)
+    control = control_table(subject, reaching)
+
+    still = swivel_samples(subject, protocol.points.swivel)
+    return Demo(seed, quick, protocol, subject, points, reaching, control, still)
+
+
+def demo_summary(
+    demo: Demo, rows: list[dict[str, Any]], warned: Sequence[str]
+) -> dict[str, Any]:
+    """Return the numbers of a demo, ready for ``summary.json``.
+
+    Parameters
+    ----------
+    demo : Demo
+    rows : list of dict
+        Learned against analytic at each PCA point.
+    warned : sequence of str
+        Warnings of that comparison.
+    """
+    person = demo.protocol.subject
+    true = person.skeleton.segment_lengths
+    found = demo.subject.skeleton.segment_lengths
+    correlations, report = demo.still.correlations, demo.subject.report
+    return {
+        "simulated": True,
+        "ikns": version("ikns"),
+        "seed": demo.seed,
+        "quick": demo.quick,
+        "person": {
+            "sex": person.adult.sex,
+            "stature_m": person.adult.stature_m,
+            "mass_kg": person.adult.mass_kg,
+        },
+        "length_error_m": {name: found[name] - true[name] for name in true},
+        "residual_median_m": report["explorations"][0]["residual_median_m"],
+        "r_of_c_and_true_swivel": correlations,
+        "same_sign_everywhere": bool(min(correlations) * max(correlations) > 0),
+        "points": rows,
+        "control_while_reaching_freely": demo.control.summary,
+        "warnings": [*report["warnings"], *warned],
+    }

@@ -1,0 +1,80 @@
+"""The control signal of a whole recording, as a table and its summary."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.calibration.subject import Subject
+from ikns.live.control.rate import RateControl
+from ikns.motion.motion import Motion
+from ikns.numerics.median import finite_median
+
+__all__ = ["ControlTable", "control_table"]
+
+
+class ControlTable(NamedTuple):
+    """The control signal of a recording by frame.
+
+    Parameters
+    ----------
+    columns : list of str
+        ``time_s``; ``c``, clipped to 0 to 1 (``c_1``, ``c_2``, ... for several degrees
+        of freedom), NaN while the chain is not in sight; ``hand_speed_m_s`` in the
+        thorax frame; ``inside``, 1 within the volume of the PCA points; ``residual_m``
+        of the markers.
+    rows : (T, len(columns)) array
+    summary : dict
+        Counts, shares and medians, ready for JSON.
+    """
+
+    columns: list[str]
+    rows: NDArray[np.float64]
+    summary: dict[str, Any]
+
+
+def control_table(
+    subject: Subject,
+    motion: Motion,
+    *,
+    mode: Literal["position", "rate"] = "position",
+) -> ControlTable:
+    """Compute the control signal of a recording.
+
+    Parameters
+    ----------
+    subject : Subject
+    motion : Motion
+        Of that subject.
+    mode : {"position", "rate"}
+        c from the posture, as in the paper, or from null-space motion. In rate mode c
+        is held while the arm is not in sight, is NaN only before it was first seen,
+        and counts as clipped while it is at 0 or 1.
+    """
+    learned, chain = subject.null_space_map, subject.chain
+    place = motion.task_position(chain)
+    if mode == "rate":
+        raw = RateControl(learned, subject.skeleton, chain).track(motion)
+    else:
+        raw = learned.control_signal(motion.chain_angles(chain), place)
+    raw = raw.reshape(len(place), -1)
+    c = np.clip(raw, 0.0, 1.0)
+    inside = learned.inside(place)
+    names = ["c"] if c.shape[1] == 1 else [f"c_{k + 1}" for k in range(c.shape[1])]
+    rows = np.column_stack(
+        [motion.time, c, motion.hand_speed(chain), inside, motion.residual]
+    )
+    known = np.isfinite(raw).all(axis=1)
+    clipped = (raw <= 0) | (raw >= 1) if mode == "rate" else (raw < 0) | (raw > 1)
+    summary = {
+        "frames": len(c),
+        "frames_without_signal": int((~known).sum()),
+        "inside_share": float((inside & known).sum() / max(known.sum(), 1)),
+        "c_median": finite_median(c[:, 0]),
+        "clipped_share": float(clipped.any(axis=1).sum() / max(known.sum(), 1)),
+        "residual_median_m": finite_median(motion.residual),
+    }
+    columns = ["time_s", *names, "hand_speed_m_s", "inside", "residual_m"]
+    return ControlTable(columns, rows, summary)

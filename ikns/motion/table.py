@@ -1,0 +1,75 @@
+"""A motion as a table for a file, and its summary."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.motion.motion import Motion
+from ikns.numerics.median import finite_median
+
+__all__ = ["MotionTable", "motion_table"]
+
+_THORAX = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
+
+
+class MotionTable(NamedTuple):
+    """Joint angles in degrees, the pose of the thorax and residuals, by frame.
+
+    Parameters
+    ----------
+    columns : list of str
+        ``time_s``; ``<joint>_deg``; ``thorax_<part>``, m and a unit quaternion in the
+        world; ``residual_m``; ``converged``, 0 or 1.
+    rows : (T, len(columns)) array
+    range_deg : dict
+        Lowest and highest angle of every joint, deg.
+    summary : dict
+        Counts of frames, median residual (m) and held joints, ready for JSON.
+    """
+
+    columns: list[str]
+    rows: NDArray[np.float64]
+    range_deg: dict[str, tuple[float, float]]
+    summary: dict[str, Any]
+
+
+def motion_table(motion: Motion) -> MotionTable:
+    """Return a motion of a body with a thorax as a table.
+
+    Parameters
+    ----------
+    motion : Motion
+        At least one frame.
+    """
+    degrees = np.degrees(motion.angles)
+    columns = [
+        "time_s",
+        *(f"{joint}_deg" for joint in motion.joint_names),
+        *(f"thorax_{part}" for part in _THORAX),
+        "residual_m",
+        "converged",
+    ]
+    rows = np.column_stack(
+        [
+            motion.time,
+            degrees,
+            motion.q[:, : len(_THORAX)],
+            motion.residual,
+            motion.converged,
+        ]
+    )
+    span = np.ptp(degrees, axis=0)
+    ends = zip(degrees.min(axis=0).tolist(), degrees.max(axis=0).tolist(), strict=True)
+    summary = {
+        "frames": len(motion.time),
+        "frames_converged": int(motion.converged.sum()),
+        "frames_without_markers": int(np.isnan(motion.residual).sum()),
+        "residual_median_m": finite_median(motion.residual),
+        "held_joints": motion.held,
+        "moved_deg": dict(zip(motion.joint_names, span.tolist(), strict=True)),
+    }
+    ranges = dict(zip(motion.joint_names, ends, strict=True))
+    return MotionTable(columns, rows, ranges, summary)
