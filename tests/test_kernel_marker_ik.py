@@ -284,6 +284,24 @@ def agree(skeleton, seen, before):
     assert ours.residual == pytest.approx(exact.residual, abs=10 * AGREEMENT)
 
 
+@pytest.mark.parametrize("compiled", [True, False])
+def test_markers_of_the_static_trial_alone_weigh_nothing(compiled):
+    skeleton, rng = Skeleton.load(), np.random.default_rng(0)
+    static = np.array([m.static_only for m in skeleton.marker_set.markers])
+    assert 0 < static.sum() < len(static)
+    solver = MarkerIK(skeleton, compiled=compiled)
+    q = skeleton.neutral()
+    q[7:] += rng.uniform(0.1, 0.4, 18)
+    seen = skeleton.markers_in_world(q) + rng.normal(0, 1e-3, (len(static), 3))
+    hidden, astray = seen.copy(), seen.copy()
+    hidden[static], astray[static] = np.nan, 5.0
+    # From scratch and from a pose before.
+    for before in (None, q):
+        without, far = solver.solve(hidden, before), solver.solve(astray, before)
+        np.testing.assert_array_equal(far.q, without.q)
+        assert far.residual == without.residual < 0.01
+
+
 @settings(deadline=None, max_examples=25)
 @given(
     st.integers(0, 10**6),
