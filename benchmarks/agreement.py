@@ -11,6 +11,7 @@ import argparse
 import os
 import platform
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import numba
@@ -26,6 +27,8 @@ from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
+#: Who and what is compared, whatever else is there: two people of UE_ADL, three lifts.
+PEOPLE, TASKS, LIFTS = ("ADL001", "ADL005"), "ACDF", (1, 2, 3)
 #: Radians or meters; what is called the same.
 SAME = 1e-6
 
@@ -41,7 +44,7 @@ def recordings(
             yield f"simulated {seed}, {trial.name}", skeleton, trial.recording
     if data is None:
         return
-    for name in ("ADL001", "ADL005"):
+    for name in PEOPLE:
         folder = data / "ue_adl" / name
         skeleton, _ = scale(
             Skeleton.load(),
@@ -49,14 +52,16 @@ def recordings(
             marker_set="ue_adl",
             min_duration=0.3,
         )
-        for trial in sorted(folder.glob(f"{name}??1.csv")):
+        for task, side in product(TASKS, "LR"):
+            trial = folder / f"{name}{task}{side}1.csv"
             yield trial.stem, skeleton, read(trial)
     skeleton, _ = scale(
         Skeleton.load(),
         read(data / "stoop" / "neu_t169_f250f350.c3d"),
         marker_set="plug_in_gait",
     )
-    for trial in sorted((data / "stoop").glob("stoop*.c3d")):
+    for i in LIFTS:
+        (trial,) = (data / "stoop").glob(f"stoop{i}_*.c3d")
         yield trial.stem, skeleton, read(trial)
 
 

@@ -25,6 +25,8 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.recording.files import read
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
+#: Whose figures are told, whoever else is there: two people of UE_ADL, three lifts.
+PEOPLE, LIFTS = ("ADL001", "ADL005"), (1, 2, 3)
 
 
 def best_shift(mine: np.ndarray, theirs: np.ndarray) -> tuple[float, int]:
@@ -54,7 +56,8 @@ def ue_adl(folder: Path, *, quick: bool) -> list[dict]:
     with (folder / "participants.csv").open() as file:
         people = {row["participant"]: row for row in csv.DictReader(file)}
     rows = []
-    for name, person in people.items():
+    for name in PEOPLE:
+        person = people[name]
         static = read(folder / name / f"{name}_static.csv")
         # One of the two static trials lasts 0.41 s.
         skeleton, report = scale(
@@ -107,9 +110,8 @@ def stoop(folder: Path, *, quick: bool) -> list[dict]:
     skeleton, _ = scale(Skeleton.load(), static, marker_set="plug_in_gait")
     labels = skeleton.marker_set.labels
     rows = []
-    for i, file in enumerate(sorted(folder.glob("stoop*.c3d")), start=1):
-        if quick and i > 1:
-            break
+    for i in LIFTS[: 1 if quick else None]:
+        (file,) = folder.glob(f"stoop{i}_*.c3d")
         recording = read(file)
         motion = MarkerIK(skeleton).track(recording)
         seen = skeleton.marker_set.pick(recording.labels, recording.markers)

@@ -240,6 +240,16 @@ def test_fast_signals_are_less_delayed():
     assert delays[0] > delays[1] > delays[2]
 
 
+@given(STEPS)
+@example([(0.0, 0.01), (1.0, 0.01), (3.0, 0.01)])
+def test_what_falls_is_smoothed_like_what_rises(steps):
+    rising, falling = OneEuro(), OneEuro()
+    for x, dt in steps:
+        # Signs change no rounding.
+        np.testing.assert_array_equal(falling.step(-x, dt), -rising.step(x, dt))
+        assert falling.delay == rising.delay
+
+
 def test_after_a_reset_it_starts_anew():
     smooth = OneEuro()
     smooth.step(5.0, 0.01)

@@ -23,6 +23,8 @@ from ikns.numerics.subspace import principal_components
 from ikns.recording.files import read
 from ikns.simulation.arm import Arm, self_motion
 
+#: Figures are of these two, whoever else is in the folder.
+PEOPLE = ("ADL001", "ADL005")
 _HALF = np.radians(35.0)
 #: A place where the elbow has less room is left out, rad.
 _LEAST = np.radians(30.0)
@@ -76,7 +78,7 @@ class RealArm:
 def real_arms(folder: Path, *, quick: bool) -> list[RealArm]:
     """Both arms of both people; the first one for a quick look."""
     arms = []
-    for name in sorted(p.name for p in folder.iterdir() if p.is_dir()):
+    for name in PEOPLE:
         static = read(folder / name / f"{name}_static.csv")
         skeleton, _ = scale(
             Skeleton.load(), static, marker_set="ue_adl", min_duration=0.3
