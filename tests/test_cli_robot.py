@@ -76,7 +76,7 @@ def test_a_table_for_people(
     ("more", "says"),
     [
         (["--frame", "tool"], "has no link 'tool'"),
-        (["--frame", "panda_link0"], "on the way to 'panda_link0', found none"),
+        (["--frame", "panda_link0"], "from the base to 'panda_link0', found none"),
         (["--speed", "0"], "slower than 0 m/s, found none"),
         (["--figure", "robot.gif"], "expected a picture"),
     ],

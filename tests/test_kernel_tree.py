@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 from ikns._kernels.body.tree import joint_axes, place_joints
+from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.tree import joint_tree
 
@@ -93,7 +94,9 @@ def test_markers_and_hands_in_the_tree_are_where_the_skeleton_has_them():
     np.testing.assert_allclose(
         markers, skeleton.markers_in_world(q), rtol=0, atol=EXACT
     )
-    joint, turn, shift = skeleton.tree_hands
+    joint, turn, shift = map(
+        np.array, zip(*(skeleton.tree_link(f"{s}_knuckle") for s in SIDES), strict=True)
+    )
     position, orientation = skeleton.hands_in_thorax(q)
     # Joint 0 is the thorax.
     hands = np.einsum("hij,hj->hi", rotation[joint], shift) + translation[joint]

@@ -100,8 +100,8 @@ def test_a_frame_that_is_not_there_is_named_with_those_that_are():
         Robot(Skeleton.load().urdf, "tool")
 
 
-def test_a_way_without_joints_is_refused():
-    with pytest.raises(InvalidInput, match="on the way to 'thorax', found none"):
+def test_a_path_without_joints_is_refused():
+    with pytest.raises(InvalidInput, match="from the base to 'thorax', found none"):
         Robot(Skeleton.load().urdf, "thorax")
 
 

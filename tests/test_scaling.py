@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.scaling import SEGMENT_SD, SIDE_SD, STATURE_SD, scale
+from ikns.calibration.scaling import scale
+from ikns.calibration.size_fit import SEGMENT_SD, SIDE_SD, STATURE_SD
 from ikns.errors import MarkerMismatch, NotEnoughData
 from ikns.motion.marker_ik import MarkerIK
 from ikns.recording.files import read
@@ -210,7 +211,9 @@ def test_an_arm_without_markers_is_held_and_a_bare_segment_refused(generic):
 
 def test_a_short_trial_is_refused_unless_asked_for(generic):
     recording = standing(person(generic, 2), 2, seconds=0.4)
-    with pytest.raises(NotEnoughData, match=r"at least 1 s is expected, found 0.40 s"):
+    with pytest.raises(
+        NotEnoughData, match=r"static trial of at least 1 s, found 0.40 s"
+    ):
         scale(generic, recording)
     scale(generic, recording, min_duration=0.4)
 

@@ -6,7 +6,7 @@ import pytest
 
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.scaling import MARKER_SD, POSE_SD, size_covariance
+from ikns.calibration.size_fit import MARKER_SD, POSE_SD, size_covariance
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
 from ikns.recording.recording import Recording
 from ikns.symbolic import fit_lengths, markers_in_world

@@ -187,6 +187,11 @@ class MarkerSet:
         """Return the set as it is worn after the static trial."""
         return self.only(m.label for m in self.markers if not m.static_only)
 
+    def all_tracked(self) -> MarkerSet:
+        """Return the set with its static-only markers tracked like the others."""
+        markers = tuple(replace(marker, static_only=False) for marker in self.markers)
+        return replace(self, markers=markers)
+
     def only(self, labels: Iterable[str]) -> MarkerSet:
         """Return the set with these markers alone, in its own order."""
         kept = set(labels)

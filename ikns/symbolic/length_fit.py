@@ -19,7 +19,7 @@ with the static trial and the prior.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +28,14 @@ from numpy.typing import NDArray
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS, relative_sizes
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.scaling import (
+from ikns.calibration.scaling import ScalingReport, scale
+from ikns.calibration.size_fit import (
     MARKER_SD,
     POSE_SD,
-    ScalingReport,
-    scale,
-    static_posture,
+    length_deviations,
+    size_factors,
 )
+from ikns.calibration.static_trial import static_posture
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.marker_ik import MarkerIK
 from ikns.recording.recording import Recording
@@ -151,7 +152,7 @@ def fit_lengths(
     )
     worn = dressed.marker_set
     q, markers = _chosen(scaled, recordings, n_frames)
-    first = MarkerIK(dressed.with_markers(_all_tracked(worn))).solve(target)
+    first = MarkerIK(dressed.with_markers(worn.all_tracked())).solve(target)
     seen = np.asarray(np.isfinite(markers).all(axis=2))
     worth = min(independent_frames / len(q), 1.0)
     pulls = np.r_[1.0, np.full(len(q), worth)] / POSE_SD**2
@@ -166,7 +167,7 @@ def fit_lengths(
 
     sizes = np.log(list(_sizes(scaled, dressed).values()))
     offsets = np.zeros((len(worn.markers), 3))
-    nominal = dressed.resized(_named(sizes)).marker_positions
+    nominal = dressed.resized(size_factors(sizes)).marker_positions
     offsets[tracked] = scaled.marker_positions - nominal[tracked]
     program = LengthProgram(dressed, len(q) + 1)
     sd = marker_sd or _spread(scaled, q, markers)
@@ -189,7 +190,7 @@ def fit_lengths(
         if abs(after - sd) < _SETTLED * sd:
             break
         sd = after
-    sized = dressed.resized(_named(sizes))
+    sized = dressed.resized(size_factors(sizes))
     places = sized.marker_positions + offsets
     skeleton = sized.with_markers(worn.at(places).only(kept))
     return skeleton, _report(skeleton, worn, found, before, sd, len(trust))
@@ -203,15 +204,11 @@ def _report(
     marker_sd: float,
     frames: int,
 ) -> LengthFit:
-    lengths, sd = skeleton.segment_lengths, np.sqrt(np.diag(found.covariance))
+    lengths = skeleton.segment_lengths
     distance = np.linalg.norm(found.offsets, axis=1)
     return LengthFit(
         lengths=lengths,
-        length_sd={
-            name: lengths[name] * float(sd[s])
-            for s, name in enumerate(SEGMENTS)
-            if name in lengths
-        },
+        length_sd=length_deviations(lengths, found.covariance),
         static_lengths=before.lengths,
         static_length_sd=before.length_sd,
         marker_sd=marker_sd,
@@ -273,12 +270,3 @@ def _spread(skeleton: Skeleton, q: Array, markers: Array) -> float:
 def _sizes(skeleton: Skeleton, dressed: Skeleton) -> dict[str, float]:
     sizes = relative_sizes(skeleton.urdf, dressed.urdf)
     return {name: sizes[name] for name in SEGMENTS}
-
-
-def _named(log_sizes: Array) -> dict[str, float]:
-    return dict(zip(SEGMENTS, np.exp(log_sizes).tolist(), strict=True))
-
-
-def _all_tracked(worn: MarkerSet) -> MarkerSet:
-    markers = tuple(replace(marker, static_only=False) for marker in worn.markers)
-    return replace(worn, markers=markers)

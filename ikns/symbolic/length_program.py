@@ -18,7 +18,7 @@ from scipy.sparse.linalg import splu
 
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.scaling import size_covariance
+from ikns.calibration.size_fit import size_covariance
 from ikns.symbolic.kinematics import sized_markers
 
 __all__ = ["FrameData", "LengthProgram", "Solution"]

@@ -1,4 +1,4 @@
-"""Link frames seen from the thorax, and how the joints move them: compiled."""
+"""Poses and Jacobians of links in the thorax frame, by compiled kernels."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class LinkFrames:
         self.tree: Tree
         self.tree, self.turned = joint_tree(model)
         self.joint_names: tuple[str, ...] = tuple(model.names)[2:]
-        self._known: dict[tuple[tuple[str, ...], tuple[str, ...]], Paths] = {}
+        self._cache: dict[tuple[tuple[str, ...], tuple[str, ...]], Paths] = {}
 
     def index(self, link: str) -> int:
         """Return the number of a link's frame in the model."""
@@ -87,9 +87,9 @@ class LinkFrames:
         shoulder, elbow, wrist = np.moveaxis(position, -3, 0)
         lx, ly, lz = np.moveaxis(wrist - shoulder, -1, 0)
         ex, ey, ez = np.moveaxis(elbow - shoulder, -1, 0)
-        # The direction below the line is -Y less its part along the line; what stands
-        # out sideways is that direction crossed with the line. Both have length
-        # hypot(lx, lz) / |line|, which the ratio does not see.
+        # The downward direction is -Y less its part along the line; the outward one is
+        # its cross product with the line. Both have length hypot(lx, lz) / |line|,
+        # which cancels in the ratio.
         length = np.sqrt(lx * lx + ly * ly + lz * lz)
         along = (ex * lx + ey * ly + ez * lz) / length**2
         down = along * ly - ey
@@ -109,28 +109,31 @@ class LinkFrames:
         return np.array(array[..., -n:], order="C").reshape(-1, n), array.shape[:-1]
 
     def paths(self, links: tuple[str, ...], columns: tuple[str, ...] = ()) -> Paths:
-        """Ways from the thorax to the links, made once."""
-        if (links, columns) not in self._known:
-            self._known[links, columns] = self._paths_to(links, columns)
-        return self._known[links, columns]
+        """Paths from the thorax to the links, computed once.
+
+        `columns` are the joints of a Jacobian's columns.
+        """
+        if (links, columns) not in self._cache:
+            self._cache[links, columns] = self._paths_to(links, columns)
+        return self._cache[links, columns]
 
     def _paths_to(self, links: tuple[str, ...], columns: tuple[str, ...]) -> Paths:
         tree, ends = self.tree, [self.in_tree(link) for link in links]
-        ways = [self.way(joint) for joint, _, _ in ends]
-        joints = np.array(sum(ways, []), dtype=np.int64)
+        moving = [self.joints_to(joint) for joint, _, _ in ends]
+        joints = np.array(sum(moving, []), dtype=np.int64)
         names = [self.joint_names[joint - 1] for joint in joints]
         column = np.array(
             [columns.index(name) if name in columns else -1 for name in names],
             dtype=np.int64,
         )
         return Paths(
-            ends=np.cumsum([len(way) for way in ways]),
+            ends=np.cumsum([len(joints) for joints in moving]),
             joint=np.stack([tree.kind[joints], joints - 1, column], axis=1),
             rotation=np.stack([*tree.rotation[joints], *(R for _, R, _ in ends)]),
             translation=np.stack([*tree.translation[joints], *(p for _, _, p in ends)]),
         )
 
-    def way(self, joint: int) -> list[int]:
-        """Joints from the thorax to this one, without the thorax's own."""
+    def joints_to(self, joint: int) -> list[int]:
+        """Joints of the tree from the thorax to this one, without the thorax's own."""
         parent = int(self.tree.parent[joint])
-        return [] if parent < 0 else [*self.way(parent), joint]
+        return [] if parent < 0 else [*self.joints_to(parent), joint]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS, segment_ends
 from ikns.errors import MarkerMismatch
 
-__all__ = ["Markers", "part_along"]
+__all__ = ["Markers", "grown_positions", "part_along"]
 
 Array = NDArray[np.float64]
 
@@ -110,10 +112,23 @@ class Markers:
         return positions
 
 
+def grown_positions(
+    urdf: str, marker_set: MarkerSet, factors: Mapping[str, float]
+) -> Array:
+    """Markers in their links, (M, 3) m, after the segments of a URDF are resized.
+
+    `factors` are size factors by link; markers keep their place along the segment.
+    """
+    positions = np.array([m.position for m in marker_set.markers]).reshape(-1, 3)
+    growth = [factors.get(m.link, 1.0) - 1 for m in marker_set.markers]
+    along = part_along(urdf, marker_set, positions)
+    return positions + np.array(growth).reshape(-1, 1) * along
+
+
 def part_along(urdf: str, marker_set: MarkerSet, positions: Array) -> Array:
     """Part of the markers' places (M, 3) that grows with their segment.
 
-    Along a limb; girth is not a matter of length. On the thorax, all of it.
+    Along a limb only, as girth does not follow length; on the thorax, all of it.
     """
     ends = segment_ends(urdf)
     axes = np.zeros((len(positions), 3, 3))

@@ -1,7 +1,7 @@
-"""Any robot from its URDF: the joints on the way to one frame, seen from the base.
+"""Any robot from its URDF: the joints from its base to one frame.
 
-What is learned and analyzed from a person's arm needs joint angles, a hand and a
-Jacobian, nothing else, so a robot arm does as well.
+Learning and analysis need joint angles, a hand and a Jacobian, nothing else, so a robot
+arm can take the place of a person's.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns._kernels.body.tree import Tree
 from ikns.body.skeleton.frames import LinkFrames
+from ikns.body.skeleton.model import build_model, read_urdf
 from ikns.errors import FileError, InvalidInput
 from ikns.numerics.subspace import null_spaces
 
@@ -40,18 +41,18 @@ class Robot:
     ----------
     frame : str
     joint_names : tuple of str
-        The n movable joints from the base to the frame, in this order; all others do
-        not matter and stay out.
+        The n movable joints from the base to the frame, in this order; others are left
+        out.
     lower, upper : (n,) array
-        Limits, rad (m for sliding joints); infinite for continuous joints.
+        Limits, rad (m for prismatic joints); infinite for continuous joints.
 
     Raises
     ------
     FileError
-        When the text is no URDF.
+        When the text is not a URDF.
     InvalidInput
-        When it has no such link, or the way there leads through no joint, or through
-        one that is neither revolute nor sliding.
+        When it has no such link, or no joint moves it, or one that does is neither
+        revolute nor prismatic.
 
     Examples
     --------
@@ -66,11 +67,8 @@ class Robot:
     """
 
     def __init__(self, urdf: str, frame: str) -> None:
-        text, continuous, odd = _with_one_angle_a_joint(urdf)
-        try:
-            model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
-        except (ValueError, RuntimeError) as error:
-            raise FileError(f"the URDF cannot be read: {error}") from None
+        text, continuous, refused = _with_one_angle_a_joint(urdf)
+        model = build_model(text)
         links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
         if frame not in links:
             more = ", ..." if len(links) > _NAMED else ""
@@ -82,16 +80,16 @@ class Robot:
         self._frames = LinkFrames(model)
         carrier, rotation, translation = self._frames.in_tree(frame)
         self.end: tuple[int, Array, Array] = (carrier, rotation, translation)
-        way = self._frames.way(carrier)
-        self.joint_names: tuple[str, ...] = tuple(model.names[j + 1] for j in way)
-        unfit = [name for name in self.joint_names if name in odd]
-        if unfit or not way:
+        moving = self._frames.joints_to(carrier)
+        self.joint_names: tuple[str, ...] = tuple(model.names[j + 1] for j in moving)
+        unfit = [name for name in self.joint_names if name in refused]
+        if unfit or not moving:
             found = f"joint '{unfit[0]}'" if unfit else "none"
             raise InvalidInput(
-                f"expected revolute or sliding joints on the way to '{frame}', found "
-                f"{found}."
+                f"expected revolute or prismatic joints from the base to '{frame}', "
+                f"found {found}."
             )
-        columns = np.array([model.joints[j + 1].idx_q for j in way])
+        columns = np.array([model.joints[j + 1].idx_q for j in moving])
         free = np.isin(self.joint_names, list(continuous))
         self.lower: Array = np.where(free, -np.inf, model.lowerPositionLimit[columns])
         self.upper: Array = np.where(free, np.inf, model.upperPositionLimit[columns])
@@ -109,11 +107,7 @@ class Robot:
         frame : str
             The link that does the task.
         """
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise FileError(f"{path}: cannot be read as a URDF: {error}") from None
-        return cls(text, frame)
+        return cls(read_urdf(Path(path)), frame)
 
     @property
     def tree(self) -> Tree:
@@ -166,7 +160,7 @@ class Robot:
         return null_spaces(self.jacobian(q, task=task), rtol=rtol)
 
     def _all(self, q: ArrayLike) -> Array:
-        """Positions of all joints, those off the way at zero."""
+        """Positions of all joints; those that do not move the frame are zero."""
         given = np.asarray(q, dtype=np.float64)
         n = len(self.joint_names)
         if not given.ndim or given.shape[-1] != n:
@@ -180,26 +174,26 @@ class Robot:
 
 
 def _with_one_angle_a_joint(urdf: str) -> tuple[str, set[str], set[str]]:
-    """Text whose joints all have one position, and which were continuous or odd.
+    """Text whose joints all have one position, and which were continuous or refused.
 
-    Pinocchio holds a continuous joint as cosine and sine; here it is an angle. A
-    floating or planar joint is fixed instead and told of where it matters.
+    Pinocchio stores a continuous joint as cosine and sine; here it is an angle. A
+    floating or planar joint becomes revolute, and is refused where it moves the frame.
     """
     try:
         robot = ET.fromstring(urdf)
     except ET.ParseError as error:
         raise FileError(f"the URDF cannot be read: {error}.") from None
-    continuous, odd = set(), set()
+    continuous, refused = set(), set()
     for joint in robot.iter("joint"):
         name, kind = joint.get("name", ""), joint.get("type")
         if kind == "continuous":
             continuous.add(name)
         elif kind in ("floating", "planar"):
-            odd.add(name)
+            refused.add(name)
         else:
             continue
         joint.set("type", "revolute")
         for old in joint.findall("limit"):
             joint.remove(old)
         ET.SubElement(joint, "limit", lower="-1", upper="1", effort="1", velocity="1")
-    return ET.tostring(robot, encoding="unicode"), continuous, odd
+    return ET.tostring(robot, encoding="unicode"), continuous, refused

@@ -4,11 +4,13 @@ A configuration ``q`` is (25,): position of the thorax in the world (m), its uni
 quaternion x, y, z, w, then 18 joint angles (rad) in the order of
 :attr:`Skeleton.joint_names`. Its tangent ``v`` is (24,): linear and angular velocity of
 the thorax in its own frame, then the joint velocities.
+
+What is seen from the thorax takes one configuration or many, (..., 25), or joint angles
+alone, (..., 18), and returns NaN where they hold NaN.
 """
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -20,11 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.tree import Tree
 from ikns.body.anthropometry import Segment, segments
-from ikns.body.chains import SIDES, chain_joints
+from ikns.body.chains import SIDES
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import (
     GENERIC_STATURE,
-    SEGMENTS,
     Inertial,
     link_inertials,
     relative_sizes,
@@ -33,16 +34,14 @@ from ikns.body.model_file import (
     urdf_folder,
 )
 from ikns.body.skeleton.frames import LinkFrames
-from ikns.body.skeleton.markers import Markers, part_along
-from ikns.errors import FileError, InvalidInput
+from ikns.body.skeleton.markers import Markers, grown_positions, part_along
+from ikns.body.skeleton.model import NQ_ROOT, NV_ROOT, read_urdf, upper_body_model
+from ikns.errors import InvalidInput
 from ikns.numerics.subspace import null_spaces
 
 __all__ = ["Skeleton"]
 
 Array = NDArray[np.float64]
-
-#: Columns of `q` and `v` that hold the thorax.
-_NQ_ROOT, _NV_ROOT = 7, 6
 
 
 class Skeleton:
@@ -64,27 +63,13 @@ class Skeleton:
     """
 
     def __init__(self, urdf: str, marker_set: MarkerSet) -> None:
-        try:
-            # Pinocchio's own parser prints to the terminal before it raises.
-            ET.fromstring(urdf)
-            model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-        except (ET.ParseError, ValueError, RuntimeError) as error:
-            raise FileError(f"the URDF cannot be read: {error}") from None
+        model = upper_body_model(urdf)
         self.urdf = urdf
         self.marker_set = marker_set
         self._model = model
         self.joint_names: tuple[str, ...] = tuple(model.names)[2:]
-        needed = {j for side in SIDES for j in chain_joints(f"{side}_arm_clavicle")}
-        needed |= {*SEGMENTS, *(f"{side}_knuckle" for side in SIDES)}
-        bodies = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
-        missing = needed - set(self.joint_names) - bodies
-        if missing or model.nq != _NQ_ROOT + len(self.joint_names):
-            raise FileError(
-                "the URDF is not an upper body of revolute joints: it lacks "
-                f"{', '.join(sorted(missing)) or 'one-angle joints'}."
-            )
-        self.lower: Array = np.array(model.lowerPositionLimit[_NQ_ROOT:])
-        self.upper: Array = np.array(model.upperPositionLimit[_NQ_ROOT:])
+        self.lower: Array = np.array(model.lowerPositionLimit[NQ_ROOT:])
+        self.upper: Array = np.array(model.upperPositionLimit[NQ_ROOT:])
         self._markers = Markers(model, marker_set)
 
     @classmethod
@@ -97,11 +82,7 @@ class Skeleton:
         18
         """
         file = urdf_folder() / "upper_body.urdf" if path is None else Path(path)
-        try:
-            text = file.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise FileError(f"{file}: cannot be read as a URDF: {error}") from None
-        return cls(text, MarkerSet.load(marker_set))
+        return cls(read_urdf(file), MarkerSet.load(marker_set))
 
     @classmethod
     def from_anthropometry(
@@ -161,28 +142,22 @@ class Skeleton:
 
         Parameters
         ----------
-        factors : mapping
-            Size factor per segment (see :data:`ikns.body.model_file.SEGMENTS`).
-        inertials : mapping, optional
-            New inertial properties by link name.
+        factors, inertials
+            As :func:`ikns.body.model_file.resize_urdf` takes them.
         """
         urdf = resize_urdf(self.urdf, factors, inertials=inertials)
-        growth = [factors.get(m.link, 1.0) - 1 for m in self.marker_set.markers]
-        positions = self.marker_positions
-        positions += np.array(growth).reshape(-1, 1) * part_along(
-            self.urdf, self.marker_set, positions
-        )
+        positions = grown_positions(self.urdf, self.marker_set, factors)
         return Skeleton(urdf, self.marker_set.at(positions))
 
     def with_markers(self, marker_set: MarkerSet) -> Skeleton:
-        """Return the same body wearing these markers where the set says."""
+        """Return the same body with these markers, at the places that the set has."""
         return Skeleton(self.urdf, marker_set)
 
     def with_nominal_markers(self, marker_set: MarkerSet) -> Skeleton:
         """Return the same body with markers at the nominal places for its size.
 
-        A shipped set's places are those on the generic body; along a longer limb they
-        lie farther apart.
+        A shipped set has the places on the generic body; on a longer limb they lie
+        farther apart.
         """
         generic = Skeleton.load().urdf
         sizes = relative_sizes(self.urdf, generic)
@@ -225,9 +200,7 @@ class Skeleton:
         unknown = [joint for joint in joints if joint not in self.joint_names]
         if unknown:
             raise InvalidInput(f"the skeleton has no joint {', '.join(unknown)}.")
-        return np.array([_NV_ROOT + self.joint_names.index(j) for j in joints])
-
-    # --- the body as arrays, for kernels --------------------------------------------
+        return np.array([NV_ROOT + self.joint_names.index(j) for j in joints])
 
     @property
     def tree(self) -> Tree:
@@ -241,26 +214,8 @@ class Skeleton:
         turned = self._frames.turned[joint]
         return joint, np.einsum("mji,mj->mi", turned, self._markers.in_joint)
 
-    @cached_property
-    def tree_hands(self) -> tuple[NDArray[np.int64], Array, Array]:
-        """Right and left knuckle frame in the tree.
-
-        Returns
-        -------
-        joint : (2,) integer array
-        rotation : (2, 3, 3) array
-        translation : (2, 3) array
-            The frame's placement in the joint's frame, m.
-        """
-        hands = [self._frames.in_tree(f"{side}_knuckle") for side in SIDES]
-        joint, rotation, translation = zip(*hands, strict=True)
-        return np.array(joint), np.stack(rotation), np.stack(translation)
-
     def tree_link(self, link: str) -> tuple[int, Array, Array]:
-        """Joint of the tree that carries a link, and the link's pose in its frame.
-
-        Rotation (3, 3) and translation (3,) m.
-        """
+        """Joint of the tree that carries a link; rotation and translation (m) there."""
         return self._frames.in_tree(link)
 
     @cached_property
@@ -271,8 +226,6 @@ class Skeleton:
     @cached_property
     def _frames(self) -> LinkFrames:
         return LinkFrames(self._model)
-
-    # --- markers in the world -------------------------------------------------------
 
     def markers_in_world(self, q: Array) -> Array:
         """Marker positions at `q`, (M, 3) m."""
@@ -286,8 +239,7 @@ class Skeleton:
         positions : (M, 3) array
             Meters in the world.
         jacobian : (M, 3, nv) array
-            d position / d v: column j is ``linear_j + angular_j x position`` for the
-            joints between the root and the marker, else zero.
+            d position / d v.
         """
         return self._markers.jacobian(q)
 
@@ -304,11 +256,6 @@ class Skeleton:
         """
         along = part_along(self.urdf, self.marker_set, self._markers.in_joint)
         return self._markers.by_size(q, along)
-
-    # --- the body seen from the thorax ----------------------------------------------
-    #
-    # `q` is one configuration or many, (..., 25), or joint angles alone, (..., 18). NaN
-    # in a configuration comes out as NaN.
 
     def link_in_thorax(self, q: ArrayLike, link: str) -> tuple[Array, Array]:
         """Origin of a link, (..., 3) m, and orientation, (..., 3, 3)."""
@@ -349,14 +296,12 @@ class Skeleton:
         q, chain, task
             As :meth:`chain_jacobian` takes them.
         rtol : float
-            See :func:`ikns.numerics.subspace.null_spaces`, which this returns.
+            See :func:`ikns.numerics.subspace.null_spaces`, which this calls.
 
         Returns
         -------
         basis : (..., d, n) array
-            Orthonormal rows, below them zeros where others have more.
         rank : (...) integer array
-            Of the Jacobian; -1 where it is not finite.
 
         Examples
         --------

@@ -1,0 +1,227 @@
+"""Least-squares fit of segment sizes, marker places and pose to a static trial.
+
+The unknowns are the size of each segment (as the log of a factor on the generic body),
+the place of each marker, and the pose. The cost is the sum of
+
+    |p_m - seen_m|^2 / MARKER_SD^2              the static trial's mean markers
+    |offset_m|^2 / placement_sd_m^2             markers sit near their nominal places
+    s' inv(C) s,   s = log factors              people's proportions vary little
+    |q|^2 / POSE_SD^2                           weak: for what markers do not show
+
+So a joint center lies midway between its medial and lateral landmarks where both are
+worn, and at the landmark's nominal offset otherwise. The covariance C of the sizes has
+a part that all segments share (stature), one per kind of segment, and one per side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.static_trial import seen_markers
+from ikns.motion.marker_ik import MarkerIK
+
+__all__ = [
+    "MARKER_SD",
+    "POSE_SD",
+    "SEGMENT_SD",
+    "SIDE_SD",
+    "STATURE_SD",
+    "SizeFit",
+    "fit_sizes",
+    "length_deviations",
+    "size_covariance",
+    "size_factors",
+]
+
+Array = NDArray[np.float64]
+
+#: Error of a marker's mean position over the trial, m: 0.1 to 1 mm of it is that of the
+#: cameras, the rest comes from segments that are not quite rigid.
+MARKER_SD = 1e-3
+#: Spread of stature over adults of both sexes, ANSUR II: 66 mm within a sex and 64 mm
+#: between the means, over 1692 mm.
+STATURE_SD = 0.055
+#: Spread of a segment's length at a given stature, ANSUR II (SEE over mean): upper arm
+#: 3.2 %, forearm 4.0 to 4.6 %, hand 3.8 to 4.3 %, half biacromial breadth 3.9 to 4.1 %;
+#: the clavicle is a shorter part of the latter.
+SEGMENT_SD = {
+    "thorax": 0.04,
+    "clavicle": 0.06,
+    "upper_arm": 0.032,
+    "forearm": 0.043,
+    "hand": 0.04,
+}
+#: Left against right in one person; about 1 % (our estimate).
+SIDE_SD = 0.01
+#: Static poses range from hanging arms to a T pose, rad.
+POSE_SD = 1.0
+#: The fit has converged when the predicted gain of a step is below this; a residual of
+#: one standard deviation costs 1.
+GAIN_TOLERANCE = 1e-4
+#: Most steps; the fit takes about ten.
+_MAX_STEPS = 100
+
+
+class SizeFit(NamedTuple):
+    """The fitted body.
+
+    Parameters
+    ----------
+    log_sizes : (S,) array
+        Log of each segment's size factor, in the order of
+        :data:`ikns.body.model_file.SEGMENTS`.
+    positions : (M, 3) array
+        Markers in their link's frame, m.
+    q : (25,) array
+        Pose in the static trial.
+    covariance : (S, S) array
+        Of the log sizes.
+    converged : bool
+        Whether the fit met its tolerance.
+    """
+
+    log_sizes: Array
+    positions: Array
+    q: Array
+    covariance: Array
+    converged: bool
+
+
+def fit_sizes(generic: Skeleton, target: Array) -> SizeFit:
+    """Gauss-Newton with step halving over sizes, marker places and pose.
+
+    Parameters
+    ----------
+    generic : Skeleton
+        The generic body with the markers at their nominal places.
+    target : (M, 3) array
+        Mean marker positions in the world, m; NaN where never seen.
+    """
+    worn = generic.marker_set
+    seen = seen_markers(target)
+    weight = np.linalg.cholesky(np.linalg.inv(size_covariance())).T
+    placement = np.array([m.placement_sd for m in worn.markers])
+    fixed = generic.columns(worn.held)
+    free = np.setdiff1d(np.arange(generic.nv), fixed)
+    n_sizes, n_markers, n_joints = len(SEGMENTS), len(placement), generic.nv - 6
+
+    q = MarkerIK(generic.with_markers(worn.all_tracked())).solve(target).q
+    sizes, offsets = np.zeros(n_sizes), np.zeros((n_markers, 3))
+
+    def residual(sizes: Array, offsets: Array, q: Array, positions: Array) -> Array:
+        return np.concatenate(
+            [
+                (positions[seen] - target[seen]).ravel() / MARKER_SD,
+                (offsets / placement).ravel(),
+                weight @ sizes,
+                q[-n_joints:] / POSE_SD,
+            ]
+        )
+
+    def body(sizes: Array, offsets: Array) -> tuple[Skeleton, Skeleton]:
+        sized = generic.resized(size_factors(sizes))
+        places = sized.marker_positions + offsets
+        return sized, sized.with_markers(worn.at(places))
+
+    sized, dressed = body(sizes, offsets)
+    positions, by_pose = dressed.marker_jacobian(q)
+    errors = residual(sizes, offsets, q, positions)
+    converged = False
+    for _ in range(_MAX_STEPS):
+        by_size, by_place = sized.size_jacobian(q)
+        J = _assemble(by_size, by_place, by_pose, seen, weight, placement, free)
+        step = cho_solve(cho_factor(J.T @ J), -J.T @ errors)
+        # The gain that the linear model predicts, in squared standard deviations.
+        if -(J.T @ errors) @ step < GAIN_TOLERANCE:
+            converged = True
+            break
+        d_sizes = step[:n_sizes]
+        d_offsets = step[n_sizes : n_sizes + 3 * n_markers].reshape(-1, 3)
+        d_pose = np.zeros(generic.nv)
+        d_pose[free] = step[n_sizes + 3 * n_markers :]
+        length = min(1.0, 0.5 / max(np.abs(d_sizes).max(), np.abs(d_pose).max(), 0.1))
+        while length > 1e-6:
+            trial = (
+                sizes + length * d_sizes,
+                offsets + length * d_offsets,
+                generic.integrate(q, length * d_pose),
+            )
+            sized, dressed = body(trial[0], trial[1])
+            positions, by_pose = dressed.marker_jacobian(trial[2])
+            trial_errors = residual(*trial, positions)
+            if trial_errors @ trial_errors <= errors @ errors * (1 + 1e-12):
+                break
+            length /= 2
+        sizes, offsets, q = trial
+        errors = trial_errors
+    by_size, by_place = sized.size_jacobian(q)
+    J = _assemble(by_size, by_place, by_pose, seen, weight, placement, free)
+    covariance = cho_solve(cho_factor(J.T @ J), np.eye(J.shape[1], n_sizes))[:n_sizes]
+    return SizeFit(sizes, sized.marker_positions + offsets, q, covariance, converged)
+
+
+def _assemble(
+    by_size: Array,
+    by_place: Array,
+    by_pose: Array,
+    seen: NDArray[np.bool_],
+    weight: Array,
+    placement: Array,
+    free: NDArray[np.int64],
+) -> Array:
+    """Jacobian of the residuals, columns sizes, marker offsets, free pose."""
+    n_seen, n_markers, n_sizes = int(seen.sum()), len(seen), by_size.shape[2]
+    n_pose, n_joints = len(free), by_pose.shape[2] - 6
+    places = slice(n_sizes, n_sizes + 3 * n_markers)
+    J = np.zeros(
+        (3 * n_seen + 3 * n_markers + n_sizes + n_joints, places.stop + n_pose)
+    )
+    top = J[: 3 * n_seen]
+    top[:, :n_sizes] = by_size[seen].reshape(3 * n_seen, n_sizes)
+    for row, marker in enumerate(np.flatnonzero(seen)):
+        column = n_sizes + 3 * marker
+        top[3 * row : 3 * row + 3, column : column + 3] = by_place[marker]
+    top[:, places.stop :] = by_pose[seen][:, :, free].reshape(3 * n_seen, n_pose)
+    top /= MARKER_SD
+    start = 3 * n_seen
+    rows = np.arange(3 * n_markers)
+    J[start + rows, n_sizes + rows] = 1 / placement.ravel()
+    start += 3 * n_markers
+    J[start : start + n_sizes, :n_sizes] = weight
+    start += n_sizes
+    for column, dof in enumerate(free):
+        if dof >= 6:
+            J[start + dof - 6, places.stop + column] = 1 / POSE_SD
+    return J
+
+
+def size_covariance() -> Array:
+    """Return the prior covariance of the segments' log factors, (S, S)."""
+    kinds = [name.split("_", 1)[-1] if name != "thorax" else name for name in SEGMENTS]
+    same = np.array([[a == b for b in kinds] for a in kinds])
+    kind_sd = np.array([SEGMENT_SD[kind] for kind in kinds])
+    return (
+        STATURE_SD**2
+        + same * np.outer(kind_sd, kind_sd)
+        + SIDE_SD**2 * np.eye(len(kinds))
+    )
+
+
+def size_factors(log_sizes: Array) -> dict[str, float]:
+    """Size factor of each segment from the logs (S,) of all, by its name."""
+    return dict(zip(SEGMENTS, np.exp(log_sizes).tolist(), strict=True))
+
+
+def length_deviations(
+    lengths: Mapping[str, float], covariance: Array
+) -> dict[str, float]:
+    """Return each length's standard deviation, m, given the log sizes' covariance."""
+    sd = dict(zip(SEGMENTS, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    return {name: length * sd[name] for name, length in lengths.items()}

@@ -1,0 +1,119 @@
+"""The static trial: mean marker positions, and the body that wears them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ikns.body.chains import SIDES, chain_joints
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
+from ikns.errors import MarkerMismatch, NotEnoughData
+from ikns.numerics.rigid import rigid_transform
+from ikns.recording.recording import Recording
+
+__all__ = ["seen_markers", "static_posture"]
+
+Array = NDArray[np.float64]
+
+#: With this many frames that show every marker only these are averaged; noise is then a
+#: third.
+_COMPLETE_FRAMES = 10
+
+
+def static_posture(
+    generic: Skeleton,
+    static: Recording,
+    *,
+    marker_set: str | Path | MarkerSet = "oxford24",
+    min_duration: float = 1.0,
+) -> tuple[Skeleton, Array, float]:
+    """Average a static trial, and put the marker set on the generic body.
+
+    Arguments as :func:`ikns.scale` takes them.
+
+    Returns
+    -------
+    dressed : Skeleton
+        The generic body with the set at its nominal places; joints of an arm without
+        any marker are held.
+    target : (M, 3) array
+        Mean marker positions, m; NaN where never seen.
+    duration : float
+        Of the trial, s.
+    """
+    worn = (
+        marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
+    )
+    duration = float(static.time[-1] - static.time[0]) if len(static.time) else 0.0
+    duration += 1 / static.rate if len(static.time) > 1 else 0.0
+    if duration < min_duration * (1 - 1e-6):
+        raise NotEnoughData(
+            f"{static.source}: expected a static trial of at least "
+            f"{min_duration:g} s, found {duration:.2f} s."
+        )
+    target = _mean_posture(static, worn)
+    worn = replace(worn, held=worn.held + _absent_joints(static, worn, target))
+    return generic.with_nominal_markers(worn), target, duration
+
+
+def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
+    """Mean marker positions, the sway of the whole body removed, (M, 3) m."""
+    markers = worn.pick(static.labels, static.markers)
+    seen = seen_markers(markers)
+    if not seen.any():
+        raise MarkerMismatch(
+            f"{static.source}: expected markers of {worn.name} "
+            f"({', '.join(worn.labels[:4])}, ...), found "
+            f"{', '.join(static.labels[:4]) or 'none'}; name the right marker set."
+        )
+    # No one stands quite still, so markers averaged over different frames do not match:
+    # where enough frames show everything, only those count.
+    complete = seen[:, seen.any(axis=0)].all(axis=1)
+    if complete.sum() >= _COMPLETE_FRAMES:
+        markers, seen = markers[complete], seen[complete]
+    reference = markers[int(np.argmax(seen.sum(axis=1)))]
+    aligned = np.full_like(markers, np.nan)
+    for i, frame in enumerate(markers):
+        common = seen[i] & seen_markers(reference)
+        if common.sum() >= 3:
+            rotation, shift = rigid_transform(frame[common], reference[common])
+            aligned[i] = frame @ rotation.T + shift
+    known = seen_markers(aligned)
+    count = known.sum(axis=0)
+    mean = np.full((len(worn.markers), 3), np.nan)
+    some = count > 0
+    total = np.where(known[..., None], aligned, 0.0).sum(axis=0)
+    mean[some] = total[some] / count[some, None]
+    return mean
+
+
+def _absent_joints(
+    static: Recording, worn: MarkerSet, target: Array
+) -> tuple[str, ...]:
+    """Joints of an arm without any marker; one segment without markers is an error."""
+    seen = seen_markers(target)
+    links = {m.link for m in worn.markers}
+    shown = {m.link for m, s in zip(worn.markers, seen, strict=True) if s}
+    absent: tuple[str, ...] = ()
+    for side in SIDES:
+        arm = {link for link in links if link.startswith(side)}
+        if arm and not arm & shown:
+            absent += tuple(chain_joints(f"{side}_arm_clavicle"))
+            links -= arm
+    bare = sorted(links - shown)
+    if bare:
+        wanted = [m.label for m in worn.markers if m.link == bare[0]]
+        raise MarkerMismatch(
+            f"{static.source}: the segment {bare[0]} has no marker; expected at least "
+            f"one of {', '.join(wanted)} of {worn.name}."
+        )
+    return tuple(joint for joint in absent if joint not in worn.held)
+
+
+def seen_markers(markers: Array) -> NDArray[np.bool_]:
+    """Which markers (..., 3) were seen, (...)."""
+    return np.asarray(np.isfinite(markers).all(axis=-1))
