@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 
+from ikns._kernels.voronoi.diagram import ANGLE, EDGE, EDGES, HULL, LINES, PLANE
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
 CUBE = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
@@ -68,3 +69,22 @@ def hull_queries(net, depth, n, rng):
     share /= share.sum(axis=1, keepdims=True)
     on = np.einsum("qk,qkd->qd", share, facets)
     return on + depth * (net.points.mean(axis=0) - on)
+
+
+def make_weights_negative(net):
+    """Damage a diagram: the axes of all edges are turned around. Twice repairs it."""
+    numbers, indices = net.packed
+    edge = indices[EDGE]
+    for _ in range(indices[EDGES]):
+        axis = indices[ANGLE] + indices[edge + 3]
+        numbers[axis : axis + 3] *= -1
+        edge += 4 + 2 * indices[edge + 2]
+    net._idle.clear()  # copies of what it was
+
+
+def lead_astray(net):
+    """Damage a diagram: no facet leads on, so that every walk fails that is needed."""
+    numbers, indices = net.packed
+    inner = indices[LINES] - indices[HULL]
+    numbers[indices[PLANE] :][: 10 * inner] = 0
+    net._idle.clear()

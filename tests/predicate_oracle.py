@@ -10,13 +10,16 @@ from fractions import Fraction
 LATTICE = 100
 
 
+def on_lattice(points):
+    """Sites as integers in steps of the lattice, cut off to it."""
+    step = 2**LATTICE
+    return [[int(Fraction(float(v)) * step) for v in point] for point in points]
+
+
 def exactly(points):
     """Sites as fractions, cut off to the lattice."""
     step = 2**LATTICE
-    return [
-        [Fraction(int(Fraction(float(v)) * step), step) for v in point]
-        for point in points
-    ]
+    return [[Fraction(v, step) for v in point] for point in on_lattice(points)]
 
 
 def determinant(rows):
@@ -28,6 +31,16 @@ def determinant(rows):
         for i, row in enumerate(rows)
         if row[0]
     )
+
+
+def cross(a, b):
+    """Vector product."""
+    return [a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)]
+
+
+def dot(a, b):
+    """Scalar product."""
+    return sum(p * q for p, q in zip(a, b, strict=True))
 
 
 def between(a, b):
@@ -43,13 +56,16 @@ def volume(sites, a, b, c, d):
 def above_sphere(sites, a, b, c, d, e):
     """Power of e to the sphere of a, b, c, d, times six volumes; lifted if 0."""
 
-    def row(i, lifts):
+    def row(i, lifted):
         edge = between(sites[a], sites[i])
-        lift = Fraction(1, 2 ** (2000 * (i + 1))) - Fraction(1, 2 ** (2000 * (a + 1)))
-        return [*edge, sum(v * v for v in edge) + lifts * lift]
+        square = dot(edge, edge)
+        if lifted:
+            square += Fraction(1, 2 ** (2000 * (i + 1)))
+            square -= Fraction(1, 2 ** (2000 * (a + 1)))
+        return [*edge, square]
 
-    power = determinant([row(i, 0) for i in (b, c, d, e)])
-    return power or determinant([row(i, 1) for i in (b, c, d, e)])
+    power = determinant([row(i, False) for i in (b, c, d, e)])
+    return power or determinant([row(i, True) for i in (b, c, d, e)])
 
 
 def sign(value):

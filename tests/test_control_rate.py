@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from interpolation_layouts import make_weights_negative
 
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
@@ -313,7 +314,9 @@ def test_the_local_map_is_the_map(x, n):
 # --- samples that miss something ------------------------------------------------------
 
 
-@pytest.mark.parametrize("what", ["q", "v", "x", "hand_speed", "gap", "outside"])
+@pytest.mark.parametrize(
+    "what", ["q", "v", "x", "hand_speed", "gap", "outside", "uncertain"]
+)
 def test_c_is_held_through_what_is_missing_and_does_not_jump_after(what):
     Z = np.eye(7)[2]
     learned = straight_map(Z, outside="nan")
@@ -328,10 +331,14 @@ def test_c_is_held_through_what_is_missing_and_does_not_jump_after(what):
         bad["x"] = np.array([9.0, 0, 0])
     elif what == "hand_speed":
         speed = np.nan
+    elif what == "uncertain":
+        make_weights_negative(control._here._natural)
     else:
         bad[what] = bad[what].copy()
         bad[what][2] = np.nan
     assert control.step(**bad, dt=dt, hand_speed=speed) == before
+    if what == "uncertain":
+        make_weights_negative(control._here._natural)
     moved = {**sample, "q": np.full(7, 0.4)}  # unseen self-motion
     assert control.step(**moved, dt=0.01, hand_speed=0.0) == before
     after = control.step(**moved, dt=0.01, hand_speed=0.0)

@@ -1,5 +1,7 @@
 """The controller, frame by frame: which frames count, why not, and what they ask."""
 
+import copy
+import dataclasses
 import math
 
 import numpy as np
@@ -7,7 +9,9 @@ import pytest
 import small_person
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from interpolation_layouts import make_weights_negative
 
+from ikns.body.chains import chain_joints
 from ikns.calibration import sight_needs
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
@@ -193,6 +197,27 @@ def test_after_a_marker_was_astray_the_next_frame_counts_again(
     # from there.
     angles, way = again.solved.q[7:], wanted.solved.q[7:] - before.solved.q[7:]
     assert np.abs(angles - wanted.solved.q[7:]).max() < np.abs(way).max()
+
+
+def test_a_frame_with_uncertain_weights_does_not_count(subject, exploring):
+    learned = copy.deepcopy(subject.null_space_map)
+    make_weights_negative(learned.interpolator_)
+    damaged = dataclasses.replace(subject, null_space_map=learned)
+    whole, made = controller(subject), controller(damaged)
+    within = []
+    for k, markers in enumerate(frames(subject, exploring)):
+        wanted, decision = (
+            each.frame(markers, k / 50, k / 50) for each in (whole, made)
+        )
+        assert not decision.solved.inside
+        if not wanted.solved.inside:
+            continue
+        within.append(decision)
+        assert "map" in decision.refused
+        assert np.isnan(decision.solved.c).all()
+        angles = decision.solved.q[7:][-len(chain_joints(subject.chain)) :]
+        assert np.isnan(learned.control_signal(angles, decision.solved.hand_in_thorax))
+    assert len(within) > 10
 
 
 def test_out_of_sight_is_not_valid(subject):

@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import pytest
 from interpolation_layouts import JITTERS, LAYOUTS, built
+from natural_neighbor_oracle import nearest_on_hull
 from scipy.spatial import ConvexHull, Delaunay
 
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
-from ikns.nullspace.interpolation.delaunay import delaunay
-from ikns.nullspace.interpolation.hull import nearest_on_hull
+from ikns.nullspace.interpolation.diagram import diagram
 
 
 def test_far_outside_the_projection_is_the_nearest_point_of_the_hull():
@@ -102,8 +102,9 @@ def test_tetrahedra_fill_the_hull_and_their_spheres_hold_no_site(name, jitter):
 
 
 def test_neighbors_of_a_tetrahedron_share_three_of_its_sites():
-    simplices, neighbors = delaunay(LAYOUTS["grid 3"])
-    for simplex, row in zip(simplices, neighbors, strict=True):
+    d = diagram(LAYOUTS["grid 3"])
+    simplices = d.simplices.tolist()
+    for simplex, row in zip(simplices, d.neighbors.tolist(), strict=True):
         for vertex, other in zip(simplex, row, strict=True):
             if other >= 0:
                 assert set(simplex) - {vertex} < set(simplices[other])

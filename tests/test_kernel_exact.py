@@ -7,7 +7,16 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from interpolation_layouts import LAYOUTS, turned
-from predicate_oracle import above_sphere, between, determinant, exactly, sign, volume
+from predicate_oracle import (
+    above_sphere,
+    between,
+    cross,
+    determinant,
+    dot,
+    exactly,
+    sign,
+    volume,
+)
 
 from ikns._kernels.voronoi import exact
 from ikns._kernels.voronoi.predicates import in_sphere, orientation
@@ -26,14 +35,6 @@ def near_degenerate(draw):
     )
     jitter = draw(st.sampled_from([0, 1e-30, 1e-17, 1e-16, 1e-13, 1e-9]))
     return points + jitter * rng.normal(size=points.shape)
-
-
-def cross(a, b):
-    return [a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)]
-
-
-def dot(a, b):
-    return sum(p * q for p, q in zip(a, b, strict=True))
 
 
 def row_value(R, row, degree, step, n):

@@ -1,6 +1,6 @@
-"""Compiled queries against the NumPy reference, and what surrounds them.
+"""Compiled queries against the NumPy oracle, and what surrounds them.
 
-Against exact arithmetic they stand in test_interpolation. Kernel and reference take the
+Against exact arithmetic they stand in test_interpolation. Kernel and oracle take the
 same lengths and angles and add up the same products, in other orders. So they differ by
 the rounding of sums: about 50 terms, of a few times the weights, 1.1e-16 each: 1e-14.
 (Measured: 2e-15.) The area of a Laplace face is a difference of such sums, divided by a
@@ -22,10 +22,12 @@ from interpolation_layouts import (
     hull_queries,
     inside_queries,
     jittered,
+    lead_astray,
+    make_weights_negative,
 )
+from natural_neighbor_oracle import weights as oracle_weights
 
 from ikns._kernels.voronoi.diagram import (
-    CORNER_ROWS,
     CORNERS,
     INSIDE_HULL,
     MARK,
@@ -79,11 +81,11 @@ def all_kinds(net, rng):
 @pytest.mark.parametrize("method", TOLERANCE)
 @pytest.mark.parametrize("jitter", JITTERS)
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_kernels_equal_the_reference(name, jitter, method):
+def test_kernels_equal_the_oracle(name, jitter, method):
     rng = np.random.default_rng(5)
     net = NaturalNeighborInterpolator(jittered(name, jitter), method=method)
     queries = all_kinds(net, rng)
-    expected = net._reference(queries, 1)
+    expected = oracle_weights(net, queries)
     one, status = one_by_one(net, queries)
     np.testing.assert_allclose(one, expected, atol=TOLERANCE[method], rtol=0)
     np.testing.assert_allclose(
@@ -96,14 +98,14 @@ def test_kernels_equal_the_reference(name, jitter, method):
 
 @pytest.mark.parametrize("name", CLOUDS)
 @pytest.mark.parametrize("outside", ["nearest", "project", "nan"])
-def test_outside_kernels_do_what_the_reference_does(name, outside):
+def test_outside_kernels_do_what_the_oracle_does(name, outside):
     rng = np.random.default_rng(6)
     points = CLOUDS[name]
     net = NaturalNeighborInterpolator(points, outside=outside)
     reach = np.repeat([0.8, 3.0, 1e9], 20)[:, None]
     away = points.mean(axis=0) + rng.normal(size=(60, 3)) * reach
     queries = np.vstack([away[~net.inside(away)], BAD])
-    expected = net._reference(queries, 1)
+    expected = oracle_weights(net, queries)
     # A projection is rounded by 1e-16 of the distance, at most by that of 1e9 sizes:
     # 2e-7; weights under the hull change by at most a few per size in these clouds.
     near = np.abs(queries - points.mean(axis=0)).max(axis=1) < 1e3
@@ -139,7 +141,7 @@ def test_any_query_of_any_lattice_points_is_answered_alike(
     except NotEnoughData:
         return
     queries = np.array([*queries, *points[:2], points[:4].mean(axis=0)])
-    expected = net._reference(queries, 1)
+    expected = oracle_weights(net, queries)
     one, _ = one_by_one(net, queries)
     np.testing.assert_allclose(one, expected, atol=TOLERANCE[method])
     np.testing.assert_allclose(net.weights(queries), expected, atol=TOLERANCE[method])
@@ -172,22 +174,43 @@ def test_earlier_queries_do_not_change_later_ones():
         np.testing.assert_array_equal(net.weights(queries[5]), fresh[0])
 
 
-def test_a_walk_that_goes_astray_is_answered_by_the_reference():
+@pytest.mark.parametrize("method", ["sibson", "laplace", "sibson_c1"])
+def test_a_walk_that_fails_gives_nan_and_leaves_other_queries_alone(method):
     points = CLOUDS["60 at random"]
-    net = NaturalNeighborInterpolator(points, points)
-    queries = inside_queries(points, 20, np.random.default_rng(9))
-    expected = net._reference(queries, 1)
-    # Every facet leads to infinity.
-    numbers, indices = net.packed
-    corners = indices[CORNERS]
-    rows = indices[indices[CORNER_ROWS] :][: 30 * corners].reshape(corners, 30)
-    rows[:, 4:8] = corners
-    found, status = one_by_one(net, queries)
-    assert (status == UNSURE).any()
-    assert np.isnan(found[status == UNSURE]).all()
-    lost = queries[status == UNSURE]
-    np.testing.assert_array_equal(net.weights(lost), expected[status == UNSURE])
-    np.testing.assert_allclose(net(lost[0]), lost[0], atol=1e-12)
+    net, whole = (
+        NaturalNeighborInterpolator(points, points, method=method) for _ in range(2)
+    )
+    lead_astray(net)
+    queries = inside_queries(points, 200, np.random.default_rng(9))
+    _, status = one_by_one(net, queries)
+    lost = status == UNSURE
+    # Those whose sphere the walk starts in need none.
+    assert 0 < lost.sum() < len(queries)
+    one = np.array([net(x) for x in queries])
+    assert np.isnan(one[lost]).all()
+    np.testing.assert_array_equal(one[~lost], [whole(x) for x in queries[~lost]])
+    # Of many queries each starts where the one before was.
+    asked = [net] if method == "sibson_c1" else [net, net.weights]
+    for ask in asked:
+        many = ask(queries)
+        lost = np.isnan(many).any(axis=1)
+        assert 0 < lost.sum() < len(queries)
+        assert np.isnan(many[lost]).all()
+    many = net(queries)
+    kept = ~np.isnan(many).any(axis=1)
+    np.testing.assert_allclose(many[kept], whole(queries[kept]), atol=1e-12)
+    assert (net.inside(queries) == whole.inside(queries)).all()
+
+
+def test_a_negative_weight_gives_nan():
+    net = NaturalNeighborInterpolator(BOX, BOX)
+    assert net.packed[1][CORNERS] <= FEW  # all corners are tried, many side by side
+    make_weights_negative(net)
+    queries = inside_queries(BOX, 20, np.random.default_rng(9))
+    assert (one_by_one(net, queries)[1] == UNSURE).all()
+    assert np.isnan(net.weights(queries)).all()
+    assert np.isnan(net(queries)).all()
+    assert np.isnan(net(queries[0])).all()
 
 
 def test_sites_found_by_walking_have_all_the_weight():

@@ -5,15 +5,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from diagram_oracle import voronoi
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from interpolation_layouts import CUBE, JITTERS, LAYOUTS, jittered, turned
 
 from ikns.errors import NotEnoughData
-from ikns.nullspace.interpolation.border import checked_points
 from ikns.nullspace.interpolation.diagram import diagram
 from ikns.nullspace.interpolation.faces import solid_angles
-from ikns.nullspace.interpolation.voronoi import Voronoi, measured, voronoi
+from ikns.nullspace.interpolation.inputs import checked_points
+from ikns.nullspace.interpolation.voronoi import Voronoi
 
 GRID = np.array(list(np.ndindex(4, 4, 4))) / 3.0
 RNG = np.random.default_rng(0)
@@ -38,7 +39,7 @@ LARGER = {
 def compare(points):
     found = diagram(points)
     simplices = [tuple(map(int, row)) for row in found.simplices]
-    true = measured(points, simplices, found.neighbors.tolist())
+    true = voronoi(points, simplices, found.neighbors.tolist())
     for field in fields(Voronoi):
         a, b = getattr(found, field.name), getattr(true, field.name)
         assert a.flags.c_contiguous
@@ -56,7 +57,7 @@ def compare(points):
     # A corner is off by 2**-100 (numerator) + 2**-100 (denominator) + a few times
     # 2**-106 (their ratio), a normal's direction by as much. (Measured: 6e-32.)
     for name in ("corner", "normal"):
-        a, b = twofold(found, name), twofold(true, name)
+        a, b = double_double(found, name), double_double(true, name)
         for x, y in zip(a, b, strict=True):
             k = max(range(3), key=lambda i: abs(y[i]))
             scale = x[k] / y[k] if name == "normal" else 1
@@ -67,7 +68,7 @@ def compare(points):
         assert (np.abs(rest) <= np.abs(high) * 2.0**-53).all()
 
 
-def twofold(d, name):
+def double_double(d, name):
     high, rest = getattr(d, name).tolist(), getattr(d, name + "_rest").tolist()
     return [
         [Fraction(a) + Fraction(b) for a, b in zip(*rows, strict=True)]
@@ -152,12 +153,3 @@ def test_the_first_site_that_is_not_alone_is_named(seed, near):
         NotEnoughData, match=f"points {first} and {distance[first].argmin()} "
     ):
         checked_points(points)
-
-
-def test_without_tetrahedra_the_exact_path_is_taken(monkeypatch):
-    empty = np.empty((0, 4), dtype=np.int64)
-    monkeypatch.setattr(
-        "ikns.nullspace.interpolation.diagram.triangulate", lambda *_: (empty, empty)
-    )
-    a, b = diagram(CUBE), voronoi(CUBE)
-    assert all((getattr(a, f.name) == getattr(b, f.name)).all() for f in fields(a))

@@ -94,6 +94,7 @@ def _neighbors() -> None:
     interpolator = NaturalNeighborInterpolator(_CORNERS, np.ones(8))
     interpolator(one)
     interpolator(many)
+    interpolator.inside(many)
     _map().control_signal(np.zeros(7), one)
 
 

@@ -104,7 +104,8 @@ def control_frame(
     place : (3,) array
         Where the task happens, written, m.
     c : (d,) array
-        The signals, written, not clipped; NaN while the chain is not in sight.
+        The signals, written, not clipped; NaN while the chain is not in sight, and
+        where the weights are NaN or the range is zero.
 
     Returns
     -------

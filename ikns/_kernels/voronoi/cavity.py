@@ -36,7 +36,7 @@ from ikns._kernels.voronoi.diagram import (
     UNKNOWN,
     place,
 )
-from ikns._kernels.voronoi.double_double import Triple, difference, twofold_dot
+from ikns._kernels.voronoi.double_double import Triple, difference, double_double_dot
 from ikns._kernels.voronoi.hull import CANCELED, depth_behind, exact_depth
 
 __all__ = ["find_cavity", "forget_cavity", "kept_length", "power_to", "try_all"]
@@ -64,7 +64,7 @@ def power_to(numbers: Floats, corner: int, x: Triple) -> float:
 
 @compiled
 def _exact_power(numbers: Floats, corner: int, x: Triple, rest: Triple) -> float:
-    """Power of a query, twofold, to 1e-30 of its terms."""
+    """Power of a query in double-double arithmetic, to 1e-30 of its terms."""
     c = numbers[corner : corner + 9]
     p, p_rest = difference(x[0], c[6])
     q, q_rest = difference(x[1], c[7])
@@ -73,7 +73,7 @@ def _exact_power(numbers: Floats, corner: int, x: Triple, rest: Triple) -> float
     u, u_rest = difference(2 * c[0], p)
     v, v_rest = difference(2 * c[1], q)
     w, w_rest = difference(2 * c[2], r)
-    return twofold_dot(
+    return double_double_dot(
         (u, v, w),
         (
             u_rest + 2 * c[3] - p_rest,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ikns._kernels.compiled import compiled
 
-__all__ = ["Triple", "difference", "product", "twofold_dot"]
+__all__ = ["Triple", "difference", "product", "double_double_dot"]
 
 Triple = tuple[float, float, float]
 
@@ -34,7 +34,7 @@ def product(a: float, b: float) -> tuple[float, float]:
 
 
 @compiled
-def twofold_dot(a: Triple, a_rest: Triple, b: Triple, b_rest: Triple) -> float:
+def double_double_dot(a: Triple, a_rest: Triple, b: Triple, b_rest: Triple) -> float:
     """Scalar product, to about 1e-30 of its largest term."""
     total, low = 0.0, 0.0
     for k in range(3):

@@ -9,10 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.voronoi.diagram import DEPTH, HULL, LINES, PLANE, place
-from ikns._kernels.voronoi.double_double import Triple, difference, twofold_dot
+from ikns._kernels.voronoi.diagram import (
+    CENTER,
+    DEPTH,
+    HULL,
+    LINES,
+    PLANE,
+    ROUNDING,
+    SCALE,
+    place,
+)
+from ikns._kernels.voronoi.double_double import Triple, difference, double_double_dot
 
-__all__ = ["CANCELED", "depth_behind", "exact_depth", "hull_depths"]
+__all__ = [
+    "CANCELED",
+    "depth_behind",
+    "exact_depth",
+    "hull_depths",
+    "inside_many",
+    "scaled",
+]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -20,6 +36,8 @@ Indices = NDArray[np.int64]
 #: Where a product of floats is below this part of its terms, it is formed again with
 #: twice the digits; above, rounding costs at most 1e-16 / 1e-3.
 CANCELED = 1e-3
+#: Queries farther out are brought this near: only their direction matters there.
+_FAR = 1e9
 
 
 @compiled
@@ -35,12 +53,12 @@ def depth_behind(numbers: Floats, plane: int, x: Triple) -> float:
 
 @compiled
 def exact_depth(numbers: Floats, plane: int, x: Triple, rest: Triple) -> float:
-    """How far a point, twofold, lies behind a plane, to 1e-30."""
+    """How far a double-double point lies behind a plane, to 1e-30."""
     n = numbers[plane : plane + 9]
     p, p_rest = difference(n[6], x[0])
     q, q_rest = difference(n[7], x[1])
     r, r_rest = difference(n[8], x[2])
-    return twofold_dot(
+    return double_double_dot(
         (n[0], n[1], n[2]),
         (n[3], n[4], n[5]),
         (p, q, r),
@@ -81,3 +99,33 @@ def hull_depths(
             least = min(least, depth)
             part = min(part, depth * numbers[place(plane + 9)])
     return least, part
+
+
+@compiled
+def scaled(numbers: Floats, x: Triple) -> Triple:
+    """Scale a query, m, and bring it near; NaN where it overflows."""
+    scale = numbers[SCALE]
+    y = (x[0] * scale, x[1] * scale, x[2] * scale)
+    a = y[0] - numbers[CENTER]
+    b = y[1] - numbers[CENTER + 1]
+    c = y[2] - numbers[CENTER + 2]
+    reach = max(abs(a), abs(b), abs(c))
+    if reach > _FAR:
+        y = (
+            numbers[CENTER] + a / reach * _FAR,
+            numbers[CENTER + 1] + b / reach * _FAR,
+            numbers[CENTER + 2] + c / reach * _FAR,
+        )
+    return y
+
+
+@compiled
+def inside_many(diagram: Floats, x: Floats, within: NDArray[np.bool_]) -> None:
+    """Write whether queries (Q, 3), m, are in the hull or, but for rounding, on it."""
+    indices, rest = diagram.view(np.int64), (0.0, 0.0, 0.0)
+    for q in range(len(x)):
+        y = scaled(diagram, (x[q, 0], x[q, 1], x[q, 2]))
+        within[q] = np.isfinite(y[0]) and np.isfinite(y[1]) and np.isfinite(y[2])
+        if within[q]:
+            least, _ = hull_depths(diagram, indices, y, rest, diagram)
+            within[q] = least >= -diagram[ROUNDING]

@@ -2,8 +2,8 @@
 
 The query is scaled and brought near, placed in or on the hull by the rule for queries
 outside it, moved away from the hull by a skin, and given its coordinates (`cavity`,
-`sibson`). A query whose coordinates cannot be trusted is `UNSURE`; the caller asks the
-slow reference, ikns.nullspace.interpolation.reference, which takes the same steps.
+`sibson`). A query whose coordinates cannot be trusted, for the walk to it failed or a
+weight came out negative, is `UNSURE` and has NaN for weights and value.
 
 Sibson's smooth interpolant joins his weights w_i and the tangent planes at the sites,
 with p_i = site - query (R. Sibson, A brief description of natural neighbour
@@ -36,7 +36,6 @@ from ikns._kernels.voronoi.diagram import (
     OUTSIDE,
     OUTSIDE_HULL,
     ROUNDING,
-    SCALE,
     SITE,
     SITES,
     SMOOTH,
@@ -49,7 +48,7 @@ from ikns._kernels.voronoi.diagram import (
     place,
 )
 from ikns._kernels.voronoi.double_double import Triple, difference
-from ikns._kernels.voronoi.hull import hull_depths
+from ikns._kernels.voronoi.hull import hull_depths, scaled
 from ikns._kernels.voronoi.hull_projection import nearest_on_hull
 from ikns._kernels.voronoi.sibson import add_polygons
 
@@ -62,29 +61,10 @@ Indices = NDArray[np.int64]
 #: there. The hull of a box whose corners are rounded is uneven by 1e-16, and this near
 #: to it weights would tell which way.
 _SKIN = 1e-11
-#: Queries farther out are brought this near: only their direction matters there.
-_FAR = 1e9
 #: Squared distance to a site below which nothing could be told apart.
 _AT_SITE = 1e-36
 #: A weight below this is wrong: rounding leaves -1e-15.
 NEGATIVE = -1e-9
-
-
-@compiled
-def _scaled(numbers: Floats, x: Triple) -> Triple:
-    scale = numbers[SCALE]
-    y = (x[0] * scale, x[1] * scale, x[2] * scale)
-    a = y[0] - numbers[CENTER]
-    b = y[1] - numbers[CENTER + 1]
-    c = y[2] - numbers[CENTER + 2]
-    reach = max(abs(a), abs(b), abs(c))
-    if reach > _FAR:
-        y = (
-            numbers[CENTER] + a / reach * _FAR,
-            numbers[CENTER + 1] + b / reach * _FAR,
-            numbers[CENTER + 2] + c / reach * _FAR,
-        )
-    return y
 
 
 @compiled
@@ -169,7 +149,7 @@ def _weights(
     numbers: Floats, indices: Indices, x: Triple, start: int, work: Floats
 ) -> tuple[int, int]:
     """Write the weights of any query; return its status and how many there are."""
-    y = _scaled(numbers, x)
+    y = scaled(numbers, x)
     if not (np.isfinite(y[0]) and np.isfinite(y[1]) and np.isfinite(y[2])):
         return NOT_FINITE, 0
     rest = (0.0, 0.0, 0.0)
@@ -266,13 +246,13 @@ def _give(
 
 @compiled
 def answer_one(diagram: Floats, x: Floats, out: Floats) -> bool:
-    """Write the value (M,) at a query (3,), m; return whether it is sure."""
+    """Write the value (M,) at a query (3,), m; return whether it has three numbers."""
     if len(x) != 3:
         return False
     indices, at = diagram.view(np.int64), (x[0], x[1], x[2])
     status, count = _weights(diagram, indices, at, indices[MIDDLE], diagram)
     _give(diagram, indices, status, count, diagram, 0, out)
-    return status != UNSURE
+    return True
 
 
 @compiled

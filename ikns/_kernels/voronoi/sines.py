@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.voronoi.double_double import difference, twofold_dot
+from ikns._kernels.voronoi.double_double import difference, double_double_dot
 
 __all__ = ["sines"]
 
@@ -76,7 +76,9 @@ def sines(
                 u, u_rest = difference(x[third, 0], x[i, 0])
                 v, v_rest = difference(x[third, 1], x[i, 1])
                 w, w_rest = difference(x[third, 2], x[i, 2])
-                height = twofold_dot(n, n_rest, (u, v, w), (u_rest, v_rest, w_rest))
+                height = double_double_dot(
+                    n, n_rest, (u, v, w), (u_rest, v_rest, w_rest)
+                )
                 if abs(height) < canceled * (abs(u) + abs(v) + abs(w)):
                     height = np.nan
                 first[p], second[p] = s, t

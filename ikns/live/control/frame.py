@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ikns._kernels.body.control_frame import ControlMap, control_frame
-from ikns._kernels.voronoi.diagram import INSIDE_HULL, UNSURE, new_work
+from ikns._kernels.voronoi.diagram import INSIDE_HULL, new_work
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import segment_pairs, sight_needs
@@ -29,7 +29,7 @@ class ControlFrame(NamedTuple):
     ----------
     c : (d,) array
         Control signals, not clipped; NaN while the chain is not in sight, and where
-        the map has no value.
+        :meth:`ikns.NullSpaceMap.control_signal` is.
     q : (nq,) array
         Configuration of the skeleton.
     hand_in_thorax : (3,) array
@@ -37,7 +37,8 @@ class ControlFrame(NamedTuple):
     in_sight : bool
         Whether every segment of the chain was seen.
     inside : bool
-        Whether the hand is inside the hull of the map's points; false out of sight.
+        Whether the hand is among the points of the map; false out of sight and where
+        the weights of the points cannot be trusted.
     residual : float
         Root mean square distance between pose and markers, m; NaN without markers.
     worst_residual : float
@@ -163,9 +164,6 @@ class FrameSolver:
         )
         self._lost = self._lost and not np.isfinite(residual)
         q = self._q.copy()
-        if status == UNSURE:  # has not been observed; use the slow way
-            angles = q[7:][self._map.columns]
-            c = np.reshape(self.null_space_map.control_signal(angles, place), -1)
         inside = status == INSIDE_HULL
         return ControlFrame(
             c, q, place, known, inside, residual, worst, apart, iterations, converged

@@ -1,7 +1,7 @@
 """Natural-neighbor interpolation in space: exact Sibson weights on any layout.
 
-The formula is in `sibson`, the diagram that it cuts in `voronoi`, the triangulation
-behind that in `delaunay`: references for the compiled forms that do the work.
+`natural_neighbor` is what is used; `diagram` builds the Voronoi diagram of the sites,
+`packed` lays it out for the compiled queries in ikns._kernels.voronoi.
 """
 
 from ikns.nullspace.interpolation.natural_neighbor import NaturalNeighborInterpolator

@@ -1,4 +1,4 @@
-"""The Voronoi diagram of some sites, built fast and as exactly as `voronoi` does.
+"""The Voronoi diagram of some sites, every number exact to its last digits.
 
 With the edges u, v, w of a tetrahedron and six times its volume, d = u . (v x w), its
 circumcenter, seen from its first site, is
@@ -28,8 +28,12 @@ from ikns._kernels.voronoi.exact import Sites, on_lattice
 from ikns._kernels.voronoi.insertion_order import insertion_order
 from ikns._kernels.voronoi.rings import lines, rings
 from ikns._kernels.voronoi.sines import sines
-from ikns.nullspace.interpolation.twofold import difference, product, twofold_dot
-from ikns.nullspace.interpolation.voronoi import Voronoi, voronoi
+from ikns.nullspace.interpolation.double_double import (
+    difference,
+    double_double_dot,
+    product,
+)
+from ikns.nullspace.interpolation.voronoi import Voronoi
 
 __all__ = ["diagram"]
 
@@ -45,9 +49,6 @@ _CANCELED = 2.0**-40
 def diagram(points: Floats) -> Voronoi:
     """Build the diagram of sites that span space and are all different.
 
-    Every number is that of :func:`~ikns.nullspace.interpolation.voronoi.voronoi` to the
-    last digits. Where sites are co-spherical, the two may choose other diagonals.
-
     Parameters
     ----------
     points : (N, 3) array
@@ -55,8 +56,6 @@ def diagram(points: Floats) -> Voronoi:
     """
     sites = on_lattice(points)
     simplices, neighbors = triangulate(sites, insertion_order(points))
-    if not len(simplices):
-        return voronoi(points)
     outside = len(simplices)
     facets, behind, ahead = lines(simplices, neighbors)
     edges, begin, side_facet, side_edge, entering, leaving = rings(
@@ -146,7 +145,7 @@ def _powers(
     """Power of the last of five sites to the sphere of the others, about c."""
     p, p_rest = difference(sites.x[fives[:, 4]], sites.x[fives[:, 0]])
     reach, reach_rest = difference(p, 2 * c)
-    power = twofold_dot(reach, reach_rest + p_rest - 2 * c_rest, p, p_rest)
+    power = double_double_dot(reach, reach_rest + p_rest - 2 * c_rest, p, p_rest)
     size = (np.abs(p) * (np.abs(p) + np.abs(2 * c))).sum(axis=1)
     few = np.flatnonzero(np.abs(power) < _CANCELED * size)
     value, _ = _determinants(sites, fives[few], exact.TO_SPHERE, exact.POWER, 1)

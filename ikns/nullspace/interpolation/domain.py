@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns._kernels.voronoi.hull import CANCELED
 from ikns.nullspace.interpolation.diagram import diagram as voronoi
-from ikns.nullspace.interpolation.sibson import depths
+from ikns.nullspace.interpolation.double_double import difference, double_double_dot
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
 __all__ = ["Domain", "domain"]
@@ -58,6 +59,17 @@ def domain(points: Floats) -> Domain:
         sites=sites,
         diagram=diagram,
         center=center,
-        center_depth=depths(diagram, sites, center[None], np.zeros((1, 3)))[0],
+        center_depth=_depths(diagram, sites, center),
         rounding=float(8 * np.finfo(float).eps * max(1.0, np.abs(sites).max())),
     )
+
+
+def _depths(diagram: Voronoi, sites: Floats, x: Floats) -> Floats:
+    """How far a point lies behind each facet of the hull, (H,); positive inside."""
+    site = sites[diagram.hull_facets[:, 0]]
+    normal, rest = diagram.normal[diagram.hull], diagram.normal_rest[diagram.hull]
+    depth = np.einsum("hk,hk->h", normal, site - x)
+    near = np.flatnonzero(np.abs(depth) < CANCELED)
+    p, p_rest = difference(site[near], x)
+    depth[near] = double_double_dot(normal[near], rest[near], p, p_rest)
+    return depth

@@ -16,25 +16,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns._kernels.voronoi.batch import answer_rows, rows_of_work
 from ikns._kernels.voronoi.diagram import CORNERS, UNSURE
+from ikns._kernels.voronoi.hull import inside_many
 from ikns._kernels.voronoi.query import answer_many, answer_one
 from ikns.errors import InvalidInput
-from ikns.nullspace.interpolation.border import checked_points, checked_values
 from ikns.nullspace.interpolation.domain import domain
 from ikns.nullspace.interpolation.faces import solid_angles
+from ikns.nullspace.interpolation.inputs import (
+    checked_out,
+    checked_points,
+    checked_queries,
+    checked_values,
+)
 from ikns.nullspace.interpolation.morton import morton_order
 from ikns.nullspace.interpolation.packed import FEW, packed
-from ikns.nullspace.interpolation.queries import checked_out, checked_queries
-from ikns.nullspace.interpolation.reference import (
-    Outside,
-    placed,
-    reference_weights,
-    scaled,
-)
-from ikns.nullspace.interpolation.smooth import slopes, smooth_values
+from ikns.nullspace.interpolation.smooth import slopes
 
 __all__ = ["Method", "NaturalNeighborInterpolator", "Outside"]
 
 Method = Literal["sibson", "laplace", "sibson_c1"]
+Outside = Literal["nearest", "project", "nan"]
 Floats = NDArray[np.float64]
 
 _FLOAT = np.dtype(np.float64)
@@ -112,7 +112,11 @@ class NaturalNeighborInterpolator:
     moved in as well: on sets thinner than 1e-6 of their width, by more than 1e-10.
 
     Queries are answered by compiled code, one or many at a time, which may round
-    differently. One interpolator can be used by many threads at once.
+    differently. Where that cannot trust itself, for a weight comes out below -1e-9 or
+    no circumsphere around the query is found, weights and values are NaN. No query has
+    been seen for which this happens, unless the diagram was damaged on purpose.
+
+    One interpolator can be used by many threads at once.
 
     R. Sibson, A brief description of natural neighbour interpolation (1981).
     V. V. Belikov et al., The non-Sibsonian interpolation (1997).
@@ -210,9 +214,9 @@ class NaturalNeighborInterpolator:
                     diagram = self._idle.pop()
                 except IndexError:
                     diagram = self._diagram.copy()
-                sure = answer_one(diagram, x, found)
+                answered = answer_one(diagram, x, found)
                 self._idle.append(diagram)
-                if sure:
+                if answered:
                     return found if self._is_row else found.reshape(self._each[0])
         if self.values is None:
             raise InvalidInput(
@@ -259,13 +263,10 @@ class NaturalNeighborInterpolator:
         (...) boolean array
         """
         queries, shape = checked_queries(x)
-        queries = scaled(self._space, queries)
-        within = np.zeros(len(queries), dtype=bool)
-        seen = np.flatnonzero(np.isfinite(queries).all(axis=1))
-        step = max(1, 50_000 // len(self.hull_facets))
-        for start in range(0, len(seen), step):
-            rows = seen[start : start + step]
-            within[rows] = placed(self._space, queries[rows], "nan")[1]
+        within = np.empty(len(queries), dtype=bool)
+        diagram = self._taken()
+        inside_many(diagram, queries, within)
+        self._idle.append(diagram)
         return within.reshape(shape)
 
     def _answer(self, x: ArrayLike, weigh: int, out: Floats | None) -> Floats:
@@ -274,18 +275,13 @@ class NaturalNeighborInterpolator:
         queries, shape = checked_queries(x)
         found = checked_out(out, (*shape, *each))
         answers = found.reshape(len(queries), math.prod(each))
-        state = np.full(len(queries), UNSURE)
-        self._answer_many(queries, weigh, answers, state)
-        again = np.flatnonzero(state == UNSURE)
-        if again.size:  # never seen
-            answers[again] = self._reference(queries[again], weigh)
+        self._answer_many(queries, weigh, answers)
         return found
 
-    def _answer_many(
-        self, x: Floats, weigh: int, found: Floats, state: NDArray[np.int64]
-    ) -> None:
-        """Write the weights or values of (Q, 3) queries, and what became of them."""
+    def _answer_many(self, x: Floats, weigh: int, found: Floats) -> None:
+        """Write the weights or values of (Q, 3) queries."""
         diagram, indices = self.packed
+        state = np.full(len(x), UNSURE)
         if len(x) < _BATCH:
             order = np.arange(len(x))
         elif indices[CORNERS] <= FEW and self.method != "sibson_c1":
@@ -304,14 +300,3 @@ class NaturalNeighborInterpolator:
             return self._idle.pop()
         except IndexError:
             return self._diagram.copy()
-
-    def _reference(self, x: Floats, weigh: int) -> Floats:
-        """Weights or values of (Q, 3) queries from NumPy."""
-        weights, places = reference_weights(
-            self._space, x, self.outside, laplace=self.method == "laplace"
-        )
-        if weigh:
-            return weights
-        if self.method != "sibson_c1":
-            return weights @ self._flat
-        return smooth_values(self._space, places, weights, self._flat, self._slopes)

@@ -1,7 +1,4 @@
-"""Sibson's smooth interpolant: his weights and tangent planes at the sites.
-
-The formula, and its source, are in ikns._kernels.voronoi.query.
-"""
+"""Gradients at the sites, for Sibson's smooth interpolant."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.errors import InvalidInput
 from ikns.nullspace.interpolation.domain import Domain
 
-__all__ = ["slopes", "smooth_values"]
+__all__ = ["slopes"]
 
 Floats = NDArray[np.float64]
 
@@ -71,38 +68,3 @@ def _estimated(space: Domain, view: Floats, values: Floats) -> Floats:
         rows = order[first[sites, None] + np.arange(count)]
         found[sites] = (np.linalg.pinv(way[rows]) @ rise[rows]).transpose(0, 2, 1)
     return found
-
-
-def smooth_values(
-    space: Domain, places: Floats, weights: Floats, values: Floats, gradients: Floats
-) -> Floats:
-    """Sibson's Z1.
-
-    Parameters
-    ----------
-    space : Domain
-    places : (Q, 3) array
-        Queries, scaled.
-    weights : (Q, N) array
-        Sibson's weights there.
-    values : (N, M) array
-    gradients : (N, M, 3) array
-        Per scaled unit of length.
-
-    Returns
-    -------
-    (Q, M) array
-    """
-    p = space.sites - places[:, None]
-    distance = np.linalg.norm(p, axis=2)
-    one_site = (weights == 1).any(axis=1)
-    distance[one_site] = 1
-    plain = weights @ values
-    near = weights / distance
-    nearness = near.sum(axis=1)
-    alpha = (weights * distance).sum(axis=1) / nearness
-    beta = (weights * distance**2).sum(axis=1)
-    rise = np.einsum("qn,nmk,qnk->qm", near, gradients, p)
-    tangents = (near @ values - rise) / nearness[:, None]
-    share = np.where(one_site, 0, beta / (alpha + beta))[:, None]
-    return (1 - share) * plain + share * tangents

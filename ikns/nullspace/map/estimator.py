@@ -269,7 +269,8 @@ class NullSpaceMap(BaseEstimator):
         -------
         (...) array, or (..., d) for ``n_dof > 1``
             0 at m, 1 at M. NaN where `q` or `x` is not finite, where the range is zero,
-            and outside the hull with ``outside="nan"``.
+            outside the hull with ``outside="nan"``, and where the weights cannot be
+            trusted (:class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`).
         """
         weights = self._weights(x)
         angles = checked_rows(q, self.directions_.shape[2], "joint vectors")

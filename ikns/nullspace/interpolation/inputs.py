@@ -1,4 +1,4 @@
-"""What interpolation accepts, checked once."""
+"""Checks of what an interpolator is given: points, values, queries, output arrays."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput, NotEnoughData
 
-__all__ = ["checked_points", "checked_values"]
+__all__ = ["checked_out", "checked_points", "checked_queries", "checked_values"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -83,3 +83,32 @@ def checked_values(values: ArrayLike, points: Floats) -> Floats:
         raise InvalidInput("all values must be finite, found NaN or infinity.")
     found.flags.writeable = False
     return found
+
+
+def checked_queries(x: ArrayLike) -> tuple[Floats, tuple[int, ...]]:
+    """Return queries as (Q, 3), and the shape that they were given in."""
+    queries = np.asarray(x, dtype=np.float64)
+    if queries.ndim == 0 or queries.shape[-1] != 3:
+        raise InvalidInput(
+            f"expected queries of shape (..., 3), found {queries.shape}."
+        )
+    # Compiled code knows only arrays that are contiguous and could be written.
+    flat = np.require(queries.reshape(-1, 3), requirements=["C", "W"])
+    return flat, queries.shape[:-1]
+
+
+def checked_out(out: Floats | None, shape: tuple[int, ...]) -> Floats:
+    """Return the array to write to: a new one, where none is given."""
+    if out is None:
+        return np.empty(shape)
+    if not (
+        isinstance(out, np.ndarray)
+        and out.shape == shape
+        and out.dtype == np.float64
+        and out.flags.carray
+    ):
+        raise InvalidInput(
+            "expected out to be a writeable, C-contiguous float64 array of shape "
+            f"{shape}."
+        )
+    return out

@@ -1,24 +1,27 @@
-"""Sums and products with twice a float's digits: a float, and what it rounds off."""
+"""Double-double arithmetic on arrays: a float, and what it rounds off.
+
+The same as ikns._kernels.voronoi.double_double, where the sources are.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["difference", "product", "twofold_dot"]
+__all__ = ["difference", "double_double_dot", "product"]
 
 Floats = NDArray[np.float64]
 
 
 def difference(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return a - b as a float, and what that float rounds off (Knuth)."""
+    """Return a - b as a float, and what that float rounds off."""
     value = a - b
     back = value - a
     return value, (a - (value - back)) - (b + back)
 
 
 def product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return a * b as a float, and what that float rounds off (Dekker, Veltkamp)."""
+    """Return a * b as a float, and what that float rounds off."""
     value = a * b
     high = []
     for factor in (a, b):
@@ -29,8 +32,8 @@ def product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     return value, ((p * r - value) + p * s + q * r) + q * s
 
 
-def twofold_dot(a: Floats, a_rest: Floats, b: Floats, b_rest: Floats) -> Floats:
-    """Scalar products of rows of three, to about 1e-30 of their largest term."""
+def double_double_dot(a: Floats, a_rest: Floats, b: Floats, b_rest: Floats) -> Floats:
+    """Scalar products of rows of three, (K,), to about 1e-30 of their largest term."""
     value, rest = product(a, b)
     rest = rest + a * b_rest + a_rest * b
     total, low = value[:, 0], rest.sum(axis=1)
