@@ -1,4 +1,4 @@
-"""Protocol, takes, guide, folder and clock of a live calibration."""
+"""Protocol, takes, targets, folder and clock of a live calibration."""
 
 import json
 import time
@@ -23,7 +23,7 @@ from ikns.live.calibration import (
 )
 from ikns.live.calibration.clock import DeviceClock
 from ikns.live.calibration.frames import recording_from_frames
-from ikns.live.calibration.targets import HandTracker
+from ikns.live.calibration.guidance import HandTracker
 from ikns.live.stream import Frame
 from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
@@ -103,7 +103,7 @@ def test_steps_follow_each_other_until_all_are_accepted():
 
 
 def test_redo_replaces_and_skip_leaves_out():
-    protocol = new(settled=["static", "free"])
+    protocol = new(accepted=["static", "free"])
     protocol.begin(0.0)
     at = up_to_verdict(protocol)
     first = protocol.take
@@ -124,11 +124,11 @@ def test_redo_replaces_and_skip_leaves_out():
 def test_what_cannot_be_used_cannot_be_accepted_and_nothing_goes_without_static():
     protocol = new()
     protocol.begin(0.0)
-    assert [c.what for c in protocol.key("skip", 0.0)] == ["refused"]
+    assert [c.what for c in protocol.key("skip", 0.0)] == ["rejected"]
     at = up_to_verdict(protocol)
     protocol.judged(keep=False, usable=False, now=at / RATE)
     for key in ("next", "skip"):
-        assert [c.what for c in protocol.key(key, 1.0)] == ["refused"]
+        assert [c.what for c in protocol.key(key, 1.0)] == ["rejected"]
     assert [c.what for c in protocol.key("redo", 1.0)] == ["redo", "ready"]
 
 
@@ -158,7 +158,7 @@ def test_a_recording_ends_on_time_though_no_frame_comes():
 
 
 def test_with_nobody_at_the_keys_verdicts_are_followed():
-    protocol = new(auto_takes=2, settled=["static", "free"])
+    protocol = new(auto_takes=2, accepted=["static", "free"])
     at, what = 0, [c.what for c in protocol.begin(0.0)]
     assert what == ["ready", "countdown"]
     for keep, usable, then in (
@@ -184,7 +184,7 @@ def test_with_nobody_at_the_keys_a_useless_static_trial_ends_it():
 
 def test_a_pending_recording_is_judged_first():
     take = Recording([0.0, 0.01], np.zeros((2, 1, 3)), ["C7"])
-    protocol = new(settled=["static", "free"], pending={"point_01": take})
+    protocol = new(accepted=["static", "free"], pending={"point_01": take})
     assert [c.what for c in protocol.begin(0.0)] == ["judging"]
     assert protocol.kept
     assert protocol.take is take
@@ -240,22 +240,22 @@ def test_a_device_that_counts_anew_goes_on():
     assert_array_equal(recording.markers[:, 0, 0], [9000, 9001, 0, 1, np.nan, 3])
 
 
-# --- guide --------------------------------------------------------------------------
+# --- targets --------------------------------------------------------------------------
 
 
 def test_suggested_places_are_the_corners_of_a_box_that_was_explored_whole():
     half = np.array([0.1, 0.2, 0.15])
     line = np.linspace(-1, 1, 5)
     grid = np.stack(np.meshgrid(line, line, line), axis=-1).reshape(-1, 3) * half
-    guide = TargetPoints(grid + [0.3, 0.0, 0.2], 10)
-    offsets = (guide.places - [0.3, 0.0, 0.2]) / half
+    targets = TargetPoints(grid + [0.3, 0.0, 0.2], 10)
+    offsets = (targets.positions - [0.3, 0.0, 0.2]) / half
     assert_allclose(np.sort(np.abs(offsets[:8]), axis=None), 1.0)
     assert len(np.unique(offsets[:8].round(6), axis=0)) == 8
     # Then the middles of the upper and the lower face.
     assert_allclose(offsets[8:], [[0, 1, 0], [0, -1, 0]], atol=1e-12)
-    assert guide.words(8) == "up"
+    assert targets.direction(8) == "up"
     assert all(
-        guide.words(k) == direction_in_words(offsets[k] * half) for k in range(8)
+        targets.direction(k) == direction_in_words(offsets[k] * half) for k in range(8)
     )
 
 
@@ -263,7 +263,7 @@ def test_suggested_places_are_the_corners_of_a_box_that_was_explored_whole():
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 12))
 def test_no_suggested_place_is_out_of_reach(seed, n):
     explored = np.random.default_rng(seed).normal(size=(50, 3)) * [0.1, 0.2, 0.1]
-    for place in TargetPoints(explored, n).places:
+    for place in TargetPoints(explored, n).positions:
         assert (explored == place).all(axis=1).any()
 
 
@@ -281,13 +281,13 @@ def test_the_tracker_sees_the_hand_where_it_is():
     worn = run.subject.skeleton.marker_set.without_static()
     skeleton = run.subject.skeleton.with_markers(worn)
     tracker = HandTracker(skeleton, "right_arm", run.free.recording.labels)
-    place = tracker.place(run.free.recording.markers[0])
+    place = tracker.position(run.free.recording.markers[0])
     truth = run.free.truth.task_position("right_arm")[0]
     assert place is not None
     # Without noise the truth leaves no residual; the solver's last step, of at most
     # 1e-5 rad, moves a hand 0.7 m away by less than 1e-5 m.
     assert np.linalg.norm(place - truth) < 1e-5
-    assert tracker.place(np.full_like(run.free.recording.markers[0], np.nan)) is None
+    assert tracker.position(np.full_like(run.free.recording.markers[0], np.nan)) is None
 
 
 # --- folder -------------------------------------------------------------------------

@@ -78,7 +78,7 @@ def test_a_stream_that_dies_without_a_word_is_noticed_and_found_again(
 ) -> None:
     # A stopped process, as a cut wire, leaves the connection open and answers nothing.
     monkeypatch.setattr("ikns.live.stream.lsl_feed._SILENCE", 0.3)
-    monkeypatch.setattr("ikns.live.stream.lsl_feed._SIGN_OF_LIFE", 0.5)
+    monkeypatch.setattr("ikns.live.stream.lsl_feed._ALIVE_TIMEOUT", 0.5)
     with start(str(walk), "--name", name, "--loop") as server:
         with open_source(f"lsl:{name}?scope=machine&timeout=60") as source:
             next(source)

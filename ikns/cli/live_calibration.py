@@ -131,7 +131,7 @@ def record_live(
             labels=source.labels,
             rate=source.rate,
             auto_takes=_AUTO_TAKES if options.auto else 0,
-            settled=folder.accepted,
+            accepted=folder.accepted,
             pending={name: ikns.read(path) for name, path in pending.items()},
         )
         screen = _Screen(steps, auto=options.auto)
@@ -182,7 +182,7 @@ class _Screen:
                 accept = "Enter accepts, " if verdict.usable else ""
                 skip = "" if step.kind == "static" else "s leaves it out, "
                 self._say(f"  {accept}r records it again, {skip}q quits.")
-        elif what == "refused":
+        elif what == "rejected":
             self._say(f"{step.name}: that key means nothing here.")
         elif what in ("accepted", "redo", "skipped", "stopped"):
             self._say(f"{step.name}: {what}.")
@@ -197,8 +197,8 @@ class _Screen:
         parts.append(f"markers {status.seen}/{status.expected}")
         if math.isfinite(status.hand_speed):
             parts.append(f"hand {status.hand_speed:.2f} m/s")
-        if math.isfinite(status.to_go):
-            parts.append(f"{100 * status.to_go:.0f} cm to go: {status.way}")
+        if math.isfinite(status.distance):
+            parts.append(f"{100 * status.distance:.0f} cm to go: {status.direction}")
         sys.stderr.write(f"\r\x1b[K{'  '.join(parts)}")
         sys.stderr.flush()
 

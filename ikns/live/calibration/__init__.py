@@ -1,8 +1,8 @@
 """The calibration protocol with a person in front of live cameras.
 
-`protocol` is the order of steps, without a screen or a clock; `verdict` says after each
-step whether it is good enough; `guide` where the hand should go next; `folder` keeps
-every recording; `procedure` ties them to a source of frames.
+`protocol` has the order of steps, without a screen or a clock; `verdict` decides after
+each step whether its recording is good enough; `targets` suggests positions for the
+hand; `folder` keeps every recording; `procedure` connects them to a source of frames.
 """
 
 from ikns.live.calibration.folder import RecordingsFolder
@@ -25,19 +25,19 @@ from ikns.live.calibration.targets import TargetPoints, direction_in_words
 from ikns.live.calibration.verdict import Verdict
 
 __all__ = [
+    "CalibrationStatus",
     "Change",
-    "TargetPoints",
     "Judge",
     "Key",
     "LiveProtocol",
-    "RecordingsFolder",
-    "CalibrationStatus",
     "ProtocolStep",
+    "RecordingsFolder",
+    "TargetPoints",
     "Verdict",
     "accepted_recordings",
-    "run_protocol",
     "check_labels",
     "direction_in_words",
     "paper_steps",
     "restore",
+    "run_protocol",
 ]

@@ -1,7 +1,7 @@
-"""The recordings folder: every take as C3D, and what was decided about each.
+"""The recordings folder: every take as a C3D file, and the decision about it.
 
-A take is on disk before anybody judges it, so a crash loses the step being recorded and
-nothing else. Takes are never deleted or overwritten.
+A take is on disk before it is judged, so a crash loses only the step being recorded.
+Takes are never deleted or overwritten.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ class RecordingsFolder:
     ----------
     path : Path
     settings : dict
-        What must stay the same when it is resumed: text and numbers.
+        Text and numbers that must be the same when it is resumed.
     resume : bool
-        Go on with a folder that exists.
+        Continue with an existing folder.
 
     Raises
     ------
     InvalidInput
-        When the folder exists and is not resumed, or was made with other settings.
+        When the folder exists and `resume` is false, or it has other settings.
     FileError
         When there is nothing to resume, or it cannot be read or written.
     """
@@ -71,7 +71,7 @@ class RecordingsFolder:
 
     @property
     def accepted(self) -> dict[str, Path]:
-        """Recording of each accepted step; of several, the last."""
+        """Recording of each accepted step: the last one accepted."""
         return {
             take["step"]: self.path / take["recording"]
             for take in self._takes
@@ -79,7 +79,7 @@ class RecordingsFolder:
         }
 
     def pending(self, steps: Sequence[ProtocolStep]) -> dict[str, Path]:
-        """Return recordings that were kept but not decided on, by step."""
+        """Return recordings without a decision, by step."""
         decided = {take["recording"] for take in self._takes}
         found: dict[str, Path] = {}
         for step in steps:
@@ -89,12 +89,12 @@ class RecordingsFolder:
         return found
 
     def keep(self, step: ProtocolStep, recording: Recording) -> Recording:
-        """Write a take, synced to the disk.
+        """Write a take and sync it to the disk.
 
         Returns
         -------
         Recording
-            As read back: the numbers that a calibration from the files will see.
+            As read back, with the same numbers that a calibration from files will use.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class RecordingsFolder:
         return read(path)
 
     def decide(self, step: ProtocolStep, outcome: str, verdict: Verdict) -> None:
-        """Write down what became of the last take of a step."""
+        """Write the decision about the last take of a step."""
         files = self._files(step)
         decided = {take["recording"] for take in self._takes}
         if not files or files[-1].name in decided:  # nothing was recorded
@@ -127,11 +127,11 @@ class RecordingsFolder:
 
     @property
     def takes(self) -> list[dict[str, Any]]:
-        """Every take that was decided on, in that order."""
+        """Every take with a decision, in the order of decisions."""
         return [dict(take) for take in self._takes]
 
     def _files(self, step: ProtocolStep) -> list[Path]:
-        """Return the takes of a step, the first one first."""
+        """Return the files of a step's takes, in order."""
         first = self.path / f"{step.name}.c3d"
         more = sorted(
             self.path.glob(f"{step.name}_take_*.c3d"),
@@ -146,7 +146,7 @@ class RecordingsFolder:
             if table["format"] != FORMAT:
                 raise ValueError(f"format {table['format']}")
             settings, self._takes = table["settings"], table["takes"]
-            self.accepted  # noqa: B018 - a damaged table must show here
+            self.accepted  # noqa: B018 - raises if the table is damaged
         except FileNotFoundError:
             raise FileError(
                 f"{self.path}: expected recordings of a live calibration to go on "
@@ -188,7 +188,7 @@ def _sync(path: Path) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return what JSON holds; a number that is not finite becomes null."""
+    """Convert to types of JSON; a number that is not finite becomes null."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

@@ -1,4 +1,4 @@
-"""Frames as they came, put where their numbers belong: a recording at a steady rate."""
+"""Frames sorted by number into a recording of constant rate."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ __all__ = ["recording_from_frames"]
 def recording_from_frames(
     frames: Sequence[Frame], labels: Sequence[str], rate: float, source: str
 ) -> Recording | None:
-    """Return the recording that frames make up.
+    """Make a recording of frames.
 
-    Frame numbers are the time: a frame that never came is a row of NaN, a late one goes
-    to its place, one that came twice counts once. A number more than 1 s back or 10 s
-    ahead is a device that counts anew: its frames follow on.
+    Frame numbers give the time: a lost frame becomes a row of NaN, a late one is put in
+    order, and a repeated one is used once. A number more than 1 s back or 10 s ahead
+    means that the device restarted counting; its frames are appended.
 
     Parameters
     ----------
     frames : sequence of Frame
-        In the order in which they came.
+        In the order of receipt.
     labels : sequence of M str
     rate : float
         Frames per second of the device's clock.
@@ -34,7 +34,7 @@ def recording_from_frames(
     Returns
     -------
     Recording or None
-        From 0 s on; None when there are fewer than two frames.
+        Starting at 0 s; None with fewer than two frames.
     """
     rows: dict[int, Frame] = {}
     row, before = -1, None

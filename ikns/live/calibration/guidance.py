@@ -1,43 +1,49 @@
-"""What the experimenter sees between changes: markers, hand, and the way to go."""
+"""What the experimenter sees: markers, hand speed, and where the hand should go."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ikns.body.chains import SIDES, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.live.calibration.judge import Judge
 from ikns.live.calibration.protocol import LiveProtocol, ProtocolStep
-from ikns.live.calibration.targets import HandTracker, TargetPoints, direction_in_words
+from ikns.live.calibration.targets import TargetPoints, direction_in_words
 from ikns.live.stream import Frame, Source
+from ikns.motion.marker_ik import MarkerIK
 
-__all__ = ["Guidance", "CalibrationStatus"]
+__all__ = ["CalibrationStatus", "Guidance", "HandTracker"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class CalibrationStatus:
-    """How it stands, for a line on a screen.
+    """Status of the calibration, for a line on a screen.
 
     Parameters
     ----------
     state : str
-        Of the protocol.
+        State of the protocol.
     step : ProtocolStep
     seconds_left : float
-        Of the countdown or the recording.
+        Time left of the countdown or the recording, s.
     seen, expected : int
-        Markers of the set in the last frame, and how many there are.
+        Number of markers of the set in the last frame, and in total.
     silence : float
-        Since the last frame, s.
+        Time since the last frame, s.
     hand_speed : float
         Speed of the hand in the thorax frame, m/s; NaN while unknown.
-    to_go : float
-        Distance of the hand from the suggested place, m; NaN without one.
-    way : str
-        Which way the hand has to go, in words.
+    distance : float
+        Distance of the hand from the suggested position, m; NaN without one.
+    direction : str
+        Direction in which the hand should move, in words.
     """
 
     state: str
@@ -47,56 +53,93 @@ class CalibrationStatus:
     expected: int
     silence: float
     hand_speed: float
-    to_go: float
-    way: str
+    distance: float
+    direction: str
+
+
+class HandTracker:
+    """Tracks the hand frame by frame.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The person's.
+    chain : str
+        See :data:`ikns.body.chains.CHAINS`.
+    labels : sequence of str
+        Labels of the frames' markers.
+    """
+
+    def __init__(self, skeleton: Skeleton, chain: str, labels: Sequence[str]) -> None:
+        self._skeleton, self._labels = skeleton, tuple(labels)
+        self._sides = [SIDES.index(side) for side in chain_sides(chain)]
+        self._solver = MarkerIK(skeleton)
+        self._q: Array | None = None
+
+    def position(self, markers: Array) -> Array | None:
+        """Hand, or the mean of both, in the thorax frame, (3,) m; None if not seen."""
+        worn = self._skeleton.marker_set
+        pose = self._solver.solve(worn.pick(self._labels, markers), self._q)
+        if not math.isfinite(pose.residual):
+            return None
+        self._q = pose.q
+        hands = self._skeleton.hands_in_thorax(pose.q)[0]
+        return np.asarray(hands[self._sides].mean(axis=0))
 
 
 class Guidance:
-    """What the experimenter sees between changes."""
+    """Follows the hand and directs it to the target points.
+
+    Parameters
+    ----------
+    source : Source
+    judge : Judge
+    n_points : int
+    """
 
     def __init__(self, source: Source, judge: Judge, n_points: int) -> None:
         self._labels, self._judge, self._n_points = source.labels, judge, n_points
         self._worn = MarkerSet.load(judge.marker_set).without_static()
         self._tracker: tuple[Skeleton, HandTracker] | None = None
-        self._guide: tuple[object, TargetPoints] | None = None
-        self._before: tuple[float, np.ndarray] | None = None
+        self._targets: tuple[object, TargetPoints] | None = None
+        self._before: tuple[float, Array] | None = None
 
-    def guide(self) -> TargetPoints | None:
-        """Places to suggest, once there was a free exploration."""
+    def targets(self) -> TargetPoints | None:
+        """Return the target points; None before the free exploration."""
         explored = self._judge.explored
         if explored is None:
             return None
-        if self._guide is None or self._guide[0] is not explored:
-            self._guide = (explored, TargetPoints(explored, self._n_points))
-        return self._guide[1]
+        if self._targets is None or self._targets[0] is not explored:
+            self._targets = (explored, TargetPoints(explored, self._n_points))
+        return self._targets[1]
 
-    def where(self, step: ProtocolStep | None) -> str:
-        """Where the hand should be, in words; empty where nobody knows."""
-        guide = self.guide()
-        if guide is None or step is None or step.kind != "point":
+    def direction(self, step: ProtocolStep | None) -> str:
+        """Direction of a step's target point, in words; empty if unknown."""
+        targets = self.targets()
+        if targets is None or step is None or step.kind != "point":
             return ""
-        return guide.words(_number(step))
+        return targets.direction(_number(step))
 
     def status(
         self, protocol: LiveProtocol, frame: Frame | None, silence: float
     ) -> CalibrationStatus:
-        """Look at the last frame."""
+        """Return the status after the last frame."""
         step = protocol.step
         assert step is not None
-        seen, speed, to_go, way = 0, math.nan, math.nan, ""
+        seen, speed, distance, direction = 0, math.nan, math.nan, ""
         if frame is not None:
             markers = self._worn.pick(self._labels, frame.markers)
             seen = int(np.isfinite(markers).all(axis=1).sum())
-            place = self._place(frame)
-            if place is not None:
+            position = self._hand_position(frame)
+            if position is not None:
                 if self._before and frame.device_time > self._before[0]:
-                    moved = float(np.linalg.norm(place - self._before[1]))
+                    moved = float(np.linalg.norm(position - self._before[1]))
                     speed = moved / (frame.device_time - self._before[0])
-                self._before = (frame.device_time, place)
-                guide = self.guide()
-                if guide is not None and step.kind == "point":
-                    offset = guide.places[_number(step)] - place
-                    to_go, way = (
+                self._before = (frame.device_time, position)
+                targets = self.targets()
+                if targets is not None and step.kind == "point":
+                    offset = targets.positions[_number(step)] - position
+                    distance, direction = (
                         float(np.linalg.norm(offset)),
                         direction_in_words(offset),
                     )
@@ -108,20 +151,20 @@ class Guidance:
             len(self._worn.labels),
             silence,
             speed,
-            to_go,
-            way,
+            distance,
+            direction,
         )
 
-    def _place(self, frame: Frame) -> np.ndarray | None:
+    def _hand_position(self, frame: Frame) -> Array | None:
         skeleton = self._judge.skeleton
         if skeleton is None:
             return None
         if self._tracker is None or self._tracker[0] is not skeleton:
             tracker = HandTracker(skeleton, self._judge.chain, self._labels)
             self._tracker = (skeleton, tracker)
-        return self._tracker[1].place(frame.markers)
+        return self._tracker[1].position(frame.markers)
 
 
 def _number(step: ProtocolStep) -> int:
-    """Return the number of a point, from 0."""
+    """Return the number of a point step, from 0."""
     return int(step.name.rsplit("_", 1)[-1]) - 1

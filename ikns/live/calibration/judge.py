@@ -1,4 +1,4 @@
-"""The judge of all steps: what accepted steps taught is what later ones are held to."""
+"""Judges all steps, later ones by what the accepted ones have shown."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Judge:
     generic : Skeleton
         Body to start from.
     marker_set, chain, n_dof, variance, max_hand_speed, min_static, min_still
-        Of :func:`ikns.calibrate`.
+        See :func:`ikns.calibrate`.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Judge:
     Raises
     ------
     InvalidInput
-        When a setting is out of its range: better now than after the protocol.
+        When a setting is out of its range.
     """
 
     def __init__(
@@ -74,17 +74,17 @@ class Judge:
         self._max_hand_speed, self._min_still = max_hand_speed, min_still
 
     def judge(self, step: ProtocolStep, recording: Recording | None) -> Verdict:
-        """Say what a recording of a step is good for; None stands for no frames."""
+        """Judge a recording of a step; None stands for no frames."""
         if recording is None:
             return Verdict(False, False, "No frames came.", {})
         try:
             return self._judge(step, recording)
         except (IknsError, np.linalg.LinAlgError) as error:
-            # The person is still there and can do it again.
+            # The step can still be repeated.
             return Verdict(False, False, f"It cannot be judged: {error}", {})
 
     def accept(self, step: ProtocolStep, verdict: Verdict) -> None:
-        """Learn from a step that was accepted."""
+        """Store the results of an accepted step."""
         if verdict.skeleton is not None:
             self.skeleton = verdict.skeleton
         if verdict.explored is not None:

@@ -1,4 +1,4 @@
-"""Is a stay at a point good enough? Hand still, elbow moving, and a new place."""
+"""Verdict on the recording of a point: hand still, elbow moving, at a new position."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ __all__ = ["judge_point"]
 
 Array = NDArray[np.float64]
 
-#: Least share of samples with the hand still. A virtual person who holds the hand, with
-#: soft tissue and all, has 0.47 at the worst of ten points; a quarter of 5 s is more
-#: than twice what a point needs.
+#: Smallest share of samples with the hand still. A virtual person who holds the hand,
+#: with soft tissue artifacts, has 0.47 at the worst of ten points; a quarter of 5 s is
+#: more than twice what a point needs.
 STEADY_SHARE = 0.25
-#: Least motion along Z, rad: noise of a joint angle is about 0.5 deg, so c would carry
-#: more than 5 % of noise.
+#: Smallest motion along Z, rad: with a noise of about 0.5 deg per joint angle, c would
+#: otherwise have a noise of more than 5 %.
 LEAST_RANGE = math.radians(10.0)
 
 
@@ -49,10 +49,10 @@ def judge_point(
     min_still: float = 0.5,
     earlier: Mapping[str, Array] | None = None,
 ) -> Verdict:
-    """Judge a stay at a point: hand still, elbow moving, one freedom, a new place.
+    """Judge a point: hand still, elbow moving, one degree of freedom, new position.
 
-    Directions and ranges come from a map of this one point, the code that the
-    calibration itself uses.
+    Directions and ranges come from a map of this single point, computed as in the
+    calibration.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def judge_point(
     chain : str
         See :data:`ikns.body.chains.CHAINS`.
     n_dof, variance, max_hand_speed, min_still
-        Of :func:`ikns.calibrate`.
+        See :func:`ikns.calibrate`.
     earlier : mapping of str to (3,) array
         Points accepted so far, thorax frame, m.
     """
@@ -82,7 +82,7 @@ def judge_point(
         "samples": int(gate.sum()),
         "residual_mm": millimeters(median(motion.residual)),
     }
-    # As in the calibration, which leaves a point with fewer out.
+    # As in the calibration, which leaves points with fewer samples out.
     enough = max(int(np.ceil(min_still * recording.rate)), len(chain_joints(chain)) + 1)
     reason = tracking_fault(skeleton, recording, motion, known, chain=chain)
     if gate.sum() < enough:
@@ -112,7 +112,7 @@ def judge_point(
         learned.fit(x, q)
     width = (learned.upper_ - learned.lower_)[0]
     c = np.reshape(learned.control_signal(q, x), (len(q), n_dof))
-    known_c = bool(np.isfinite(c).all())  # unless no joint moves at all
+    known_c = bool(np.isfinite(c).all())  # false if no joint moves at all
     leak = np.linalg.norm(slopes(c, x), axis=1) if known_c else np.full(n_dof, np.nan)
     components = int(learned.n_components_[0])
     values |= {
@@ -141,7 +141,7 @@ def _fault(
     leak: float,
     apart: Mapping[str, float],
 ) -> str:
-    """Say what is wrong first of all; empty where nothing is."""
+    """Describe the most important fault; empty if there is none."""
     if steady < STEADY_SHARE:
         return (
             f"The hand was steady in {100 * steady:.0f} % of the samples only, "
@@ -155,14 +155,14 @@ def _fault(
     if components > n_dof:
         return (
             f"It took {components} components, so more moved than the elbow: the hand "
-            "turned or the shoulder went along."
+            "turned or the shoulder moved too."
         )
     if not leak < ONE_PLACE:
-        return f"The hand went with the elbow, {1e3 * leak:.0f} mm from end to end."
+        return f"The hand moved with the elbow, {1e3 * leak:.0f} mm from end to end."
     for name, distance in sorted(apart.items(), key=lambda item: item[1])[:1]:
         if distance < ONE_PLACE:
             return (
-                f"It is the place of {name}, {100 * distance:.0f} cm away, expected at "
-                f"least {100 * ONE_PLACE:.0f} cm."
+                f"The position is that of {name}, {100 * distance:.0f} cm away, "
+                f"expected at least {100 * ONE_PLACE:.0f} cm."
             )
     return ""

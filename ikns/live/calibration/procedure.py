@@ -1,7 +1,7 @@
-"""From a source of frames to accepted recordings: protocol, judge and folder together.
+"""Run the calibration protocol: from a source of frames to accepted recordings.
 
-Time is the device's clock while frames come, so a recording played at full speed goes
-through the protocol as the person did; between frames it is this machine's.
+Time is the device's clock while frames come, so a recording played at full speed passes
+through the protocol as the person did; without frames it is this machine's clock.
 """
 
 from __future__ import annotations
@@ -26,20 +26,19 @@ from ikns.recording.files import read
 
 __all__ = ["accepted_recordings", "run_protocol", "check_labels", "restore"]
 
-#: Called with a change, the verdict where there is one, and where the hand should go.
+#: Called with a change, the verdict if there is one, and the direction of the target.
 OnChange = Callable[[Change, Verdict | None, str], None]
 
-#: Seconds to wait for a frame before looking at the keys again.
+#: Seconds to wait for a frame before reading the keys again.
 _WAIT = 0.05
 
 
 def check_labels(
     source: Source, marker_set: str, chain: str, *, generic: Skeleton
 ) -> None:
-    """Make sure that every marker of the thorax and of the chain can come.
+    """Check that the source has every marker of the thorax and of the chain.
 
-    Markers of the static trial alone may be missing, and those of an arm that takes no
-    part.
+    Static-only markers and those of an arm outside the chain may be missing.
 
     Raises
     ------
@@ -64,7 +63,7 @@ def check_labels(
 def restore(
     judge: Judge, folder: RecordingsFolder, steps: Sequence[ProtocolStep]
 ) -> None:
-    """Teach the judge what was accepted before."""
+    """Restore the judge's state from the recordings accepted before."""
     accepted = folder.accepted
     for step in steps:
         if step.name in accepted:
@@ -79,8 +78,8 @@ def accepted_recordings(
     Raises
     ------
     NotEnoughData
-        When there is no static trial, or there are fewer points than a map needs: 4,
-        or all where fewer were asked for.
+        When there is no static trial, or there are fewer points than a map needs: 4, or
+        all of them if fewer were requested.
     """
     accepted = folder.accepted
     static = [s for s in steps if s.kind == "static" and s.name in accepted]
@@ -110,33 +109,32 @@ def run_protocol(
     status_every: float = 0.1,
     read_timeout: float = 10.0,
 ) -> None:
-    """Go through the protocol until it is done or stopped.
+    """Run the protocol until it is done or stopped.
 
     Parameters
     ----------
     source : Source
     protocol : LiveProtocol
-        Not begun yet.
+        Not started yet.
     judge : Judge
-        That knows what was accepted before, see :func:`restore`.
+        Restored from earlier recordings, see :func:`restore`.
     folder : RecordingsFolder
     n_points : int
-        Points in all, for the places to suggest.
+        Number of points, for the suggested positions.
     keys : callable
-        Called with whether only a key goes on; returns the keys that were pressed.
+        Called with whether the protocol waits for a key; returns the keys pressed.
     on_change : callable
-        Called with every change, the verdict where there is one, and words for where
-        the hand should go.
+        Called with every change, the verdict if there is one, and the direction of the
+        target in words.
     on_status : callable, optional
         Called with a :class:`CalibrationStatus` about every `status_every` seconds.
     read_timeout : float
-        Seconds without a frame after which nobody waits any longer where no key could
-        end the wait.
+        Without keys, an error is raised after this time without a frame, s.
 
     Raises
     ------
     StreamError
-        When the source ends, or falls silent with nobody at the keys.
+        When the source ends, or sends no frames and there are no keys.
     """
     _Run(source, protocol, judge, folder, n_points, on_change).go(
         keys, on_status, status_every, read_timeout
@@ -144,7 +142,7 @@ def run_protocol(
 
 
 class _Run:
-    """State of one way through the protocol."""
+    """State of one run of the protocol."""
 
     def __init__(
         self,
@@ -186,14 +184,14 @@ class _Run:
                 self._handle(protocol.frame(frame, self._clock.now))
             else:
                 self._handle(protocol.tick(self._clock.now))
-                self._wait(read_timeout)
+                self._check_silence(read_timeout)
             if on_status and not protocol.over:
                 if time.monotonic() - shown >= status_every:
                     shown = time.monotonic()
                     silence = self._clock.silence
                     on_status(self._guidance.status(protocol, self._frame, silence))
 
-    def _wait(self, read_timeout: float) -> None:
+    def _check_silence(self, read_timeout: float) -> None:
         protocol, source = self._protocol, self._source
         step = protocol.step.name if protocol.step else "the end"
         if source.ended and not protocol.waiting and not protocol.over:
@@ -220,14 +218,14 @@ class _Run:
                     self._folder.decide(step, change.what, self._verdict)
             if change.what == "stopped":
                 self._verdict = None
-            self._on_change(change, self._verdict, self._guidance.where(step))
+            self._on_change(change, self._verdict, self._guidance.direction(step))
             if change.what in ("accepted", "redo", "skipped"):
                 self._verdict = None
             if change.what == "judging":
-                changes += self._settle(change)
+                changes += self._judge_take(change)
 
-    def _settle(self, change: Change) -> list[Change]:
-        """Keep the take, then judge it: a judge that fails loses nothing."""
+    def _judge_take(self, change: Change) -> list[Change]:
+        """Write the take, then judge it, so that a failing judge loses nothing."""
         protocol, step = self._protocol, change.step
         assert step is not None
         take = protocol.take

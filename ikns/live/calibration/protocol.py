@@ -1,6 +1,6 @@
-"""The order of steps: prompts, countdowns, recordings and what becomes of them.
+"""The state machine of the protocol: countdowns, recordings and decisions.
 
-Nothing here looks at a screen or a clock: every call says what time it is.
+It has no screen and no clock: every call passes the time.
 
     ready -> countdown -> recording -> judging -> verdict -> accepted | redo | skipped
 """
@@ -21,8 +21,8 @@ __all__ = [
     "Change",
     "Key",
     "LiveProtocol",
-    "State",
     "ProtocolStep",
+    "State",
     "paper_steps",
 ]
 
@@ -40,12 +40,12 @@ class ProtocolStep:
     Parameters
     ----------
     name : str
-        Also the name of its file.
+        Also the stem of its file name.
     kind : {"static", "free", "point"}
     seconds : float
-        How long it is recorded.
+        Duration of the recording, s.
     countdown : float
-        Seconds before the recording.
+        Time before the recording, s.
     """
 
     name: str
@@ -55,17 +55,17 @@ class ProtocolStep:
 
 
 class Change(NamedTuple):
-    """What happened to a step, and when.
+    """A change of a step's state.
 
     Parameters
     ----------
     time : float
-        As told to the call, s.
+        As passed to the call, s.
     step : ProtocolStep or None
         None at the end.
     what : str
-        The new state, or what became of the step: ``accepted``, ``redo``, ``skipped``;
-        ``refused`` for a key that means nothing here.
+        The new state, or the decision about the step: ``accepted``, ``redo``,
+        ``skipped``; ``rejected`` for a key that is not valid in this state.
     """
 
     time: float
@@ -115,7 +115,7 @@ def paper_steps(
 
 
 class LiveProtocol:
-    """Where a calibration stands.
+    """The protocol of a live calibration.
 
     Parameters
     ----------
@@ -125,25 +125,25 @@ class LiveProtocol:
     rate : float
         Frames per second of the device's clock.
     auto_takes : int
-        0: a key decides everything. Otherwise nothing waits for a key, verdicts are
-        followed, and a step gets at most this many takes.
-    settled : collection of str
-        Names of steps that were accepted before.
+        0: keys decide. Otherwise verdicts decide without keys, and a step gets at most
+        this many takes.
+    accepted : collection of str
+        Names of steps accepted before.
     pending : mapping of str to Recording
-        Recordings of steps on which nobody decided yet.
+        Recordings of steps without a decision.
 
     Attributes
     ----------
     state : str
     step : ProtocolStep or None
-        The present one; None once there is none left.
+        The present step; None at the end.
     take : Recording or None
-        What was recorded of it, None with fewer than two frames.
+        Its recording; None with fewer than two frames.
     kept : bool
-        Whether the take was pending, so it is on disk already.
+        Whether the take was pending, hence is on disk already.
     skipped : list of str
     seconds_left : float
-        Of the countdown or the recording.
+        Time left of the countdown or the recording, s.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class LiveProtocol:
         labels: Sequence[str],
         rate: float,
         auto_takes: int = 0,
-        settled: Collection[str] = (),
+        accepted: Collection[str] = (),
         pending: Mapping[str, Recording] | None = None,
     ) -> None:
         self.auto = auto_takes > 0
@@ -162,7 +162,7 @@ class LiveProtocol:
         self.kept = self._usable = False
         self.skipped: list[str] = []
         self.seconds_left = 0.0
-        self._left = [step for step in steps if step.name not in settled]
+        self._left = [step for step in steps if step.name not in accepted]
         self._pending = dict(pending or {})
         self._labels, self._rate = tuple(labels), rate
         self._auto_takes, self._takes = auto_takes, 0
@@ -176,17 +176,17 @@ class LiveProtocol:
 
     @property
     def waiting(self) -> bool:
-        """Whether it goes on only with a key."""
+        """Whether it waits for a key."""
         return self.state in ("ready", "verdict") and not self.auto
 
     @property
     def over(self) -> bool:
-        """Whether nothing more will happen."""
+        """Whether the protocol has ended."""
         return self.state in ("done", "stopped")
 
     def begin(self, now: float) -> list[Change]:
-        """Start with the first step."""
-        return self._enter(now)
+        """Start the first step."""
+        return self._start_step(now)
 
     def tick(self, now: float) -> list[Change]:
         """Let time pass without a frame."""
@@ -197,7 +197,7 @@ class LiveProtocol:
             if self.seconds_left <= half:
                 self._frames, self._since = [], now
                 self.seconds_left = self._present.seconds
-                return [self._to("recording", now)]
+                return [self._change_state("recording", now)]
         elif self.state == "recording":
             self.seconds_left = self._since + self._present.seconds - now
             if self.seconds_left <= half:
@@ -205,74 +205,76 @@ class LiveProtocol:
         return []
 
     def frame(self, frame: Frame, now: float) -> list[Change]:
-        """Take the next frame."""
+        """Process the next frame."""
         changes = self.tick(now)
         if self.state == "recording":
             self._frames.append(frame)
-            # The last frame of a step lies one period before its end.
+            # The last frame of a step is one period before its end.
             if self.seconds_left <= 1.5 / self._rate:
                 changes += self._finish(now)
         return changes
 
     def judged(self, *, keep: bool, usable: bool, now: float) -> list[Change]:
-        """Hear the verdict on the step just recorded."""
+        """Take the verdict on the step just recorded."""
         self._usable = usable
-        changes = [self._to("verdict", now)]
+        changes = [self._change_state("verdict", now)]
         if not self.auto:
             return changes
         last = self._takes >= self._auto_takes
         if keep or (last and usable):
-            return changes + self._settle("accepted", now)
+            return changes + self._decide("accepted", now)
         if not last:
-            return changes + self._again(now)
+            return changes + self._retry(now)
         if self._present.kind == "static":
             self.state = "stopped"
             return [*changes, Change(now, self.step, "stopped")]
-        return changes + self._settle("skipped", now)
+        return changes + self._decide("skipped", now)
 
     def key(self, key: Key, now: float) -> list[Change]:
-        """Hear what the experimenter wants.
+        """Handle a key of the experimenter.
 
-        What a calibration cannot use cannot be accepted, and nothing goes without the
-        static trial.
+        A recording that a calibration cannot use cannot be accepted, and the static
+        trial cannot be skipped.
         """
         if self.over or self.state == "judging":
             return []
         if key == "quit":
-            return [self._to("stopped", now)]
+            return [self._change_state("stopped", now)]
         if key == "next" and self.state == "ready":
-            return self._count(now)
+            return self._start_countdown(now)
         if key == "next" and self.state == "verdict" and self._usable:
-            return self._settle("accepted", now)
+            return self._decide("accepted", now)
         if key == "redo" and self.state != "ready":
-            return self._again(now)
+            return self._retry(now)
         if key == "skip" and self._present.kind != "static":
-            return self._settle("skipped", now)
-        return [Change(now, self.step, "refused")]
+            return self._decide("skipped", now)
+        return [Change(now, self.step, "rejected")]
 
     @property
     def _present(self) -> ProtocolStep:
         assert self._left
         return self._left[0]
 
-    def _to(self, state: State, now: float) -> Change:
+    def _change_state(self, state: State, now: float) -> Change:
         self.state = state
         return Change(now, self.step, state)
 
-    def _enter(self, now: float) -> list[Change]:
+    def _start_step(self, now: float) -> list[Change]:
         self.take, self._frames, self._takes = None, [], 0
         self.kept = self._usable = False
         if not self._left:
-            return [self._to("done", now)]
+            return [self._change_state("done", now)]
         if self._present.name in self._pending:
             self.take, self._takes = self._pending.pop(self._present.name), 1
             self.kept = True
-            return [self._to("judging", now)]
-        return [self._to("ready", now)] + (self._count(now) if self.auto else [])
+            return [self._change_state("judging", now)]
+        return [self._change_state("ready", now)] + (
+            self._start_countdown(now) if self.auto else []
+        )
 
-    def _count(self, now: float) -> list[Change]:
+    def _start_countdown(self, now: float) -> list[Change]:
         self._since, self.seconds_left = now, self._present.countdown
-        return [self._to("countdown", now)]
+        return [self._change_state("countdown", now)]
 
     def _finish(self, now: float) -> list[Change]:
         self.take = recording_from_frames(
@@ -280,17 +282,17 @@ class LiveProtocol:
         )
         self._frames = []
         self._takes += 1
-        return [self._to("judging", now)]
+        return [self._change_state("judging", now)]
 
-    def _again(self, now: float) -> list[Change]:
+    def _retry(self, now: float) -> list[Change]:
         self.take, self._frames = None, []
         self.kept = self._usable = False
-        changes = [Change(now, self.step, "redo"), self._to("ready", now)]
-        return changes + (self._count(now) if self.auto else [])
+        changes = [Change(now, self.step, "redo"), self._change_state("ready", now)]
+        return changes + (self._start_countdown(now) if self.auto else [])
 
-    def _settle(self, what: Literal["accepted", "skipped"], now: float) -> list[Change]:
+    def _decide(self, what: Literal["accepted", "skipped"], now: float) -> list[Change]:
         change = Change(now, self.step, what)
         if what == "skipped":
             self.skipped.append(self._present.name)
         del self._left[0]
-        return [change, *self._enter(now)]
+        return [change, *self._start_step(now)]

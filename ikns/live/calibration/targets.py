@@ -1,66 +1,60 @@
-"""Where the hand should go next, in words, and how far it still is."""
+"""Target points for the hand, and directions in words."""
 
 from __future__ import annotations
-
-import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns.body.chains import SIDES, chain_sides
-from ikns.body.skeleton import Skeleton
-from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.clustering import (
     BoundingBox,
     box_surface_points,
     minimum_bounding_box,
 )
 
-__all__ = ["TargetPoints", "HandTracker", "direction_in_words", "target_points"]
+__all__ = ["TargetPoints", "direction_in_words", "target_points"]
 
 Array = NDArray[np.float64]
 
-#: A part of the way shorter than this share of the longest part is not worth a word.
-_WORTH_SAYING = 0.3
-#: Each way along the axes of the thorax (ISB): X forward, Y up, Z right.
-_WAYS = (("forward", "back"), ("up", "down"), ("to the right", "to the left"))
+#: Components smaller than this share of the largest one are not mentioned.
+_LEAST_SHARE = 0.3
+#: Directions along the axes of the thorax (ISB): X forward, Y up, Z right.
+_DIRECTIONS = (("forward", "back"), ("up", "down"), ("to the right", "to the left"))
 _ORDER = (1, 0, 2)
 
 
-def direction_in_words(way: ArrayLike) -> str:
-    """Say a way in the thorax frame as the person would.
+def direction_in_words(displacement: ArrayLike) -> str:
+    """Describe a displacement in the thorax frame from the person's point of view.
 
     Examples
     --------
     >>> direction_in_words([0.2, 0.3, 0.15]), direction_in_words([0.01, -0.2, 0.0])
     ('up, forward, to the right', 'down')
     """
-    parts = np.asarray(way, dtype=np.float64)
+    parts = np.asarray(displacement, dtype=np.float64)
     longest = np.abs(parts).max()
-    said = [
-        _WAYS[axis][int(parts[axis] < 0)]
+    words = [
+        _DIRECTIONS[axis][int(parts[axis] < 0)]
         for axis in _ORDER
-        if abs(parts[axis]) > _WORTH_SAYING * longest
+        if abs(parts[axis]) > _LEAST_SHARE * longest
     ]
-    return ", ".join(said) or "stay"
+    return ", ".join(words) or "stay"
 
 
 def target_points(explored: ArrayLike, box: BoundingBox, n: int) -> Array:
-    """Places that the hand reached, each nearest to a place on the box around all.
+    """Explored positions that are nearest to points on the surface of a box.
 
-    The box is that of minimum volume; its vertices come first, then the centers of its
-    upper and lower face (Lisini Baldi et al., arXiv 2012.03600). A box around what a
-    hand can reach has corners that it cannot.
+    The points on the box are its vertices, then the centers of its upper and lower face
+    (Lisini Baldi et al., arXiv 2012.03600). As the hand cannot reach every corner of a
+    box around its workspace, the nearest explored positions are used.
 
     Parameters
     ----------
     explored : (N, 3) array
         Hand positions in the thorax frame, m.
     box : BoundingBox
-        Around them.
+        Minimum bounding box of `explored`.
     n : int
-        How many places.
+        Number of points.
 
     Returns
     -------
@@ -72,51 +66,26 @@ def target_points(explored: ArrayLike, box: BoundingBox, n: int) -> Array:
     return places[nearest]
 
 
-class HandTracker:
-    """Where the hand is, frame by frame, as the line of calibration sees it.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        The person's.
-    chain : str
-        See :data:`ikns.body.chains.CHAINS`.
-    labels : sequence of str
-        Of the frames' markers.
-    """
-
-    def __init__(self, skeleton: Skeleton, chain: str, labels: Sequence[str]) -> None:
-        self._skeleton, self._labels = skeleton, tuple(labels)
-        self._sides = [SIDES.index(side) for side in chain_sides(chain)]
-        self._solver = MarkerIK(skeleton)
-        self._q: Array | None = None
-
-    def place(self, markers: Array) -> Array | None:
-        """Hand, or the middle of both, in the thorax frame, (3,) m; None if unseen."""
-        worn = self._skeleton.marker_set
-        pose = self._solver.solve(worn.pick(self._labels, markers), self._q)
-        if not math.isfinite(pose.residual):
-            return None
-        self._q = pose.q
-        hands = self._skeleton.hands_in_thorax(pose.q)[0]
-        return np.asarray(hands[self._sides].mean(axis=0))
-
-
 class TargetPoints:
-    """Suggest a place for each point.
+    """Suggested positions for the points of the protocol.
 
     Parameters
     ----------
     explored : (N, 3) array
         Hand positions of the free exploration, thorax frame, m.
     n_points : int
+
+    Attributes
+    ----------
+    positions : (n_points, 3) array
+        Thorax frame, m.
     """
 
     def __init__(self, explored: Array, n_points: int) -> None:
         box = minimum_bounding_box(explored)
-        self.places = target_points(explored, box, n_points)
-        self._middle = box.center
+        self.positions = target_points(explored, box, n_points)
+        self._center = box.center
 
-    def words(self, point: int) -> str:
-        """Where point number `point` (from 0) is, seen from the middle of the box."""
-        return direction_in_words(self.places[point] - self._middle)
+    def direction(self, point: int) -> str:
+        """Direction of a point (number from 0) from the center of the box, in words."""
+        return direction_in_words(self.positions[point] - self._center)

@@ -1,7 +1,7 @@
-"""Is a recording good enough? Asked before the person leaves the cameras.
+"""Verdicts on recordings, before the person leaves the cameras.
 
-The limits are named constants: none is in the paper, and each says where it comes from.
-A verdict recommends; the experimenter decides. Points have a file of their own.
+The limits are named constants with their origin; none is from the paper. A verdict
+recommends, the experimenter decides. Points are judged in a file of their own.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ikns.calibration.scaling import scale
 from ikns.errors import IknsError
 from ikns.live.calibration.measures import (
     SEEN_SHARE,
+    marker_displacement,
     median,
     millimeters,
     missing_percent,
     percent,
-    stray,
     tracking_fault,
 )
 from ikns.nullspace.clustering import minimum_bounding_box
@@ -34,20 +34,20 @@ __all__ = ["ONE_PLACE", "Verdict", "judge_free", "judge_static"]
 
 Array = NDArray[np.float64]
 
-#: Markers of a person who stands still stray less than markers are misplaced on the
-#: skin (10 mm for most of a set), once the sway of the whole body is taken out, m. Two
-#: real static trials have 0.7 and 1.2 mm, simulated ones 2 to 7 mm.
+#: Largest displacement of a marker of a person who stands still, without the sway of
+#: the whole body, m: as much as markers are misplaced on the skin (10 mm for most of a
+#: set). Two real static trials have 0.7 and 1.2 mm, simulated ones 2 to 7 mm.
 STILL_MARKERS = 0.010
-#: A hand that travels farther is not at one place, nor are two points that are nearer
-#: to each other two places, m (a fifth of a small workspace; our choice).
+#: A hand that moves farther than this is not at one position, and two points closer
+#: than this are not two positions, m (a fifth of a small workspace; chosen here).
 ONE_PLACE = 0.05
-#: Smallest side of the explored box, m: thinner holds no two layers of points.
+#: Smallest side of the explored box, m: a thinner one has no two layers of points.
 LEAST_BOX = 2 * ONE_PLACE
 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What a recording is good for.
+    """Result of judging a recording.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Verdict:
     reason : str
         One sentence.
     values : dict
-        Numbers behind it by name, units in the names, ready for JSON.
+        The numbers behind it, ready for JSON, with units in their names.
     place : (3,) array, optional
         Where the hand was held, thorax frame, m.
     explored : (N, 3) array, optional
@@ -83,23 +83,23 @@ def judge_static(
     marker_set: str,
     min_static: float = 1.0,
 ) -> Verdict:
-    """Judge the static trial: seen, steady, and enough to scale a body.
+    """Judge the static trial: markers in sight, still, and enough to scale a body.
 
     Parameters
     ----------
     recording : Recording
     generic : Skeleton
-        Body to start from.
+        Body to scale.
     marker_set : str
-        What the person wears.
+        Name of the marker set of the person.
     min_static : float
-        Shortest trial to accept, s.
+        Shortest duration to accept, s.
     """
     worn = MarkerSet.load(marker_set)
     markers = worn.pick(recording.labels, recording.markers)
     seen = np.all(np.isfinite(markers), axis=2)
     never = [m for m, s in zip(worn.labels, seen.any(axis=0), strict=True) if not s]
-    spread = stray(markers)
+    spread = marker_displacement(markers)
     values: dict[str, Any] = {
         "seconds": len(recording.time) / recording.rate,
         "markers_seen": len(worn.labels) - len(never),
@@ -118,7 +118,7 @@ def judge_static(
     reason = ""
     if spread.max() > STILL_MARKERS:
         reason = (
-            f"The person moved: {worn.labels[int(spread.argmax())]} strayed "
+            f"The person moved: {worn.labels[int(spread.argmax())]} by "
             f"{millimeters(spread.max()):.0f} mm, expected at most "
             f"{millimeters(STILL_MARKERS):.0f} mm."
         )
@@ -142,9 +142,9 @@ def _lost(
     labels: Sequence[str],
     dropped: Sequence[str],
 ) -> list[str]:
-    """Name markers that the calibration will do without though they may be worn.
+    """Name markers that the calibration leaves out though the person may wear them.
 
-    They are of segments of which something was seen, and the recording knows them.
+    They are of segments with other markers in sight, and their labels are recorded.
     """
     shown = {m.link for m, s in zip(worn.markers, seen, strict=True) if s}
     return [
@@ -158,7 +158,7 @@ def _lost(
 
 
 def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdict:
-    """Judge the free exploration, which only tells where the hand can go.
+    """Judge the free exploration, which only shows where the hand can go.
 
     Parameters
     ----------

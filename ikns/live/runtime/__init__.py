@@ -5,4 +5,4 @@ from ikns.live.runtime.priority import check_realtime
 from ikns.live.runtime.replay import Replayed, replay_run
 from ikns.live.runtime.report import LoopStatus, Report
 
-__all__ = ["Replayed", "Report", "LoopStatus", "check_realtime", "replay_run", "run"]
+__all__ = ["LoopStatus", "Replayed", "Report", "check_realtime", "replay_run", "run"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ikns.live.control.safety import Transition
 from ikns.live.stream.delays import Delays
 
-__all__ = ["Report", "LoopStatus"]
+__all__ = ["LoopStatus", "Report"]
 
 
 @dataclass(frozen=True)

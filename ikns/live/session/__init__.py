@@ -1,19 +1,19 @@
-"""Everything that happened in a session, on disk while it happens.
+"""Sessions: everything that happens in a run, on disk within a second.
 
 A session is a Motion-BIDS dataset::
 
     SESSION/
       dataset_description.json  participants.tsv  participants.json  README.md
       sub-01/motion/
-        sub-01_task-ikns_tracksys-markers_run-01_motion.tsv   what the cameras said
-        sub-01_task-ikns_tracksys-model_run-01_motion.tsv     what was made of it
-        sub-01_task-ikns_run-01_events.tsv                    what happened when
+        sub-01_task-ikns_tracksys-markers_run-01_motion.tsv   recorded markers
+        sub-01_task-ikns_tracksys-model_run-01_motion.tsv     results per frame
+        sub-01_task-ikns_run-01_events.tsv                    events
         ..._motion.json  ..._channels.tsv  ..._channels.json
       sourcedata/sub-01/run-01/                               configuration, subject
 
 Motion-BIDS: Jeung et al. 2024, Sci Data 11:716; the Brain Imaging Data Structure 1.10.
-A motion file has one row a frame and no header; its columns are the rows of its
-channels file. What is missing is ``n/a``.
+A motion file has one row per frame and no header; its columns are the rows of its
+channels file. Missing values are ``n/a``.
 """
 
 from ikns.live.session.channels import Channel, marker_channels, micro, model_channels

@@ -1,4 +1,4 @@
-"""Columns of the motion files: names, BIDS types, units, and how a cell is printed."""
+"""Columns of the motion files: names, BIDS types, units, and number formats."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["STATES", "Channel", "marker_channels", "micro", "model_channels"]
 
-#: States of the safety machine by their number in the column ``state``.
+#: States of the safety machine; the column ``state`` has their index.
 STATES = ("disarmed", "armed", "active", "holding", "safe")
 
 #: Six decimals: micrometers and microseconds.
 _MICRO = "%.6f"
-#: Text as it is; of a number the fewest digits that read back as the same number.
+#: Text unchanged; a number with the fewest digits that read back as the same number.
 _EXACT = "%s"
 
 
@@ -28,16 +28,16 @@ class Channel:
     name : str
         Unique within the file.
     type : str
-        Of BIDS: POS, ORNT, JNTANG, LATENCY, MISC.
+        BIDS type: POS, ORNT, JNTANG, LATENCY, MISC.
     units : str
     component : str
         x, y, z, quat_x to quat_w, or n/a.
     tracked_point : str
-        What it belongs to.
+        Marker, segment or joint that it belongs to.
     frame : str
         Reference frame: world, thorax, or n/a.
     form : str
-        How a number is printed.
+        Number format.
     """
 
     name: str
@@ -50,19 +50,19 @@ class Channel:
 
 
 def micro(values: ArrayLike) -> NDArray[np.float64]:
-    """Round to six decimals, m or s, as everything is when it comes in.
+    """Round to six decimals (micrometers or microseconds), as is done with all input.
 
-    What is printed with six decimals then reads back as the same number, so a session
-    replayed from disk computes with the very numbers that it computed with live. A
-    micrometer is a hundredth of what cameras resolve. Every NaN becomes the same one,
-    as reading makes it, so that equal frames are equal bytes.
+    Numbers printed with six decimals then read back as the same numbers, so a replay
+    computes with the same numbers as the live run. A micrometer is a hundredth of the
+    resolution of cameras. All NaN get the same bits, so that equal frames are equal
+    bytes.
 
     Examples
     --------
     >>> float(f"{float(micro(0.1234567891)):.6f}") == float(micro(0.1234567891))
     True
     """
-    # Dividing an integer by a power of ten rounds correctly, as reading decimals does.
+    # Dividing an integer by a power of ten rounds correctly, like reading decimals.
     rounded = np.asarray(
         np.rint(np.asarray(values, dtype=np.float64) * 1e6) / 1e6 + 0.0
     )
@@ -71,10 +71,10 @@ def micro(values: ArrayLike) -> NDArray[np.float64]:
 
 
 def marker_channels(labels: Sequence[str]) -> list[Channel]:
-    """Columns of what came in: frame number, times, markers.
+    """Columns of the input: frame number, times, markers.
 
-    Times are LATENCY channels, s from the onset of the run: ``device_time`` by the
-    cameras' clock from their first frame, ``receive_time`` by this machine's.
+    Times are LATENCY channels in s: ``device_time`` on the cameras' clock since their
+    first frame, ``receive_time`` on this machine's since the onset of the run.
     """
     timing = [
         Channel("frame", "MISC", "n/a", form="%d"),
@@ -89,10 +89,10 @@ def marker_channels(labels: Sequence[str]) -> list[Channel]:
 
 
 def model_channels(joint_names: Sequence[str], n_dof: int = 1) -> list[Channel]:
-    """Columns of what was made of it, a row a frame.
+    """Columns of the results.
 
-    Body in the world, joint angles, hand, control signal, what the finger was asked,
-    what was sent and what it measured, and how the stages fared.
+    Thorax pose, joint angles, hand, control signal, flexion commanded, sent and
+    measured, and the quality and timing of the frame.
     """
     body = [
         Channel(f"thorax_{axis}", "POS", "m", axis, "thorax", "world") for axis in "xyz"

@@ -1,4 +1,4 @@
-"""Stricter than the BIDS validator: rows match, time runs, nobody is named."""
+"""Checks beyond those of the BIDS validator, and repair after a crash."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["check_session", "mend_session"]
 
 
 def check_session(session: str | Path) -> list[str]:
-    """Look for what is wrong with a session.
+    """Check a session for faults: rows, times, ranges, personal data.
 
     Parameters
     ----------
@@ -23,35 +23,35 @@ def check_session(session: str | Path) -> list[str]:
     Returns
     -------
     list of str
-        One sentence a finding; none when all is well.
+        One sentence per fault; empty if there is none.
 
     Raises
     ------
     FileError
-        When the folder is no session.
+        When the folder is not a session.
     """
     place = Path(session)
     next_run(place)
-    found = _people(place)
+    found = _personal_data(place)
     for number in runs(place):
         try:
             run = read_run(place, number)
         except FileError as error:
             found.append(str(error))
         else:
-            found += [f"run {number}: {finding}" for finding in _findings(run)]
+            found += [f"run {number}: {finding}" for finding in _faults(run)]
     if not runs(place):
         found.append("the session has no run.")
     return found
 
 
 def mend_session(session: str | Path) -> list[str]:
-    """Cut what a crash left: rows without an end, and rows without their partner.
+    """Cut off incomplete rows, and rows missing in the other file, after a crash.
 
     Returns
     -------
     list of str
-        What was cut, one sentence a file.
+        What was cut off, one sentence per file.
     """
     place, done = Path(session), []
     participant, _ = next_run(place)
@@ -72,15 +72,15 @@ def mend_session(session: str | Path) -> list[str]:
     return done
 
 
-def _people(place: Path) -> list[str]:
+def _personal_data(place: Path) -> list[str]:
     lines = (place / "participants.tsv").read_text("utf-8").splitlines()
     extra = [column for column in lines[0].split("\t") if column != "participant_id"]
     if extra:
-        return [f"participants.tsv tells more than a pseudonym: {', '.join(extra)}."]
+        return [f"participants.tsv contains more than a pseudonym: {', '.join(extra)}."]
     return []
 
 
-def _findings(run: Run) -> list[str]:
+def _faults(run: Run) -> list[str]:
     found = [
         f"the file of {name} ends within a row ({size} bytes); mend it."
         for name, size in run.torn.items()

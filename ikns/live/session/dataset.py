@@ -1,4 +1,4 @@
-"""The dataset around the runs: folders, sidecars, and the number of the next run."""
+"""The BIDS dataset of a session: folders, sidecar files, numbers of runs."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ __all__ = [
     "run_files",
 ]
 
-#: Of the standard that the files follow.
+#: Version of the standard that the files follow.
 BIDS_VERSION = "1.10.0"
-#: Of our own conventions within it.
+#: Version of the conventions of this package within it.
 FORMAT = 1
 TASK = "ikns"
 #: Columns of the events file.
@@ -39,25 +39,24 @@ EVENTS = (
 
 _README = """# A session of ikns
 
-Motion of a person's arm, and the signal that was made of it, as recorded by `ikns run`.
-`tracksys-markers` holds what the cameras said, `tracksys-model` the joint angles, the
-control signal c and what the finger was asked, was sent and measured; a row of one
-belongs to the same row of the other. `sourcedata` holds the configuration of each run
-and the subject it ran with. `ikns replay` computes c and the commands again from the
-markers.
+Motion of a person's arm and the resulting control signal, recorded by `ikns run`.
+`tracksys-markers` has the recorded markers, `tracksys-model` the joint angles, the
+control signal c and the flexion commanded, sent and measured; rows of the two files
+correspond. `sourcedata` has the configuration and the subject of each run. `ikns
+replay` computes c and the commands again from the markers.
 """
 _LABEL = re.compile(r"[0-9A-Za-z]+")
 
 
 def create_session(folder: str | Path, *, participant: str = "01") -> Path:
-    """Make an empty dataset.
+    """Create an empty dataset.
 
     Parameters
     ----------
     folder : str or Path
-        Must not exist, or be empty.
+        Must not exist or be empty.
     participant : str
-        Pseudonym, letters and digits; no name, no date of birth.
+        Pseudonym of letters and digits; no name, no date of birth.
 
     Returns
     -------
@@ -66,7 +65,7 @@ def create_session(folder: str | Path, *, participant: str = "01") -> Path:
     Raises
     ------
     InvalidInput
-        When the folder holds something, or the pseudonym is none.
+        When the folder is not empty, or the pseudonym has other characters.
     FileError
         When it cannot be written.
     """
@@ -104,12 +103,12 @@ def create_session(folder: str | Path, *, participant: str = "01") -> Path:
 
 
 def next_run(session: str | Path) -> tuple[str, int]:
-    """Participant and number of the run that comes next.
+    """Return the participant and the number of the next run.
 
     Raises
     ------
     FileError
-        When the folder is no session, or of an unknown version.
+        When the folder is not a session, or of an unknown version.
     """
     place = Path(session)
     try:
@@ -134,7 +133,7 @@ def next_run(session: str | Path) -> tuple[str, int]:
 
 
 def run_files(session: Path, participant: str, run: int) -> dict[str, Path]:
-    """Where the files of a run lie: events, markers, model."""
+    """Paths of a run's files: events, markers, model."""
     motion = session / f"sub-{participant}" / "motion"
     stem = f"sub-{participant}_task-{TASK}"
     return {"events": motion / f"{stem}_run-{run:02d}_events.tsv"} | {
@@ -165,13 +164,13 @@ def open_run(
     joint_names : sequence of str
         Joints, in the order of their columns.
     rate : float
-        Frames per second that the source promises.
+        Nominal frames per second of the source.
     n_dof : int
-        Control signals.
+        Number of control signals.
     configuration : mapping
-        Everything that is needed to compute the run again, as JSON.
+        Everything needed to compute the run again, as JSON.
     subject : mapping of file name to text, optional
-        The subject folder.
+        Files of the subject folder.
     on_fault : callable, optional
         See :class:`RunWriter`.
 
@@ -185,7 +184,7 @@ def open_run(
     InvalidInput
         When the rate is not positive or two columns share a name.
     FileError
-        When the folder is no session or cannot be written.
+        When the folder is not a session or cannot be written.
     """
     if not 0 < rate < float("inf"):
         raise InvalidInput(f"expected a positive rate in Hz, found {rate:g}.")
@@ -257,7 +256,7 @@ def _sidecars(path: Path, name: str, channels: Sequence[Channel], rate: float) -
     stem = path.name.removesuffix("_motion.tsv")
     table = "".join("\t".join(row) + "\n" for row in [fields, *rows])
     _text(path.with_name(f"{stem}_channels.tsv"), table)
-    # World: whatever the cameras were calibrated to. Thorax: ISB's axes.
+    # World: as the cameras were calibrated. Thorax: axes of the ISB.
     levels = {
         "world": {"SpatialAxes": "n/a", "RotationRule": "right-hand"},
         "thorax": {"SpatialAxes": "ASR", "RotationRule": "right-hand"},
@@ -281,7 +280,7 @@ def _json(path: Path, value: Mapping[str, Any]) -> None:
 
 
 def _text(path: Path, text: str) -> None:
-    """Write a file that was not there, and put it on the disk."""
+    """Write a new file and sync it to the disk."""
     with path.open("x", encoding="utf-8", newline="") as file:
         file.write(text)
         file.flush()

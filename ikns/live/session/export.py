@@ -1,4 +1,4 @@
-"""A run as other programs like it: CSV, MAT and C3D."""
+"""Export a run for other programs: CSV, MAT and C3D."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ FORMATS = ("csv", "mat", "c3d")
 
 
 def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
-    """Write a run into one file, by the ending of its name.
+    """Write a run into one file, whose format follows from its extension.
 
-    ``.csv`` has a row a frame and a column a channel; ``.mat`` the same columns as
-    variables, with ``markers`` (T, M, 3) in meters and ``labels``; ``.c3d`` only the
+    ``.csv`` has one row per frame and one column per channel; ``.mat`` the same columns
+    as variables, with ``markers`` (T, M, 3) in meters and ``labels``; ``.c3d`` only the
     markers.
 
     Parameters
@@ -30,13 +30,13 @@ def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
     run : Run
     path : str or Path
     force : bool
-        Whether to replace a file that exists.
+        Whether to replace an existing file.
 
     Raises
     ------
     InvalidInput
-        When the ending is none of these, the file exists, or the run has too few
-        frames for a C3D.
+        When the extension is another one, the file exists, or the run has too few
+        frames for a C3D file.
     """
     target = Path(path)
     kind = target.suffix.lower().removeprefix(".")
@@ -64,7 +64,7 @@ def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
             oned_as="column",
         )
     elif kind == "c3d":
-        # Frames that the cameras dropped are missing here too: C3D knows a rate only.
+        # Dropped frames are missing in this file: C3D has a rate but no times.
         time = np.arange(len(run.frame)) / run.rate
         recording = Recording(time, run.markers, run.labels, str(run.session))
         write_c3d(target, recording, force=force)

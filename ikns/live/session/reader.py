@@ -1,4 +1,4 @@
-"""Read a session back, also one that ended in the middle of a row."""
+"""Read the runs of a session, including one that ended within a row."""
 
 from __future__ import annotations
 
@@ -30,21 +30,22 @@ class Run:
     participant : str
     number : int
     rate : float
-        Frames per second that the source promised.
+        Nominal frames per second of the source.
     labels : tuple of str
-        Markers.
+        Marker names.
     frame : (T,) integer array
-        Numbers that the source gave.
+        Frame numbers of the source.
     device_time, receive_time : (T,) array
-        Seconds from the onset.
+        s, see :func:`ikns.live.session.marker_channels`.
     markers : (T, M, 3) array
         m in the world; NaN = not seen.
     model : dict of (T,) arrays
-        Every column of the model file by name, in the unit of its channel.
-    events : list of (onset s, duration s, what, value)
+        Columns of the model file by name, in the units of their channels.
+    events : list of (onset, duration, type, value)
+        Onset and duration in s.
     configuration : dict
     torn : dict of str to int
-        Bytes after the last whole row of each file: a row cut off by a crash.
+        Bytes after the last complete row of each file, left by a crash.
     """
 
     session: Path
@@ -63,7 +64,7 @@ class Run:
 
     @property
     def subject_folder(self) -> Path:
-        """The subject that the run was made with."""
+        """Folder of the run's subject."""
         return _kept(self.session, self.participant, self.number) / "subject"
 
 
@@ -78,14 +79,28 @@ def runs(session: str | Path) -> list[int]:
 
 
 def read_run(session: str | Path, number: int | None = None) -> Run:
-    """Read one run; by default the last.
+    """Read one run, by default the last one.
 
-    Where a crash left one motion file longer than the other, both end with the shorter.
+    If a crash left one motion file longer than the other, both are cut to the shorter.
 
     Raises
     ------
     FileError
         When there is no such run, or a file is missing or damaged.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from ikns.live.session import create_session, open_run
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     session = create_session(folder)
+    ...     about = {"labels": ["C7"], "joint_names": [], "rate": 100.0}
+    ...     with open_run(session, configuration={}, **about) as writer:
+    ...         writer.row("markers", [0, 0.0, 0.0, 0.1, 0.2, 0.3])
+    ...         writer.row("model", [math.nan] * 21)
+    ...     run = read_run(session)
+    >>> run.rate, run.markers.tolist()
+    (100.0, [[[0.1, 0.2, 0.3]]])
     """
     place = Path(session)
     participant, _ = next_run(place)
@@ -175,7 +190,7 @@ def _events(path: Path) -> tuple[list[tuple[float, float, str, str]], int]:
 
 
 def _whole_lines(path: Path) -> tuple[list[str], int]:
-    """Lines that end, and how many bytes come after them."""
+    """Return complete lines, and the number of bytes after them."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -185,7 +200,7 @@ def _whole_lines(path: Path) -> tuple[list[str], int]:
     try:
         text = data[:end].decode("utf-8")
     except UnicodeDecodeError:
-        raise FileError(f"{path}: expected text, found bytes that are none.") from None
+        raise FileError(f"{path}: expected UTF-8 text, found other bytes.") from None
     return re.split("\n", text)[:-1], len(data) - end
 
 

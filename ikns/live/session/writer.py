@@ -1,10 +1,10 @@
-"""Append rows to disk while they happen, and never wait for the disk.
+"""Append rows to files without waiting for the disk.
 
-Rows go into a queue; a thread prints them, gives them to the system five times a second
-and asks for them to be on the disk itself once a second. A process that is killed loses
-what is in the queue; a machine that loses power, a second. A row is on disk whole or
-not at all: after a fault (disk full, say) the file is cut back to its last whole row,
-rows wait in memory, and the thread tries again. That a file was deleted is told too.
+Rows go into a queue; a thread formats them, writes them five times per second and syncs
+the files once per second. A killed process loses what is in the queue; a machine that
+loses power, about a second. Rows are written completely or not at all: after a fault
+(such as a full disk) the file is cut back to its last complete row, rows wait in
+memory, and the thread tries again. Deleted files are reported too.
 """
 
 from __future__ import annotations
@@ -24,30 +24,29 @@ __all__ = ["RunWriter"]
 
 Row = tuple[float | str, ...]
 
-#: How often rows are given to the system, and how often to the disk, s.
+#: Time between writes, and between syncs to the disk, s.
 _FLUSH, _SYNC = 0.2, 0.8
-#: How many rows of a file wait in memory while it cannot be written: ten minutes of
-#: 100 Hz.
+#: Rows per file that wait in memory while it cannot be written: ten minutes at 100 Hz.
 _WAITING = 60_000
 
 
 class RunWriter:
-    """Files of one run, each appended row by row.
+    """Files of one run, to which rows are appended.
 
     Parameters
     ----------
     files : mapping of name to (path, channels)
-        Each must exist already, empty or with a header.
+        Each file must exist, empty or with a header.
     on_fault : callable, optional
-        Called from the writing thread with a sentence when a file cannot be written,
-        and again with one when it can be.
+        Called from the writing thread with a message when a file cannot be written, and
+        again when it can be.
 
     Attributes
     ----------
     fault : str
-        What is wrong now; empty when all is well.
+        Present fault; empty if there is none.
     lost : int
-        Rows that had to be given up.
+        Number of rows lost.
     """
 
     def __init__(
@@ -67,36 +66,36 @@ class RunWriter:
 
     @property
     def lost(self) -> int:
-        """Rows that had to be given up."""
+        """Number of rows lost."""
         return sum(file.lost for file in self._files.values())
 
     def row(self, name: str, values: Sequence[float | str]) -> None:
-        """Append a row to a file; returns at once.
+        """Append a row to a file, without waiting.
 
         Parameters
         ----------
         name : str
-            Of the file.
+            Name of the file.
         values : sequence
-            One a channel; NaN is missing.
+            One per channel; NaN for a missing value.
         """
         file = self._files[name]
         if len(values) != file.width:
             raise InvalidInput(
                 f"expected {file.width} values for '{name}', found {len(values)}."
             )
-        # Numbers of numpy print with their type.
+        # NumPy's numbers would print with their type.
         file.put(tuple(v if isinstance(v, str) else float(v) for v in values))
 
     def close(self) -> None:
-        """Write what is left and put it on the disk; safe to call again."""
+        """Write and sync all rows; harmless when repeated."""
         self._closing.set()
         self._thread.join()
         for file in self._files.values():
             file.close()
 
     def __enter__(self) -> RunWriter:
-        """Nothing to do: it is open."""
+        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -111,11 +110,11 @@ class RunWriter:
             faults = [file.write(sync=sync) for file in self._files.values()]
             if sync:
                 synced = time.monotonic()
-            self._tell("; ".join(fault for fault in faults if fault))
+            self._report("; ".join(fault for fault in faults if fault))
             if last:
                 return
 
-    def _tell(self, fault: str) -> None:
+    def _report(self, fault: str) -> None:
         if fault != self.fault:
             self.fault = fault
             if self._on_fault:
@@ -123,7 +122,7 @@ class RunWriter:
 
 
 class _File:
-    """One file and the rows that wait for it."""
+    """One file and the rows waiting for it."""
 
     def __init__(self, path: Path, channels: Sequence[Channel]) -> None:
         self.path, self.width, self.lost = path, len(channels), 0
@@ -141,7 +140,7 @@ class _File:
         self._rows.append(row)
 
     def write(self, *, sync: bool) -> str:
-        """Write the rows that wait; return what went wrong, or nothing."""
+        """Write the waiting rows; return the fault, or an empty string."""
         rows = []
         while self._rows:
             rows.append(self._rows.popleft())
@@ -155,10 +154,10 @@ class _File:
                 self._append("".join(map(self._print, rows)).encode())
             if sync:
                 os.fsync(self._descriptor)
-                # Writing to a file without a name succeeds, for nobody.
+                # Writing to a deleted file succeeds without effect.
                 self._deleted = os.fstat(self._descriptor).st_nlink == 0
         except OSError as error:
-            self._wait_again(rows)
+            self._requeue(rows)
             with suppress(OSError):
                 self._cut()
             return self._fault((error.strerror or str(error)).lower())
@@ -183,12 +182,12 @@ class _File:
         self._torn = False
 
     def _cut(self) -> None:
-        """Cut back to the last whole row."""
+        """Cut back to the last complete row."""
         os.ftruncate(self._descriptor, self._size)
         self._torn = False
 
-    def _wait_again(self, rows: list[Row]) -> None:
-        if self._torn:  # else they are written, and only not yet on the disk
+    def _requeue(self, rows: list[Row]) -> None:
+        if self._torn:  # otherwise they are written but not yet synced
             self._rows.extendleft(reversed(rows))
         while len(self._rows) > _WAITING:
             self._rows.popleft()
@@ -202,6 +201,6 @@ class _File:
 
 def _cell(form: str, value: float | str) -> str:
     if isinstance(value, str):
-        # Text that stays within its cell.
+        # No tabs or line breaks within a cell.
         return " ".join(value.split()) or "n/a"
     return form % value if value == value else "n/a"
