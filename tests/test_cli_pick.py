@@ -39,21 +39,21 @@ def test_an_object_by_ring_and_by_arm(
                 lambda s: s["state"] == "waiting" and s["page"] and s["c"] is not None
             )
             order.append(panel.shown["condition"])
-            await panel.ask("begin")
+            await panel.submit("begin")
             await panel.until("ready")
-            await page.ask("toggle")
+            await page.submit("toggle")
             await panel.until("running")
             if order[-1] == "ring":
-                await page.ask("press")
+                await page.submit("press")
                 await panel.wait(lambda s: (s["drive"].get("measured") or 0) > 0.3)
-                await panel.ask("toggle")
+                await panel.submit("toggle")
                 await panel.until("judge")
-                await panel.ask("success", "well held")
+                await panel.submit("success", "well held")
             else:
                 await panel.wait(lambda s: s["drive"].get("state") == "active")
-                await panel.ask("dropped")
+                await panel.submit("dropped")
             await panel.until("waiting", "rest", "finished")
-        await panel.ask("end")
+        await panel.submit("end")
 
     argv = ["pick", str(folder), *SHORT, "--subject", str(files / "person")]
     argv += ["--source", f"replay:{files / 'free.c3d'}?loop=yes", "--json"]

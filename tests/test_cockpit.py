@@ -20,10 +20,10 @@ from ikns.experiments.cockpit import Cockpit
 from ikns.experiments.conduct import (
     Conductor,
     HeldInput,
-    PickingDesk,
-    TrackingDesk,
-    VisitBook,
-    carry_out,
+    PickingExperiment,
+    TrackingExperiment,
+    VisitLog,
+    run_visit,
 )
 from ikns.experiments.conduct.ring import ring_driver
 from ikns.experiments.picking import pick_schedule
@@ -56,7 +56,7 @@ FOLLOW = """({ seconds, list }) => {
 
 
 @dataclass
-class Desk:
+class Served:
     """A visit that is served, and pages that look at it."""
 
     conductor: Conductor
@@ -106,7 +106,7 @@ class Desk:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        return read_visit(self.conductor.book.folder).attempts
+        return read_visit(self.conductor.log.folder).attempts
 
 
 def says(page: Any, id: str, text: str) -> None:
@@ -135,7 +135,7 @@ def chromium() -> Iterator[Any]:
 @contextmanager
 def at_work(
     chromium: Any, folder: Path, conditions: list[str], **design: Any
-) -> Iterator[Desk]:
+) -> Iterator[Served]:
     """A visit that goes on in a thread, as the command carries it out."""
     picking = conditions == ["ring"]
     align = design.pop("align", 1.0)
@@ -145,7 +145,7 @@ def at_work(
         if picking
         else schedule(0, profiles=["T1"], **design)
     )
-    book = VisitBook(
+    log = VisitLog(
         folder,
         {
             "experiment": "picking" if picking else "tracking",
@@ -154,14 +154,14 @@ def at_work(
             "design": design,
         },
     )
-    desk: Any = (
-        PickingDesk(steps, book.attempts)
+    experiment: Any = (
+        PickingExperiment(steps, log.attempts)
         if picking
-        else TrackingDesk(steps, book.attempts, align=align)
+        else TrackingExperiment(steps, log.attempts, align=align)
     )
-    conductor = Conductor(desk, book, borne=[*PAGES, "ring"])
+    conductor = Conductor(experiment, log, page_conditions=[*PAGES, "ring"])
     held = {name: HeldInput() for name in conditions if name in PAGES}
-    arm = HeldInput(stale=3600.0)  # an arm that is held still
+    arm = HeldInput(timeout=3600.0)  # an arm that is held still
     arm.put(time.monotonic(), 0.5)
     presses: SimpleQueue[None] = SimpleQueue()
     drivers: Any = {
@@ -174,10 +174,10 @@ def at_work(
     stop = Event()
     with Cockpit(conductor, held, on_press=lambda: presses.put(None)) as cockpit:
         thread = Thread(
-            target=carry_out, args=(conductor, drivers), kwargs={"stop": stop}
+            target=run_visit, args=(conductor, drivers), kwargs={"stop": stop}
         )
         thread.start()
-        made = Desk(conductor, cockpit, chromium)
+        made = Served(conductor, cockpit, chromium)
         try:
             yield made
             assert made.complaints == []
@@ -194,22 +194,22 @@ def at_work(
 
 def test_a_whole_trial_with_a_gamepad(chromium: Any, tmp_path: Path) -> None:
     """5 s to align and 25 s to follow, as in the paper; here the stick follows."""
-    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1, align=5.0) as desk:
-        page = desk.participant(script=GAMEPAD)
+    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1, align=5.0) as visit:
+        page = visit.participant(script=GAMEPAD)
         page.evaluate("stick.axes[1] = -0.25")
-        desk.wait(lambda shown: shown["c"] == 0.25)
+        visit.wait(lambda shown: shown["c"] == 0.25)
         page.evaluate("stick.pressed = true")
-        desk.until("align")
+        visit.until("align")
         page.evaluate("stick.pressed = false")
-        began = desk.conductor.desk.trial()[1]  # type: ignore[attr-defined]
-        heights = desk.conductor.curve["heights"]
+        began = visit.conductor.experiment.trial()[1]  # type: ignore[attr-defined]
+        heights = visit.conductor.curve["heights"]
         page.evaluate(f"stick.axes[1] = {-heights[0] / 100}")
-        desk.until("track")
+        visit.until("track")
         late = time.monotonic() - began
         page.evaluate(FOLLOW, {"seconds": 25.0, "list": heights})
-        desk.until("finished", seconds=40.0)
+        visit.until("finished", seconds=40.0)
         says(page, "prompt", "That was all. Thank you!")
-        (row,) = desk.rows
+        (row,) = visit.rows
     assert row["outcome"] == "done"
     record = tracking_record(row)
     assert (record.time[0] < -4.9, record.time[-1] > 24.9) == (True, True)
@@ -226,34 +226,34 @@ def test_a_whole_trial_with_a_gamepad(chromium: Any, tmp_path: Path) -> None:
     assert figures.rmse < 20 * (late + 0.1 + gap)
     assert figures.correlation > 0.95
     assert -0.05 < figures.lag < late + 0.1 + gap
-    told = desk.conductor.results[-1]
+    told = visit.conductor.results[-1]
     assert told["rmse"] == figures.rmse
 
 
 def test_a_trial_with_the_keyboard_and_the_panel(chromium: Any, tmp_path: Path) -> None:
     with at_work(
         chromium, tmp_path / "v", ["keyboard"], repeats=1, seconds=12.0
-    ) as desk:
-        panel, page = desk.panel(), desk.participant()
+    ) as visit:
+        panel, page = visit.panel(), visit.participant()
         assert panel.inner_text("#state") == "Waiting"
         assert panel.is_disabled("#abort")
         page.keyboard.down("ArrowUp")
-        desk.wait(lambda shown: (shown["c"] or 0) > 0.3)
+        visit.wait(lambda shown: (shown["c"] or 0) > 0.3)
         page.keyboard.up("ArrowUp")
         panel.click("#begin")
-        desk.until("track")
+        visit.until("track")
         says(panel, "state", "Tracking")
-        high = desk.conductor.shown["c"]
+        high = visit.conductor.shown["c"]
         page.keyboard.down("KeyS")
-        desk.wait(lambda shown: (shown["c"] or 0) < high - 0.2)
+        visit.wait(lambda shown: (shown["c"] or 0) < high - 0.2)
         page.keyboard.up("KeyS")
         # 0.5 per second, whatever the page draws.
-        low = desk.conductor.shown["c"]
-        desk.until("finished", seconds=30.0)
+        low = visit.conductor.shown["c"]
+        visit.until("finished", seconds=30.0)
         panel.wait_for_function(
             "() => document.querySelectorAll('#attempts tr').length === 1"
         )
-        (row,) = desk.rows
+        (row,) = visit.rows
         shown = panel.inner_text("#attempts")
     assert row["outcome"] == "done"
     record = tracking_record(row)
@@ -270,107 +270,107 @@ def test_a_trial_with_the_keyboard_and_the_panel(chromium: Any, tmp_path: Path) 
 def test_a_page_that_closes_and_one_that_looks_on(
     chromium: Any, tmp_path: Path
 ) -> None:
-    with at_work(chromium, tmp_path / "v", ["mouse"], repeats=1) as desk:
-        first, second = desk.participant(), desk.participant()
+    with at_work(chromium, tmp_path / "v", ["mouse"], repeats=1) as visit:
+        first, second = visit.participant(), visit.participant()
         assert first.is_hidden("#viewer")
         assert second.is_visible("#viewer")
-        assert "only looks on" in second.inner_text("#hint")
+        assert "only watches" in second.inner_text("#hint")
         # What the second one does counts for nothing.
         second.mouse.move(320, 350)
         second.keyboard.press("Space")
         first.mouse.move(320, 120)
-        desk.wait(lambda shown: (shown["c"] or 0) > 0.6)
-        assert desk.conductor.shown["state"] == "waiting"
+        visit.wait(lambda shown: (shown["c"] or 0) > 0.6)
+        assert visit.conductor.shown["state"] == "waiting"
         first.keyboard.press("Space")
-        desk.until("align", "track")
+        visit.until("align", "track")
         first.close()
-        desk.until("waiting")
-        (row,) = desk.rows
+        visit.until("waiting")
+        (row,) = visit.rows
         assert row["outcome"] == "aborted"
         assert "page was closed" in row["reason"]
         # The other one takes over, and the trial comes again.
         second.wait_for_function("() => document.getElementById('viewer').hidden")
         second.mouse.move(320, 200)
-        desk.wait(lambda shown: shown["c"] is not None and shown["c"] == shown["c"])
+        visit.wait(lambda shown: shown["c"] is not None and shown["c"] == shown["c"])
         second.keyboard.press("Space")
-        desk.until("align", "track")
-        assert desk.conductor.shown["step"]["repeat"] == row["repeat"] + 1
+        visit.until("align", "track")
+        assert visit.conductor.shown["step"]["repeat"] == row["repeat"] + 1
 
 
 def test_a_gamepad_that_is_pulled_out_is_no_signal(
     chromium: Any, tmp_path: Path
 ) -> None:
-    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1) as desk:
-        page = desk.participant(script=GAMEPAD)
-        desk.wait(lambda shown: shown["c"] == 0.0)
+    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1) as visit:
+        page = visit.participant(script=GAMEPAD)
+        visit.wait(lambda shown: shown["c"] == 0.0)
         page.evaluate("stick.there = false")
-        desk.wait(lambda shown: not shown["c"] == shown["c"])
+        visit.wait(lambda shown: not shown["c"] == shown["c"])
         says(page, "input", "No gamepad yet: press one of its buttons")
         time.sleep(1.1)  # a signal that came within a second would do
         page.keyboard.press("Space")
-        desk.wait(lambda shown: "button of the gamepad" in shown["message"])
-        assert desk.conductor.shown["state"] == "waiting"
+        visit.wait(lambda shown: "button of the gamepad" in shown["message"])
+        assert visit.conductor.shown["state"] == "waiting"
 
 
 @pytest.mark.parametrize("how", ["button", "panel key", "participant key"])
 def test_the_emergency_stop(chromium: Any, tmp_path: Path, how: str) -> None:
-    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as desk:
-        panel, page = desk.panel(), desk.participant()
+    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as visit:
+        panel, page = visit.panel(), visit.participant()
         panel.click("#begin")
-        desk.until("align", "track")
+        visit.until("align", "track")
         if how == "button":
             panel.click("#emergency")
         else:
             (panel if how == "panel key" else page).keyboard.press("Escape")
-        desk.until("stopped")
+        visit.until("stopped")
         says(panel, "state", "STOPPED")
         says(page, "prompt", "Stopped")
         assert panel.is_disabled("#begin")
-        (row,) = desk.rows
+        (row,) = visit.rows
         assert row["reason"] == "emergency stop"
         panel.click("#end")
-        desk.wait(lambda _: desk.conductor.over)
+        visit.wait(lambda _: visit.conductor.over)
 
 
 def test_the_arm_does_not_depend_on_a_page(chromium: Any, tmp_path: Path) -> None:
-    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as desk:
-        panel, page = desk.panel(), desk.participant()
+    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as visit:
+        panel, page = visit.panel(), visit.participant()
         panel.click("#begin")
-        desk.until("align", "track")
+        visit.until("align", "track")
         page.close()
-        desk.pages.remove(page)
-        desk.wait(lambda shown: not shown["page"])
-        assert desk.conductor.shown["state"] in ("align", "track")
+        visit.pages.remove(page)
+        visit.wait(lambda shown: not shown["page_connected"])
+        assert visit.conductor.shown["state"] in ("align", "track")
 
 
 def test_an_object_by_the_ring_button(chromium: Any, tmp_path: Path) -> None:
-    with at_work(chromium, tmp_path / "v", ["ring"], repeats=2) as desk:
-        panel, page = desk.panel(), desk.participant()
-        desk.wait(lambda shown: shown["c"] == 0.0)
+    with at_work(chromium, tmp_path / "v", ["ring"], repeats=2) as visit:
+        panel, page = visit.panel(), visit.participant()
+        visit.wait(lambda shown: shown["c"] == 0.0)
         panel.click("#begin")
-        desk.until("ready")
+        visit.until("ready")
         page.wait_for_function(
             "() => document.getElementById('name').textContent.length > 2"
         )
         page.keyboard.press("Enter")
-        desk.until("running")
+        visit.until("running")
         page.keyboard.press("Space")
-        desk.wait(lambda shown: shown["c"] == 1.0)
-        desk.wait(lambda shown: (shown["drive"].get("measured") or 0) > 0.5)
+        visit.wait(lambda shown: shown["c"] == 1.0)
+        visit.wait(lambda shown: (shown["source"].get("measured") or 0) > 0.5)
         page.keyboard.press("Space")
-        desk.wait(lambda shown: shown["c"] == 0.0)
+        visit.wait(lambda shown: shown["c"] == 0.0)
         panel.keyboard.press("Space")
-        desk.until("judge")
+        visit.until("judge")
         panel.fill("#text", "a firm grip")
         panel.click("#success")
-        desk.until("waiting")
+        visit.until("waiting")
         panel.click("#begin")
-        desk.until("ready")
+        visit.until("ready")
         panel.keyboard.press("Space")
-        desk.until("running")
+        visit.until("running")
         panel.click("#dropped")
-        desk.until("finished")
-        first, second = desk.rows
+        visit.until("finished")
+        first, second = visit.rows
     assert (first["outcome"], first["comment"]) == ("success", "a firm grip")
     assert 0 < first["time"] < 20
     assert (second["outcome"], second["practised"]) == ("dropped", 1)

@@ -87,7 +87,7 @@ def pick(
     space on the participant's page. Every attempt is on disk when it ends; Ctrl-C
     breaks off, and the same command goes on.
     """
-    from ikns.experiments.conduct import Desk, PickingDesk
+    from ikns.experiments.conduct import Experiment, PickingExperiment
     from ikns.experiments.picking import OBJECT_IDS, pick_schedule
 
     who = whose(
@@ -125,8 +125,8 @@ def pick(
         )
     steps = pick_schedule(who.number, **design)
 
-    def make_desk(rows: Sequence[Mapping[str, Any]]) -> Desk:
-        return PickingDesk(steps, rows)
+    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Experiment:
+        return PickingExperiment(steps, rows)
 
     conduct(
         who,
@@ -144,7 +144,7 @@ def pick(
         Screens(host, port, browser, 100.0),
         conditions=design["conditions"],
         about={"experiment": "picking", "design": design},
-        make_desk=make_desk,
+        make_experiment=make_experiment,
         rest=float(design["rest"]),
         seed=int(design["seed"]),
         as_json=as_json,

@@ -99,7 +99,7 @@ def track(
     Two pages open: one for the participant, one for the experimenter. Every attempt is
     on disk when it ends; Ctrl-C breaks off, and the same command goes on.
     """
-    from ikns.experiments.conduct import Desk, TrackingDesk
+    from ikns.experiments.conduct import Experiment, TrackingExperiment
     from ikns.experiments.tracking import draw_profile, schedule
 
     who = whose(
@@ -153,8 +153,8 @@ def track(
             f"{design['rest']:g}."
         )
 
-    def make_desk(rows: Sequence[Mapping[str, Any]]) -> Desk:
-        return TrackingDesk(steps, rows, align=wait)
+    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Experiment:
+        return TrackingExperiment(steps, rows, align=wait)
 
     conduct(
         who,
@@ -172,7 +172,7 @@ def track(
         Screens(host, port, browser, rate, stick),
         conditions=design["conditions"],
         about={"experiment": "tracking", "design": design, "align": wait},
-        make_desk=make_desk,
+        make_experiment=make_experiment,
         rest=float(design["rest"]),
         seed=int(design["seed"]),
         as_json=as_json,

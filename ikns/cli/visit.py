@@ -29,7 +29,7 @@ from ikns.cli.visit_drivers import (
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.experiments.conduct import Conductor, Desk, Driver
+    from ikns.experiments.conduct import Conductor, Driver, Experiment
     from ikns.live.runtime import Status
 
 __all__ = ["Whose", "chosen", "conduct", "names", "whose"]
@@ -98,10 +98,10 @@ def whose(
         )
     declared = None
     if study is not None:
-        from ikns.experiments.study import check_declared, read_study
+        from ikns.experiments.study import check_declaration, read_study
 
         declared = read_study(study)
-        check_declared(study, declared)
+        check_declaration(study, declared)
         if participant is None:
             raise InvalidInput("--study needs the --participant whose visit it is.")
         visit = study / "visits" / f"sub-{participant}_{experiment}"
@@ -133,7 +133,7 @@ def conduct(
     *,
     conditions: Sequence[str],
     about: Mapping[str, Any],
-    make_desk: Callable[[Sequence[Mapping[str, Any]]], Desk],
+    make_experiment: Callable[[Sequence[Mapping[str, Any]]], Experiment],
     rest: float,
     seed: int,
     as_json: bool,
@@ -148,8 +148,8 @@ def conduct(
     conditions : sequence of str
     about : mapping
         What of ``visit.json`` is particular to the experiment.
-    make_desk : callable
-        Makes the experiment of the attempts that are there already.
+    make_experiment : callable
+        Makes the experiment from the attempts that are there already.
     rest : float
         Of a break, s.
     seed : int
@@ -157,7 +157,7 @@ def conduct(
     as_json : bool
     """
     from ikns.experiments.cockpit import Cockpit, check_port
-    from ikns.experiments.conduct import Conductor, HeldInput, VisitBook, carry_out
+    from ikns.experiments.conduct import Conductor, HeldInput, VisitLog, run_visit
     from ikns.experiments.conduct.ring import ring_driver
 
     virtual = "virtual" in conditions
@@ -185,7 +185,7 @@ def conduct(
             # Sources that do not answer are told before anything is written.
             with open_arm_source(arm, subject):
                 ikns.warm_up()
-        book = VisitBook(
+        log = VisitLog(
             who.folder,
             {
                 "participant": who.participant,
@@ -202,14 +202,14 @@ def conduct(
             | dict(about),
         )
         if who.study is not None:
-            from ikns.experiments.study import keep_declared
+            from ikns.experiments.study import save_declaration
 
-            keep_declared(who.folder.parents[1], who.study)
-        desk = make_desk(book.attempts)
+            save_declaration(who.folder.parents[1], who.study)
+        experiment = make_experiment(log.attempts)
         conductor = Conductor(
-            desk,
-            book,
-            borne={*PAGE, "ring"},
+            experiment,
+            log,
+            page_conditions={*PAGE, "ring"},
             rest=rest,
             auto=_VIRTUAL_WAIT if virtual else None,
         )
@@ -219,7 +219,7 @@ def conduct(
             drivers[name] = lambda one=one: nullcontext(one)  # type: ignore[misc]
         if virtual:
             drivers["virtual"] = lambda: nullcontext(
-                virtual_driver(desk, rate=screens.rate, seed=[seed, who.number])
+                virtual_driver(experiment, rate=screens.rate, seed=[seed, who.number])
             )
         if subject is not None:
             if arm.view:
@@ -259,7 +259,7 @@ def conduct(
         if screens.browser:
             webbrowser.open(cockpit.panel_url)
             webbrowser.open(cockpit.url)
-        carry_out(conductor, drivers, stop=stop, rate=screens.rate)
+        run_visit(conductor, drivers, stop=stop, rate=screens.rate)
     _tell(who, conductor, as_json=as_json)
 
 
@@ -272,12 +272,12 @@ def _relative(path: Path, folder: Path) -> str:
 def _tell(who: Whose, conductor: Conductor, *, as_json: bool) -> None:
     from ikns.statistics.wording import counted
 
-    results, left = conductor.results, conductor.shown["left"]
-    figures = "time" if conductor.desk.experiment == "picking" else "rmse"
+    results, left = conductor.results, conductor.shown["trials_left"]
+    figures = "time" if conductor.experiment.name == "picking" else "rmse"
     result = {
         "visit": who.folder,
         "participant": who.participant,
-        "simulated": conductor.book.simulated,
+        "simulated": conductor.log.simulated,
         "left": left,
         "stopped": conductor.emergency.is_set(),
         "attempts": results,
@@ -286,7 +286,7 @@ def _tell(who: Whose, conductor: Conductor, *, as_json: bool) -> None:
     show(
         result,
         table(
-            f"{title} (simulated)" if conductor.book.simulated else title,
+            f"{title} (simulated)" if conductor.log.simulated else title,
             {
                 "": "d",
                 "step": "s",

@@ -190,7 +190,7 @@ def finger_opener(arm: Arm) -> Callable[[], Finger] | None:
     return lambda: open_finger(address, safety=safety)
 
 
-def virtual_driver(desk: Any, *, rate: float, seed: Sequence[int]) -> Driver:
+def virtual_driver(experiment: Any, *, rate: float, seed: Sequence[int]) -> Driver:
     """Make a virtual operator with a stick, practised."""
     import numpy as np
 
@@ -199,7 +199,7 @@ def virtual_driver(desk: Any, *, rate: float, seed: Sequence[int]) -> Driver:
 
     rng = np.random.default_rng(seed)
     operator = Operator(typical("gamepad").practised(9), rate=rate, seed=rng)
-    return VirtualInput(operator, Delay(0.05, rate=rate), desk.trial)
+    return VirtualInput(operator, Delay(0.05, rate=rate), experiment.trial)
 
 
 def input_said(condition: str, arm: Arm, screens: Screens) -> str:

@@ -17,7 +17,7 @@ from ikns.errors import FileError, IknsError, NotEnoughData, naming
 from ikns.experiments.tracking import error_over_time, measure
 from ikns.experiments.visits import (
     VisitRecord,
-    counting,
+    counted_attempts,
     read_visit,
     tracking_record,
 )
@@ -190,7 +190,7 @@ def _trials(
     """List the attempts that count, each with its number among those of its kind."""
     seen: Counter[tuple[str, str]] = Counter()
     found = []
-    for row in counting(visit.attempts):
+    for row in counted_attempts(visit.attempts):
         if row["outcome"] in outcomes:
             seen[row["condition"], row["kind"]] += 1
             found.append((row, seen[row["condition"], row["kind"]]))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ikns.errors import FileError
-from ikns.experiments.study import check_declared, read_study
+from ikns.experiments.study import check_declaration, read_study
 from ikns.experiments.study.declaration import FILE
 from ikns.experiments.study.summary.accumulate import Gathered
 from ikns.experiments.study.summary.digest import Digest, LeftOut, digest_visit
@@ -166,5 +166,5 @@ def _plan(folder: Path) -> dict[str, Any]:
     if not (folder / FILE).exists():
         return {}
     study = read_study(folder)
-    check_declared(folder, study)
+    check_declaration(folder, study)
     return study.declared()
