@@ -18,7 +18,12 @@ from scipy import stats
 
 from ikns.errors import FileError, InvalidInput
 from ikns.experiments.study import init_study
-from ikns.experiments.study.summary import RunningError, cells, digest_visit, summarize
+from ikns.experiments.study.summary import (
+    RunningError,
+    condition_means,
+    digest_visit,
+    summarize,
+)
 from ikns.experiments.study.summary.answers import picking_answer, tracking_answer
 from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_csv
 from ikns.experiments.tracking import (
@@ -505,7 +510,7 @@ def test_cells_of_a_hand_made_table():
         "trajectory": np.array(["T1", "T2", "T1"]),
         "rmse": np.array([1.0, 5.0, 2.0]),
     }
-    found = cells(
+    found = condition_means(
         table, "rmse", level="trajectory", conditions=["x", "y"], levels=["T1", "T2"]
     )
     means = {(c.condition, c.level): c.over.mean for c in found}
