@@ -6,7 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ikns.experiments.tracking import Profile, Step, TrackingRecord, draw_profile
+from ikns.experiments.tracking import (
+    Profile,
+    TrackingRecord,
+    TrackingStep,
+    draw_profile,
+)
 from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import create_visit, tracking_row, write_attempts
 
@@ -62,7 +67,7 @@ def attempt(
     reason: str = "",
 ) -> dict[str, Any]:
     """Row of a trial; the pointer's height is a function of profile and time."""
-    step = Step(kind, condition, trajectory, 0, repeat, SECONDS)
+    step = TrackingStep(kind, condition, trajectory, 0, repeat, SECONDS)
     profile = draw_profile(trajectory, 0, seconds=SECONDS)
     time = np.arange(-round(ALIGN * RATE), round(SECONDS * RATE) + 1) / RATE
     c = pointer(profile, time) / 100

@@ -36,24 +36,28 @@ def test_an_object_by_ring_and_by_arm(
         await page.come(address)
         for _ in range(2):
             await panel.wait(
-                lambda s: s["state"] == "waiting" and s["page"] and s["c"] is not None
+                lambda s: (
+                    s["state"] == "waiting"
+                    and s["page_connected"]
+                    and s["c"] is not None
+                )
             )
             order.append(panel.shown["condition"])
-            await panel.ask("begin")
+            await panel.submit("begin")
             await panel.until("ready")
-            await page.ask("toggle")
+            await page.submit("toggle")
             await panel.until("running")
             if order[-1] == "ring":
-                await page.ask("press")
-                await panel.wait(lambda s: (s["drive"].get("measured") or 0) > 0.3)
-                await panel.ask("toggle")
+                await page.submit("press")
+                await panel.wait(lambda s: (s["source"].get("measured") or 0) > 0.3)
+                await panel.submit("toggle")
                 await panel.until("judge")
-                await panel.ask("success", "well held")
+                await panel.submit("success", "well held")
             else:
-                await panel.wait(lambda s: s["drive"].get("state") == "active")
-                await panel.ask("dropped")
+                await panel.wait(lambda s: s["source"].get("state") == "active")
+                await panel.submit("dropped")
             await panel.until("waiting", "rest", "finished")
-        await panel.ask("end")
+        await panel.submit("end")
 
     argv = ["pick", str(folder), *SHORT, "--subject", str(files / "person")]
     argv += ["--source", f"replay:{files / 'free.c3d'}?loop=yes", "--json"]
@@ -76,7 +80,7 @@ def test_an_object_by_ring_and_by_arm(
         ([], "needs --subject"),
         (["--conditions", "gamepad"], "found 'gamepad'"),
         (["--conditions", "ring", "--objects", "Z"], "found 'Z'"),
-        (["--conditions", "ring", "--objects", ""], "objects that differ"),
+        (["--conditions", "ring", "--objects", ""], "distinct objects"),
         (["--conditions", "ring", "--limit", "0"], "limit above 0 s"),
         (["--conditions", "ring", "--finger", "gpio:1"], "unknown finger"),
         (["--conditions", "ring", "--number", "-1"], "subject"),

@@ -43,7 +43,7 @@ def test_a_virtual_operator_plays_by_itself_and_goes_on(
         assert panel.hello["simulated"] is True
         await panel.until("track")  # nobody has begun it
         await panel.wait(lambda shown: shown["trial"].get("time", 0) > 1.5)
-        await panel.ask("end")
+        await panel.submit("end")
 
     argv = ["track", str(folder), "--conditions", "virtual", *SHORT, "--align", "1"]
     pages = run([*argv, "--json"], look, monkeypatch)
@@ -88,10 +88,10 @@ def test_the_arm_drives_the_pointer_and_the_finger(
         panel = Page("panel")
         await panel.come(address)
         await panel.wait(lambda shown: shown["c"] is not None)
-        await panel.ask("begin")
+        await panel.submit("begin")
         await panel.until("track")
         await panel.wait(lambda shown: shown["trial"].get("time", 0) > 1.0)
-        drive = panel.shown["drive"]
+        drive = panel.shown["source"]
         assert drive["state"] == "active"
         assert drive["finger"] == "active"
         assert drive["latency"] > 0
@@ -100,11 +100,11 @@ def test_the_arm_drives_the_pointer_and_the_finger(
         if how == "signal":
             os.kill(os.getpid(), signal.SIGINT)
             return
-        await panel.ask("emergency")
+        await panel.submit("emergency")
         await panel.until("stopped")
-        await panel.ask("begin")
+        await panel.submit("begin")
         await panel.wait(lambda shown: "stopped" in shown["message"])
-        await panel.ask("end")
+        await panel.submit("end")
 
     argv = ["track", str(folder), "--conditions", "ikns", *SHORT, "--align", "0.5"]
     argv += ["--subject", str(files / "person"), "--finger", "sim:"]
@@ -161,8 +161,8 @@ def test_nothing_is_written_where_the_source_does_not_answer(
         ([], "needs --subject"),
         (["--conditions", "ikns", "--subject", "nobody"], "needs --source"),
         (["--conditions", "telepathy"], "found 'telepathy'"),
-        (["--conditions", "mouse,mouse"], "conditions that differ"),
-        (["--conditions", ""], "conditions that differ"),
+        (["--conditions", "mouse,mouse"], "distinct conditions"),
+        (["--conditions", ""], "distinct conditions"),
         (["--conditions", "virtual,mouse"], "people or the virtual operator"),
         (["--conditions", "mouse", "--repeats", "0"], "repeats from 1"),
         (["--conditions", "mouse", "--seconds", "3"], "at least 12 s"),
@@ -217,12 +217,12 @@ def test_a_study_says_what_is_done_and_where(
         page = Page("participant")
         await page.come(address)
         assert page.hello["participant"] == "03"
-        await page.ask("end")  # not the participant's to say
+        await page.submit("end")  # not the participant's to say
         await page.link.write_message(json.dumps({"by": "keyboard", "c": 0.5}))
         panel = Page("panel")
         await panel.come(address)
-        assert not math.isnan(panel.shown["left"])
-        await panel.ask("end")
+        assert not math.isnan(panel.shown["trials_left"])
+        await panel.submit("end")
 
     study = ["track", "--study", str(tmp_path)]
     run([*study, "--participant", "03"], look, monkeypatch)

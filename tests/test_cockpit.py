@@ -21,10 +21,10 @@ from ikns.experiments.cockpit import Cockpit, link
 from ikns.experiments.conduct import (
     Conductor,
     HeldInput,
-    PickingDesk,
-    TrackingDesk,
-    VisitBook,
-    carry_out,
+    PickingExperiment,
+    TrackingExperiment,
+    VisitLog,
+    run_visit,
     visit_loop,
 )
 from ikns.experiments.conduct.ring import ring_driver
@@ -76,7 +76,7 @@ class Clock:
 
 
 @dataclass
-class Desk:
+class Served:
     """A visit that is served, and pages that look at it."""
 
     conductor: Conductor
@@ -132,20 +132,20 @@ class Desk:
     def let_pass(self, seconds: float) -> None:
         """Let the visit's clock go on."""
         self.clock.let_pass(seconds)
-        self.heard = self.conductor.shown["drive"].get("told", 0)
+        self.heard = self.conductor.shown["source"].get("told", 0)
 
     def hears(self, c: float, within: float = 0.0) -> None:
         """Wait until a page has told a control signal at the present time."""
 
         def told(shown: Any) -> bool:
-            new = shown["drive"].get("told", 0) > self.heard
+            new = shown["source"].get("told", 0) > self.heard
             return new and abs(shown["c"] - c) <= within
 
         self.wait(told)
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        return read_visit(self.conductor.book.folder).attempts
+        return read_visit(self.conductor.log.folder).attempts
 
 
 def says(page: Any, id: str, text: str) -> None:
@@ -174,7 +174,7 @@ def chromium() -> Iterator[Any]:
 @contextmanager
 def at_work(
     chromium: Any, folder: Path, conditions: list[str], **design: Any
-) -> Iterator[Desk]:
+) -> Iterator[Served]:
     """A visit that goes on in a thread, as the command carries it out."""
     picking = conditions == ["ring"]
     align = design.pop("align", 1.0)
@@ -184,7 +184,7 @@ def at_work(
         if picking
         else schedule(0, profiles=["T1"], **design)
     )
-    book = VisitBook(
+    log = VisitLog(
         folder,
         {
             "experiment": "picking" if picking else "tracking",
@@ -193,15 +193,15 @@ def at_work(
             "design": design,
         },
     )
-    desk: Any = (
-        PickingDesk(steps, book.attempts)
+    experiment: Any = (
+        PickingExperiment(steps, log.attempts)
         if picking
-        else TrackingDesk(steps, book.attempts, align=align)
+        else TrackingExperiment(steps, log.attempts, align=align)
     )
-    conductor = Conductor(desk, book, borne=[*PAGES, "ring"])
+    conductor = Conductor(experiment, log, page_conditions=[*PAGES, "ring"])
     clock = Clock()
     held = {name: HeldInput() for name in conditions if name in PAGES}
-    arm = HeldInput(stale=3600.0)  # an arm that is held still
+    arm = HeldInput(timeout=3600.0)  # an arm that is held still
     arm.put(clock.monotonic(), 0.5)
     presses: SimpleQueue[None] = SimpleQueue()
     drivers: Any = {
@@ -219,10 +219,10 @@ def at_work(
         for module in (visit_loop, link):
             patch.setattr(module, "time", clock)
         thread = Thread(
-            target=carry_out, args=(conductor, drivers), kwargs={"stop": stop}
+            target=run_visit, args=(conductor, drivers), kwargs={"stop": stop}
         )
         thread.start()
-        made = Desk(conductor, cockpit, clock, chromium)
+        made = Served(conductor, cockpit, clock, chromium)
         try:
             yield made
             assert made.complaints == []
@@ -239,23 +239,23 @@ def at_work(
 
 def test_a_whole_trial_with_a_gamepad(chromium: Any, tmp_path: Path) -> None:
     """5 s to align and 25 s to follow, as in the paper; here the stick follows."""
-    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1, align=5.0) as desk:
-        page = desk.participant(script=GAMEPAD)
+    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1, align=5.0) as visit:
+        page = visit.participant(script=GAMEPAD)
         page.evaluate("stick.axes[1] = -0.25")
-        desk.hears(0.25)
+        visit.hears(0.25)
         page.evaluate("stick.pressed = true")
-        desk.until("align")
+        visit.until("align")
         page.evaluate("stick.pressed = false")
-        profile, _ = desk.conductor.desk.trial()  # type: ignore[attr-defined]
+        profile, _ = visit.conductor.experiment.trial()  # type: ignore[attr-defined]
         for end in np.arange(1, round(30 / STEP) + 1) * STEP - 5.0:
             c = float(profile.at(end)) / 100
             page.evaluate("c => { stick.axes[1] = -c; }", c)
-            desk.hears(c)
-            desk.let_pass(STEP)
-        desk.let_pass(STEP)
-        desk.until("finished")
+            visit.hears(c)
+            visit.let_pass(STEP)
+        visit.let_pass(STEP)
+        visit.until("finished")
         says(page, "prompt", "That was all. Thank you!")
-        (row,) = desk.rows
+        (row,) = visit.rows
     assert row["outcome"] == "done"
     record = tracking_record(row)
     # A row for the beginning and each step; the clock rounds.
@@ -267,12 +267,12 @@ def test_a_whole_trial_with_a_gamepad(chromium: Any, tmp_path: Path) -> None:
     figures = measure(record)
     assert figures.rmse < 1e-3
     assert figures.correlation > 0.9999  # over the lags that fit between two rows
-    assert desk.conductor.results[-1]["rmse"] == figures.rmse
+    assert visit.conductor.results[-1]["rmse"] == figures.rmse
 
 
 def test_a_trial_with_the_keyboard_and_the_panel(chromium: Any, tmp_path: Path) -> None:
-    with at_work(chromium, tmp_path / "v", ["keyboard"], repeats=1, align=0.0) as desk:
-        panel, page = desk.panel(), desk.participant(stopped=True)
+    with at_work(chromium, tmp_path / "v", ["keyboard"], repeats=1, align=0.0) as visit:
+        panel, page = visit.panel(), visit.participant(stopped=True)
         page.clock.pause_at(3600)
         assert panel.inner_text("#state") == "Waiting"
         assert panel.is_disabled("#abort")
@@ -280,27 +280,27 @@ def test_a_trial_with_the_keyboard_and_the_panel(chromium: Any, tmp_path: Path) 
         page.clock.run_for(800)
         page.keyboard.up("ArrowUp")
         page.clock.run_for(100)
-        desk.hears(0.4, 1e-9)  # at 0.5 per second, whatever the page draws
+        visit.hears(0.4, 1e-9)  # at 0.5 per second, whatever the page draws
         panel.click("#begin")
-        desk.until("track")
+        visit.until("track")
         says(panel, "state", "Tracking")
         page.keyboard.down("KeyS")
         for k in range(1, 5):
             page.clock.run_for(1000 * STEP)
             # The page tells what holds 60 times a second.
-            desk.hears(0.4 - 0.5 * k * STEP, 0.5 / 60 + 1e-9)
-            desk.let_pass(STEP)
+            visit.hears(0.4 - 0.5 * k * STEP, 0.5 / 60 + 1e-9)
+            visit.let_pass(STEP)
         page.keyboard.up("KeyS")
         for _ in range(5):
             page.clock.run_for(1000 * STEP)
-            desk.hears(0.4 - 2 * STEP, 1e-9)
-            desk.let_pass(STEP)
-        desk.let_pass(25.0)
-        desk.until("finished")
+            visit.hears(0.4 - 2 * STEP, 1e-9)
+            visit.let_pass(STEP)
+        visit.let_pass(25.0)
+        visit.until("finished")
         panel.wait_for_function(
             "() => document.querySelectorAll('#attempts tr').length === 1"
         )
-        (row,) = desk.rows
+        (row,) = visit.rows
         shown = panel.inner_text("#attempts")
     assert row["outcome"] == "done"
     record = tracking_record(row)
@@ -315,108 +315,108 @@ def test_a_trial_with_the_keyboard_and_the_panel(chromium: Any, tmp_path: Path) 
 def test_a_page_that_closes_and_one_that_looks_on(
     chromium: Any, tmp_path: Path
 ) -> None:
-    with at_work(chromium, tmp_path / "v", ["mouse"], repeats=1) as desk:
-        first, second = desk.participant(), desk.participant()
+    with at_work(chromium, tmp_path / "v", ["mouse"], repeats=1) as visit:
+        first, second = visit.participant(), visit.participant()
         assert first.is_hidden("#viewer")
         assert second.is_visible("#viewer")
-        assert "only looks on" in second.inner_text("#hint")
+        assert "only watches" in second.inner_text("#hint")
         # What the second one does counts for nothing.
         second.mouse.move(320, 350)
         second.keyboard.press("Space")
         first.mouse.move(320, 120)
-        desk.wait(lambda shown: (shown["c"] or 0) > 0.6)
-        assert desk.conductor.shown["state"] == "waiting"
+        visit.wait(lambda shown: (shown["c"] or 0) > 0.6)
+        assert visit.conductor.shown["state"] == "waiting"
         first.keyboard.press("Space")
-        desk.until("align", "track")
+        visit.until("align", "track")
         first.close()
-        desk.until("waiting")
-        (row,) = desk.rows
+        visit.until("waiting")
+        (row,) = visit.rows
         assert row["outcome"] == "aborted"
         assert "page was closed" in row["reason"]
         # The other one takes over, and the trial comes again.
         second.wait_for_function("() => document.getElementById('viewer').hidden")
         second.mouse.move(320, 200)
-        desk.wait(lambda shown: shown["c"] is not None and shown["c"] == shown["c"])
+        visit.wait(lambda shown: shown["c"] is not None and shown["c"] == shown["c"])
         second.keyboard.press("Space")
-        desk.until("align", "track")
-        assert desk.conductor.shown["step"]["repeat"] == row["repeat"] + 1
+        visit.until("align", "track")
+        assert visit.conductor.shown["step"]["repeat"] == row["repeat"] + 1
 
 
 def test_a_gamepad_that_is_pulled_out_is_no_signal(
     chromium: Any, tmp_path: Path
 ) -> None:
-    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1) as desk:
-        page = desk.participant(script=GAMEPAD)
-        desk.hears(0.0)
+    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1) as visit:
+        page = visit.participant(script=GAMEPAD)
+        visit.hears(0.0)
         page.evaluate("stick.there = false")
-        desk.wait(lambda shown: not shown["c"] == shown["c"])
+        visit.wait(lambda shown: not shown["c"] == shown["c"])
         says(page, "input", "No gamepad yet: press one of its buttons")
-        desk.let_pass(1.1)  # a signal that came within a second would do
+        visit.let_pass(1.1)  # a signal that came within a second would do
         page.keyboard.press("Space")
-        desk.wait(lambda shown: "button of the gamepad" in shown["message"])
-        assert desk.conductor.shown["state"] == "waiting"
+        visit.wait(lambda shown: "button of the gamepad" in shown["message"])
+        assert visit.conductor.shown["state"] == "waiting"
 
 
 @pytest.mark.parametrize("how", ["button", "panel key", "participant key"])
 def test_the_emergency_stop(chromium: Any, tmp_path: Path, how: str) -> None:
-    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as desk:
-        panel, page = desk.panel(), desk.participant()
+    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as visit:
+        panel, page = visit.panel(), visit.participant()
         panel.click("#begin")
-        desk.until("align", "track")
+        visit.until("align", "track")
         if how == "button":
             panel.click("#emergency")
         else:
             (panel if how == "panel key" else page).keyboard.press("Escape")
-        desk.until("stopped")
+        visit.until("stopped")
         says(panel, "state", "STOPPED")
         says(page, "prompt", "Stopped")
         assert panel.is_disabled("#begin")
-        (row,) = desk.rows
+        (row,) = visit.rows
         assert row["reason"] == "emergency stop"
         panel.click("#end")
-        desk.wait(lambda _: desk.conductor.over)
+        visit.wait(lambda _: visit.conductor.over)
 
 
 def test_the_arm_does_not_depend_on_a_page(chromium: Any, tmp_path: Path) -> None:
-    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as desk:
-        panel, page = desk.panel(), desk.participant()
+    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as visit:
+        panel, page = visit.panel(), visit.participant()
         panel.click("#begin")
-        desk.until("align", "track")
+        visit.until("align", "track")
         page.close()
-        desk.pages.remove(page)
-        desk.wait(lambda shown: not shown["page"])
-        assert desk.conductor.shown["state"] in ("align", "track")
+        visit.pages.remove(page)
+        visit.wait(lambda shown: not shown["page_connected"])
+        assert visit.conductor.shown["state"] in ("align", "track")
 
 
 def test_an_object_by_the_ring_button(chromium: Any, tmp_path: Path) -> None:
-    with at_work(chromium, tmp_path / "v", ["ring"], repeats=2) as desk:
-        panel, page = desk.panel(), desk.participant()
-        desk.wait(lambda shown: shown["c"] == 0.0)
+    with at_work(chromium, tmp_path / "v", ["ring"], repeats=2) as visit:
+        panel, page = visit.panel(), visit.participant()
+        visit.wait(lambda shown: shown["c"] == 0.0)
         panel.click("#begin")
-        desk.until("ready")
+        visit.until("ready")
         page.wait_for_function(
             "() => document.getElementById('name').textContent.length > 2"
         )
         page.keyboard.press("Enter")
-        desk.until("running")
-        desk.let_pass(3.0)
+        visit.until("running")
+        visit.let_pass(3.0)
         page.keyboard.press("Space")
-        desk.wait(lambda shown: shown["c"] == 1.0)
-        desk.wait(lambda shown: (shown["drive"].get("measured") or 0) > 0.5)
+        visit.wait(lambda shown: shown["c"] == 1.0)
+        visit.wait(lambda shown: (shown["source"].get("measured") or 0) > 0.5)
         page.keyboard.press("Space")
-        desk.wait(lambda shown: shown["c"] == 0.0)
+        visit.wait(lambda shown: shown["c"] == 0.0)
         panel.keyboard.press("Space")
-        desk.until("judge")
+        visit.until("judge")
         panel.fill("#text", "a firm grip")
         panel.click("#success")
-        desk.until("waiting")
+        visit.until("waiting")
         panel.click("#begin")
-        desk.until("ready")
+        visit.until("ready")
         panel.keyboard.press("Space")
-        desk.until("running")
+        visit.until("running")
         panel.click("#dropped")
-        desk.until("finished")
-        first, second = desk.rows
+        visit.until("finished")
+        first, second = visit.rows
     assert (first["outcome"], first["comment"]) == ("success", "a firm grip")
     assert first["time"] == pytest.approx(3.0, abs=1e-6)
     assert (second["outcome"], second["practised"]) == ("dropped", 1)

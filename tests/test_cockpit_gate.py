@@ -16,10 +16,11 @@ from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from ikns.errors import FileError, InvalidInput
-from ikns.experiments.cockpit import Cockpit, Gate
+from ikns.experiments.cockpit import Cockpit
 from ikns.experiments.cockpit.handlers import FILES
-from ikns.experiments.conduct import Conductor, HeldInput, TrackingDesk, VisitBook
+from ikns.experiments.conduct import Conductor, HeldInput, TrackingExperiment, VisitLog
 from ikns.experiments.tracking import schedule
+from ikns.web_access import WebAccess
 
 ABOUT = {"experiment": "tracking", "participant": "01", "simulated": False}
 PAGES = sorted(FILES)
@@ -28,9 +29,11 @@ PAGES = sorted(FILES)
 def conductor(folder: Path) -> Conductor:
     steps = schedule(0, conditions=["keyboard"], training=0)
     made = Conductor(
-        TrackingDesk(steps), VisitBook(folder / "visit", ABOUT), borne=["keyboard"]
+        TrackingExperiment(steps),
+        VisitLog(folder / "visit", ABOUT),
+        page_conditions=["keyboard"],
     )
-    made.check(0.0)
+    made.update(0.0)
     return made
 
 
@@ -56,7 +59,7 @@ def afar(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cockpit]:
 def ask(
     cockpit: Cockpit, path: str, *, method: str = "GET", **headers: str
 ) -> tuple[int, dict[str, str], bytes]:
-    line = http.client.HTTPConnection("127.0.0.1", cockpit.gate.port, timeout=10)
+    line = http.client.HTTPConnection("127.0.0.1", cockpit.access.port, timeout=10)
     try:
         line.request(method, path, headers=headers)
         answer = line.getresponse()
@@ -71,7 +74,7 @@ def knock(
     """Open a web socket; return the first message, or the status of the refusal."""
 
     async def come() -> dict[str, object] | int:
-        url = f"ws://127.0.0.1:{cockpit.gate.port}/link?role={role}"
+        url = f"ws://127.0.0.1:{cockpit.access.port}/link?role={role}"
         try:
             link: WebSocketClientConnection = await websocket_connect(
                 HTTPRequest(url, headers=headers)
@@ -98,13 +101,13 @@ def knock(
 
 
 def own(cockpit: Cockpit) -> str:
-    return f"http://127.0.0.1:{cockpit.gate.port}"
+    return f"http://127.0.0.1:{cockpit.access.port}"
 
 
 def test_by_default_only_this_machine_is_listened_to(here: Cockpit) -> None:
     assert {urlsplit(a).hostname for a in (here.url, here.panel_url)} == {"127.0.0.1"}
     assert here._socket.getsockname()[0] == "127.0.0.1"
-    assert here.gate.token == ""
+    assert here.access.token == ""
 
 
 @pytest.mark.parametrize("path", PAGES)
@@ -128,7 +131,7 @@ def test_a_name_that_was_led_here_is_refused(
     here: Cockpit, path: str, host: str
 ) -> None:
     # Of a page that has its own name lead to this machine (DNS rebinding).
-    named = host.format(port=here.gate.port)
+    named = host.format(port=here.access.port)
     status, _, body = ask(here, path, Host=named, Origin=f"http://{named}")
     assert status == 403
     assert b"<html" not in body
@@ -146,7 +149,7 @@ def test_a_name_that_was_led_here_is_refused(
     ],
 )
 def test_a_socket_of_a_foreign_page_is_refused(here: Cockpit, origin: str) -> None:
-    assert knock(here, Origin=origin.format(port=here.gate.port)) == 403
+    assert knock(here, Origin=origin.format(port=here.access.port)) == 403
 
 
 def test_a_socket_that_does_not_say_whose_it_is_is_refused(here: Cockpit) -> None:
@@ -168,7 +171,9 @@ def test_nothing_can_be_posted(here: Cockpit, method: str) -> None:
         assert "Access-Control-Allow-Origin" not in headers
 
 
-@pytest.mark.parametrize("path", ["/../pyproject.toml", "/gate.py", "/link/../x", "//"])
+@pytest.mark.parametrize(
+    "path", ["/../pyproject.toml", "/server.py", "/link/../x", "//"]
+)
 def test_no_other_file_is_served(here: Cockpit, path: str) -> None:
     assert ask(here, path)[0] == 404
 
@@ -189,27 +194,27 @@ def test_a_message_that_is_too_long_ends_the_talk(here: Cockpit) -> None:
 
 def test_a_participant_cannot_do_what_is_the_experimenters(tmp_path: Path) -> None:
     with serving(tmp_path) as cockpit:
-        for name in ("pause", "skip", "end", "left"):
-            says = json.dumps({"ask": name})
+        for name in ("pause", "skip", "end", "page_disconnected"):
+            says = json.dumps({"command": name})
             knock(cockpit, role="participant", says=(says,), Origin=own(cockpit))
-            shown = cockpit.conductor.check(1.0)
+            shown = cockpit.conductor.update(1.0)
             assert shown["state"] == "waiting"
-            assert shown["at"] == 0
+            assert shown["step_index"] == 0
             assert not cockpit.conductor.over
-        says = json.dumps({"ask": "pause"})
+        says = json.dumps({"command": "pause"})
         knock(cockpit, role="panel", says=(says,), Origin=own(cockpit))
-        assert cockpit.conductor.check(1.0)["state"] == "paused"
+        assert cockpit.conductor.update(1.0)["state"] == "paused"
 
 
 # --- with another address -----------------------------------------------------------
 
 
 def test_from_afar_the_token_is_needed(afar: Cockpit) -> None:
-    token = afar.gate.token
+    token = afar.access.token
     assert len(token) >= 32  # 24 bytes
     assert f"token={token}" in afar.url
     wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
-    cookie = f"{afar.gate.cookie}={wrong}"
+    cookie = f"{afar.access.cookie}={wrong}"
     for path in [*PAGES, f"/?token={wrong}", "/?token=", "/link"]:
         assert ask(afar, path)[0] == 403, path
         assert ask(afar, path, Cookie=cookie)[0] == 403, path
@@ -221,7 +226,7 @@ def test_from_afar_the_token_is_needed(afar: Cockpit) -> None:
 def test_the_token_is_exchanged_for_a_cookie_and_leaves_the_address(
     afar: Cockpit,
 ) -> None:
-    status, headers, _ = ask(afar, f"/panel?token={afar.gate.token}")
+    status, headers, _ = ask(afar, f"/panel?token={afar.access.token}")
     assert status == 302
     assert headers["Location"] == "/panel"
     cookie = headers["Set-Cookie"]
@@ -239,28 +244,28 @@ def test_the_token_is_exchanged_for_a_cookie_and_leaves_the_address(
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "lab.example", ""])
 def test_no_other_address_without_a_token(host: str) -> None:
     with pytest.raises(InvalidInput, match="token"):
-        Gate(host, 80)
-    assert len(Gate.at(host, 80).token) >= 32
-    assert Gate.at(host, 80).token != Gate.at(host, 80).token
+        WebAccess(host, 80)
+    assert len(WebAccess.at(host, 80).token) >= 32
+    assert WebAccess.at(host, 80).token != WebAccess.at(host, 80).token
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1"])
 def test_loopback_needs_none(host: str) -> None:
-    assert Gate.at(host, 8000).token == ""
+    assert WebAccess.at(host, 8000).token == ""
 
 
 @given(st.text(), st.text())
 def test_only_the_token_itself_is_the_token(token: str, told: str) -> None:
-    gate = Gate("10.0.0.1", 80, "t" + token)
-    assert gate.knows_token(told) == (told == "t" + token)
-    assert not gate.knows_token(None)
+    access = WebAccess("10.0.0.1", 80, "t" + token)
+    assert access.accepts_token(told) == (told == "t" + token)
+    assert not access.accepts_token(None)
 
 
 @given(st.text())
 def test_an_origin_is_ours_only_letter_by_letter(origin: str) -> None:
-    gate = Gate("127.0.0.1", 8000)
+    access = WebAccess("127.0.0.1", 8000)
     ours = origin == "http://127.0.0.1:8000"
-    assert gate.same_origin(origin, "127.0.0.1:8000") == ours
+    assert access.same_origin(origin, "127.0.0.1:8000") == ours
 
 
 def test_a_port_that_is_taken_is_one_sentence(tmp_path: Path) -> None:

@@ -19,15 +19,15 @@ from ikns.experiments.conduct import (
     Command,
     Conductor,
     HeldInput,
-    PickingDesk,
-    TrackingDesk,
+    PickingExperiment,
+    TrackingExperiment,
     VirtualInput,
-    VisitBook,
+    VisitLog,
 )
 from ikns.experiments.conduct.visit_log import _FIXED
 from ikns.experiments.picking import pick_schedule
 from ikns.experiments.tracking import measure, schedule
-from ikns.experiments.visits import counting, read_visit, tracking_record
+from ikns.experiments.visits import counted_attempts, read_visit, tracking_record
 from ikns.simulation.operator import Delay, Operator, typical
 
 DESIGN = {"conditions": ["keyboard", "ikns"], "profiles": ["T1"], "repeats": 1}
@@ -54,35 +54,35 @@ def about(experiment: str) -> dict[str, Any]:
 
 def conductor(folder: Path, experiment: str = "tracking") -> Conductor:
     """A conductor at a visit's folder, new or gone on with."""
-    book = VisitBook(folder, about(experiment))
-    desk = (
-        TrackingDesk(STEPS, book.attempts, align=ALIGN)
+    log = VisitLog(folder, about(experiment))
+    made = (
+        TrackingExperiment(STEPS, log.attempts, align=ALIGN)
         if experiment == "tracking"
-        else PickingDesk(PICKS, book.attempts)
+        else PickingExperiment(PICKS, log.attempts)
     )
-    return Conductor(desk, book, borne=["keyboard", "ring"], rest=10.0)
+    return Conductor(made, log, page_conditions=["keyboard", "ring"], rest=10.0)
 
 
 def play(at: Conductor, start: float, seconds: float, c: float = 0.5) -> float:
     """Let time pass at 5 Hz with a signal; return when."""
     for k in range(1, round(seconds * 5) + 1):
-        at.frame(start + k / 5, c)
-        at.check(start + k / 5)
+        at.add_sample(start + k / 5, c)
+        at.update(start + k / 5)
     return start + seconds
 
 
 def ask(at: Conductor, now: float, *names: str, text: str = "") -> dict[str, Any]:
     for name in names:
-        at.ask(Command(name, text))
-    return at.check(now)
+        at.submit(Command(name, text))
+    return at.update(now)
 
 
 def start(folder: Path, experiment: str = "tracking") -> Conductor:
     """With the participant's page there and a signal coming."""
     made = conductor(folder, experiment)
-    made.ask(Command("came"))
-    made.frame(0.0, 0.5)
-    made.check(0.0)
+    made.submit(Command("page_connected"))
+    made.add_sample(0.0, 0.5)
+    made.update(0.0)
     return made
 
 
@@ -97,8 +97,8 @@ def test_a_trial_is_on_disk_as_soon_as_it_ends(tmp_path: Path) -> None:
     told = rng.uniform(0, 1, len(frames))
     told[100:120] = np.nan
     for now, c in zip(frames, told, strict=True):
-        at.frame(now, c)
-        shown = at.check(now)
+        at.add_sample(now, c)
+        shown = at.update(now)
     assert shown["state"] == "waiting"
     (row,) = read_visit(tmp_path / "v", experiment="tracking").attempts
     assert row["outcome"] == "done"
@@ -124,7 +124,7 @@ def test_the_screen_says_what_is_due(tmp_path: Path) -> None:
     assert trial["x"] == pytest.approx(3.0 / 12.0)
     assert trial["y"] == 50.0
     assert at.shown["state"] == "track"
-    profile = at.desk.visit.trial.profile  # type: ignore[attr-defined]
+    profile = at.experiment.visit.trial.profile  # type: ignore[attr-defined]
     heights = at.curve["heights"]
     grid = np.linspace(0, 12.0, len(heights))
     np.testing.assert_allclose(heights, profile.at(grid), atol=0.0051)  # two digits
@@ -141,36 +141,36 @@ def test_what_is_shown_is_plain_data(tmp_path: Path) -> None:
 def test_a_trial_needs_a_signal_and_a_page_if_that_bears_it(tmp_path: Path) -> None:
     at = conductor(tmp_path / "v")
     assert "page" in ask(at, 0.0, "begin")["message"]
-    at.ask(Command("came"))
+    at.submit(Command("page_connected"))
     assert "signal of keyboard" in ask(at, 0.1, "begin")["message"]
-    at.frame(1.0, math.nan)
+    at.add_sample(1.0, math.nan)
     assert "signal of keyboard" in ask(at, 1.0, "begin")["message"]
-    at.frame(1.0, 0.5)
+    at.add_sample(1.0, 0.5)
     assert "signal of keyboard" in ask(at, 2.1, "begin")["message"]
-    at.frame(3.0, 0.5)
+    at.add_sample(3.0, 0.5)
     assert ask(at, 3.1, "begin")["state"] == "align"
 
 
 def test_a_page_that_goes_takes_its_trial_with_it(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
     ask(at, 0.1, "begin")
-    shown = ask(at, 2.0, "left")
+    shown = ask(at, 2.0, "page_disconnected")
     assert shown["state"] == "waiting"
     assert "page was closed" in shown["message"]
     (row,) = read_visit(tmp_path / "v").attempts
     assert (row["outcome"], len(row["c"])) == ("aborted", 0)
     assert "page was closed" in row["reason"]
     # It comes again.
-    assert at.desk.visit.current.key == row["key"]
+    assert at.experiment.visit.current.key == row["key"]
 
 
 def test_a_trial_with_the_arm_goes_on_without_a_page(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
     while at.condition != "ikns" or at.state == "rest":
         ask(at, 1.0, "skip")
-    at.frame(1.0, 0.5)
+    at.add_sample(1.0, 0.5)
     ask(at, 1.0, "begin")
-    shown = ask(at, 1.5, "left")
+    shown = ask(at, 1.5, "page_disconnected")
     assert shown["state"] == "align"
     play(at, 1.5, ALIGN + 12.0)
     rows = read_visit(tmp_path / "v").attempts
@@ -187,16 +187,16 @@ def test_rest_break_and_pause_hold_trials_up(tmp_path: Path) -> None:
     assert ask(at, 1.0, "pause")["state"] == "waiting"
     assert ask(at, 1.0, "rest")["state"] == "rest"
     assert "break" in ask(at, 2.0, "begin")["message"]
-    assert at.check(6.0)["countdown"] == pytest.approx(5.0)
-    at.frame(11.0, 0.5)
-    assert at.check(11.0)["state"] == "waiting"  # 10 s are over
+    assert at.update(6.0)["countdown"] == pytest.approx(5.0)
+    at.add_sample(11.0, 0.5)
+    assert at.update(11.0)["state"] == "waiting"  # 10 s are over
     ask(at, 11.0, "rest")
     assert ask(at, 11.0, "skip")["state"] == "waiting"
-    assert not at.book.attempts  # a break that is cut short is no attempt
+    assert not at.log.attempts  # a break that is cut short is no attempt
     while at.state != "rest":
         ask(at, 12.0, "skip")
-    assert at.check(13.0)["countdown"] == pytest.approx(29.0)
-    assert at.check(42.1)["state"] == "waiting"
+    assert at.update(13.0)["countdown"] == pytest.approx(29.0)
+    assert at.update(42.1)["state"] == "waiting"
 
 
 def test_a_clock_that_was_stopped_waits_for_the_outcome(tmp_path: Path) -> None:
@@ -204,9 +204,9 @@ def test_a_clock_that_was_stopped_waits_for_the_outcome(tmp_path: Path) -> None:
     assert ask(at, 0.1, "begin")["state"] == "ready"
     assert "running" in ask(at, 0.2, "success")["message"] or at.state == "ready"
     assert ask(at, 1.0, "toggle")["state"] == "running"
-    assert at.check(5.0)["trial"]["left"] == pytest.approx(16.0)
+    assert at.update(5.0)["trial"]["time_left"] == pytest.approx(16.0)
     assert ask(at, 8.5, "toggle")["state"] == "judge"
-    assert at.check(90.0)["state"] == "judge"  # no time-out any more
+    assert at.update(90.0)["state"] == "judge"  # no time-out any more
     ask(at, 91.0, "dropped", text="slipped  off\n the palm")
     (row,) = read_visit(tmp_path / "v", experiment="picking").attempts
     assert (row["outcome"], row["time"]) == ("dropped", 7.5)
@@ -217,7 +217,7 @@ def test_the_limit_ends_a_trial_by_itself(tmp_path: Path) -> None:
     at = start(tmp_path / "v", "picking")
     ask(at, 0.1, "begin", "toggle")
     ask(at, 3.0, "comment", text="heavy")
-    assert at.check(20.2)["state"] == "waiting"
+    assert at.update(20.2)["state"] == "waiting"
     (row,) = read_visit(tmp_path / "v", experiment="picking").attempts
     assert (row["outcome"], row["time"]) == ("timeout", 20.0)
     assert row["comment"] == "heavy"
@@ -242,18 +242,20 @@ def test_an_emergency_stop_acts_at_once_and_stays(
     at = start(tmp_path / "v", experiment)
     ask(at, 0.1, "begin", "toggle")
     called = []
-    at.at_emergency.append(lambda: called.append(threading.current_thread().name))
-    thread = threading.Thread(target=at.ask, args=(Command("emergency"),), name="page")
+    at.on_emergency.append(lambda: called.append(threading.current_thread().name))
+    thread = threading.Thread(
+        target=at.submit, args=(Command("emergency"),), name="page"
+    )
     thread.start()
     thread.join()
     # Before anything was checked, in the thread of whoever asked.
     assert called == ["page"]
     assert at.emergency.is_set()
-    shown = at.check(2.0)
+    shown = at.update(2.0)
     assert (shown["state"], shown["condition"]) == ("stopped", "")
     (row,) = read_visit(tmp_path / "v").attempts
     assert (row["outcome"], row["reason"]) == ("aborted", "emergency stop")
-    others = sorted((COMMANDS | at.desk.commands) - {"end"})
+    others = sorted((COMMANDS | at.experiment.commands) - {"end"})
     assert ask(at, 3.0, *others)["state"] == "stopped"
     assert len(read_visit(tmp_path / "v").attempts) == 1
     ask(at, 4.0, "end")
@@ -263,7 +265,9 @@ def test_an_emergency_stop_acts_at_once_and_stays(
 # --- whatever is asked --------------------------------------------------------------
 
 ASKED = st.sampled_from(
-    sorted(COMMANDS | PickingDesk.commands) + ["begin", "toggle"] * 8 + ["nonsense"]
+    sorted(COMMANDS | PickingExperiment.commands)
+    + ["begin", "toggle"] * 8
+    + ["nonsense"]
 )
 #: What happens: a command, or time that passes with or without a signal.
 HAPPENS = st.one_of(
@@ -275,17 +279,17 @@ HAPPENS = st.one_of(
 def consistent(at: Conductor, folder: Path) -> list[dict[str, Any]]:
     """What must hold at any time; returns the attempts on disk."""
     rows = read_visit(folder).attempts
-    attempts = at.desk.visit.attempts
+    attempts = at.experiment.visit.attempts
     assert [(r["key"], r["outcome"]) for r in rows] == [
         (a.key, a.outcome) for a in attempts
     ]
     assert [r["number"] for r in rows] == list(range(1, len(rows) + 1))
     # Done and left make up all there is.
-    steps = [s for s in at.desk.visit.steps if s.kind != "rest"]
-    final = FINAL[at.desk.experiment]
-    counted = counting(rows)
+    steps = [s for s in at.experiment.visit.steps if s.kind != "rest"]
+    final = FINAL[at.experiment.name]
+    counted = counted_attempts(rows)
     assert {r["outcome"] for r in counted} <= final
-    assert len(counted) + at.shown["left"] == len(steps)
+    assert len(counted) + at.shown["trials_left"] == len(steps)
     practised: dict[str, int] = {}
     for row in rows:
         assert row["practised"] == practised.get(row["condition"], 0)
@@ -308,9 +312,9 @@ def test_nothing_is_lost_whatever_is_asked(
                 at.close(now)
                 before = consistent(at, folder)
                 at = conductor(folder, experiment)
-                at.ask(Command("came"))
-                at.frame(now, 0.5)
-                at.check(now)
+                at.submit(Command("page_connected"))
+                at.add_sample(now, 0.5)
+                at.update(now)
                 after = consistent(at, folder)
                 assert len(after) == len(before)
             if isinstance(what, str):
@@ -318,16 +322,16 @@ def test_nothing_is_lost_whatever_is_asked(
             else:
                 now = play(at, now, min(what, 3.0), how)
                 now += max(0.0, what - 3.0)
-                at.frame(now, how)
-                at.check(now)
+                at.add_sample(now, how)
+                at.update(now)
         at.close(now)
         rows = consistent(at, folder)
-        assert at.desk.state() == ""
+        assert at.experiment.state() == ""
         # And what is left can be done by the next.
         again = conductor(folder, experiment)
-        again.check(now)
+        again.update(now)
         assert len(consistent(again, folder)) == len(rows)
-        assert again.shown["left"] == at.shown["left"]
+        assert again.shown["trials_left"] == at.shown["trials_left"]
 
 
 def test_many_threads_may_ask(tmp_path: Path) -> None:
@@ -335,41 +339,41 @@ def test_many_threads_may_ask(tmp_path: Path) -> None:
 
     def press() -> None:
         for _ in range(200):
-            at.ask(Command("pause"))
+            at.submit(Command("pause"))
 
     threads = [threading.Thread(target=press) for _ in range(4)]
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
-        at.check(1.0)
+        at.update(1.0)
     for thread in threads:
         thread.join()
-    at.check(1.0)
+    at.update(1.0)
     # None was lost: an even number of changes leaves it as it was.
     log = (tmp_path / "v" / "log.jsonl").read_text()
     assert log.count('"pause') == 800
     assert at.state == "waiting"
 
 
-# --- the book -----------------------------------------------------------------------
+# --- the log ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("key", _FIXED)
 def test_another_visit_does_not_go_on_with_this_one(tmp_path: Path, key: str) -> None:
     first = about("tracking")
-    VisitBook(tmp_path / "v", first)
+    VisitLog(tmp_path / "v", first)
     other = {"experiment": "picking", "simulated": True, "design": {"rest": 1}}
     changed = first | {key: other.get(key, "12")}
     with pytest.raises((InvalidInput, FileError), match=r"expected .* found"):
-        VisitBook(tmp_path / "v", changed)
-    VisitBook(tmp_path / "v", first)
+        VisitLog(tmp_path / "v", changed)
+    VisitLog(tmp_path / "v", first)
 
 
 def test_the_design_that_differs_is_named(tmp_path: Path) -> None:
-    VisitBook(tmp_path / "v", about("tracking"))
+    VisitLog(tmp_path / "v", about("tracking"))
     changed = about("tracking") | {"design": DESIGN | SHORT | {"rest": 60.0}}
     with pytest.raises(InvalidInput, match=r"expected rest 30\.0.* found 60\.0"):
-        VisitBook(tmp_path / "v", changed)
+        VisitLog(tmp_path / "v", changed)
 
 
 def test_what_cannot_be_written_waits_and_is_told(tmp_path: Path) -> None:
@@ -380,16 +384,16 @@ def test_what_cannot_be_written_waits_and_is_told(tmp_path: Path) -> None:
     shown = ask(at, 1.0, "abort", "begin", "abort")
     assert "visit.json" in shown["fault"]
     with pytest.raises(FileError, match="2 attempts could not be written"):
-        at.book.close()
+        at.log.close()
     away.rename(file)
-    assert at.check(5.0)["fault"] == ""
+    assert at.update(5.0)["fault"] == ""
     assert len(consistent(at, tmp_path / "v")) == 2
 
 
 def test_a_folder_that_holds_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(InvalidInput, match=r"mine\.txt"):
-        VisitBook(tmp_path, about("tracking"))
+        VisitLog(tmp_path, about("tracking"))
     assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
 
 
@@ -400,7 +404,7 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path: Path) -> Non
 def test_a_held_signal_stays_within_bounds_and_grows_stale(
     c: float, age: float
 ) -> None:
-    held = HeldInput(stale=0.2)
+    held = HeldInput(timeout=0.2)
     held.put(5.0, c)
     ((at, value),) = held.take(5.0 + age)
     assert at == 5.0 + age
@@ -408,7 +412,7 @@ def test_a_held_signal_stays_within_bounds_and_grows_stale(
         assert math.isnan(value)
     else:
         assert value == min(max(c, 0.0), 1.0)
-    held.lose()
+    held.clear()
     assert math.isnan(held.take(5.0)[0].c)
 
 
@@ -420,15 +424,15 @@ def virtual(visit: Callable[[], Any]) -> VirtualInput:
 
 def test_a_virtual_operator_plays_a_trial(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
-    player = virtual(at.desk.trial)  # type: ignore[attr-defined]
+    player = virtual(at.experiment.trial)  # type: ignore[attr-defined]
     now = 0.0
     for k in range(1500):
         now = k / 60
         for sample in player.take(now):
-            at.frame(*sample)
+            at.add_sample(*sample)
         if k == 30:
-            at.ask(Command("begin"))
-        at.check(now)
+            at.submit(Command("begin"))
+        at.update(now)
     rows = read_visit(tmp_path / "v").attempts
     record = tracking_record(rows[0])
     # A hundred samples a second whatever the screen does: 13 s, the last one maybe

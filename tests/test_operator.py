@@ -15,8 +15,8 @@ from ikns.experiments.tracking import CHARACTERS, draw_profile, measure, virtual
 from ikns.simulation.operator import (
     CONDITIONS,
     Ability,
-    Copyist,
     Delay,
+    DelayedCopy,
     Operator,
     closed_loop,
     open_loop,
@@ -26,7 +26,7 @@ from ikns.simulation.operator import (
     typical,
 )
 from ikns.simulation.operator.ability import LEAST_MARGIN, parameters
-from ikns.simulation.operator.model import straight_step
+from ikns.simulation.operator.model import discrete_step
 
 #: Nothing is cut off.
 FREE = (-np.inf, np.inf)
@@ -77,7 +77,7 @@ def test_latency_of_the_device_is_part_of_the_loop():
 def test_the_discrete_system_is_exact(omega, rate):
     """Against the z-transform of limb and delay, written down independently."""
     ability = replace(able, delay=0.21, preview=0.3)
-    A, B0, B1 = straight_step(ability, rate)
+    A, B0, B1 = discrete_step(ability, rate)
     z = np.exp(1j * omega / rate)
     limb = np.linalg.solve(z * np.eye(3) - A, B0 + B1 * z)[1]
     whole = int(0.21 * rate)
@@ -90,7 +90,7 @@ def test_the_discrete_system_is_exact(omega, rate):
 
 def test_the_step_is_exact_for_a_straight_error():
     rate, w, z = 20.0, able.limb_frequency, able.limb_damping
-    A, B0, B1 = straight_step(able, rate)
+    A, B0, B1 = discrete_step(able, rate)
     x = np.zeros(3)
     for k in range(400):
         x = A @ x + B0 * (1 + 0.5 * k / rate) + B1 * (1 + 0.5 * (k + 1) / rate)
@@ -174,7 +174,7 @@ def test_who_looks_ahead_less_is_behind_by_as_much(seed, name):
 def test_a_copyist_makes_no_error_but_the_delay_that_was_planted(seed, name, samples):
     profile = draw_profile(name, seed)
     delay = samples / 50
-    record = virtual_trial(Copyist(delay, rate=50), Delay(0, rate=50), profile)
+    record = virtual_trial(DelayedCopy(delay, rate=50), Delay(0, rate=50), profile)
     found = measure(record)
     late = profile.at(np.arange(1251) / 50 - delay)
     wanted = np.sqrt(np.mean((late - profile.at(np.arange(1251) / 50)) ** 2))
@@ -184,7 +184,7 @@ def test_a_copyist_makes_no_error_but_the_delay_that_was_planted(seed, name, sam
 
 def test_an_operator_that_keeps_still_has_the_target_s_own_root_mean_square():
     profile = draw_profile("T2", 8)
-    still = Copyist(0.0, rate=50, gain=0.0, start=0.4)
+    still = DelayedCopy(0.0, rate=50, gain=0.0, start=0.4)
     found = measure(virtual_trial(still, Delay(0, rate=50), profile))
     y = profile.at(np.arange(1251) / 50)
     assert found.rmse == pytest.approx(np.sqrt(np.mean((y - 40) ** 2)))

@@ -17,7 +17,7 @@ from ikns.experiments.tracking import (
 from ikns.live.control.settings import ControlSettings
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
 from ikns.simulation.operator import (
-    Copyist,
+    DelayedCopy,
     Operator,
     Participant,
     draw_participant,
@@ -155,7 +155,9 @@ def test_a_delay_planted_in_the_limb_is_recovered_through_the_whole_chain(person
     found = []
     for delay in (0.0, 0.16):
         arm = loop(person, seconds=30.0)
-        found.append(measure(virtual_trial(Copyist(delay, rate=RATE), arm, profile)))
+        found.append(
+            measure(virtual_trial(DelayedCopy(delay, rate=RATE), arm, profile))
+        )
     assert found[1].lag - found[0].lag == pytest.approx(0.16, abs=0.02)
     # What the chain itself takes: its latency of 30 ms is two frames of 20 ms.
     assert found[0].lag == pytest.approx(0.04, abs=0.02)

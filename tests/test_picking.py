@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from ikns.errors import InvalidInput
 from ikns.experiments.picking import (
     OBJECT_IDS,
-    PickMachine,
     PickStep,
+    PickTrial,
     load_objects,
     pick_schedule,
 )
@@ -181,11 +181,11 @@ def test_the_paper_s_visit_is_the_default():
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"conditions": []}, "expected conditions that differ"),
-        ({"conditions": ["ikns", "ikns"]}, "expected conditions that differ"),
-        ({"conditions": "ikns"}, "expected conditions that differ, found 'ikns'"),
-        ({"objects": []}, "expected objects that differ"),
-        ({"objects": ["A", "A"]}, "expected objects that differ"),
+        ({"conditions": []}, "expected distinct conditions"),
+        ({"conditions": ["ikns", "ikns"]}, "expected distinct conditions"),
+        ({"conditions": "ikns"}, "expected distinct conditions, found 'ikns'"),
+        ({"objects": []}, "expected distinct objects"),
+        ({"objects": ["A", "A"]}, "expected distinct objects"),
         ({"objects": ["A", "K"]}, "found 'K'"),
         ({"repeats": 0}, "repeats from 1"),
         ({"training": -1}, "training from 0"),
@@ -221,10 +221,10 @@ commands = st.one_of(
 
 @given(zeros, st.floats(0, 19.9), st.sampled_from(["success", "dropped"]))
 def test_a_trial_that_is_stopped_took_the_time_from_start_to_stop(zero, t, outcome):
-    trial = PickMachine(STEP)
-    assert trial.check(zero - 5.0) == ("waiting", 0.0, 20.0)
+    trial = PickTrial(STEP)
+    assert trial.update(zero - 5.0) == ("waiting", 0.0, 20.0)
     trial.start(zero)
-    trial.check(zero + t / 2)
+    trial.update(zero + t / 2)
     assert trial.stop(zero + t, outcome).state == outcome
     # A clock of 1e9 s rounds to 1.2e-7 s, once at each end.
     assert trial.record.time == pytest.approx(t, abs=3e-7)
@@ -234,27 +234,27 @@ def test_a_trial_that_is_stopped_took_the_time_from_start_to_stop(zero, t, outco
 @given(zeros, st.floats(0.01, 1e4))
 def test_at_the_limit_exactly_the_time_is_over(zero, limit):
     step = PickStep("trial", "ring", "B", limit=limit)
-    trial = PickMachine(step)
+    trial = PickTrial(step)
     trial.start(zero)
     end = zero + limit
-    assert trial.check(math.nextafter(end, -math.inf)).state == "running" or (
+    assert trial.update(math.nextafter(end, -math.inf)).state == "running" or (
         math.nextafter(end, -math.inf) <= zero
     )
     assert trial.stop(end, "success").state == "timeout"
     assert trial.record.time == limit
-    assert trial.check(end + 1).left == 0.0
+    assert trial.update(end + 1).left == 0.0
 
 
 @given(zeros, st.lists(commands, max_size=12))
 def test_whatever_is_pressed_the_time_is_within_the_limit_and_an_end_is_an_end(
     zero, sequence
 ):
-    trial, now, ended = PickMachine(STEP), zero, None
+    trial, now, ended = PickTrial(STEP), zero, None
     for command, wait in sequence:
         now, before = now + wait, trial.state
         try:
             if command == "check":
-                trial.check(now)
+                trial.update(now)
             elif command == "start":
                 trial.start(now)
             elif command == "abort":
@@ -265,7 +265,7 @@ def test_whatever_is_pressed_the_time_is_within_the_limit_and_an_end_is_an_end(
             # Only a start too many and a stop too early are refused.
             assert (command == "start") == (before != "waiting")
             assert trial.state == before
-        view = trial.check(now)
+        view = trial.update(now)
         assert 0.0 <= view.time <= 20.0
         assert view.left == 20.0 - view.time
         if ended is not None:
@@ -278,30 +278,30 @@ def test_whatever_is_pressed_the_time_is_within_the_limit_and_an_end_is_an_end(
 
 
 def test_a_clock_that_goes_back_or_says_nothing_changes_nothing():
-    trial = PickMachine(STEP)
+    trial = PickTrial(STEP)
     trial.start(100.0)
-    assert trial.check(104.0).time == 4.0
-    assert trial.check(101.0).time == 4.0
-    assert trial.check(math.nan).time == 4.0
+    assert trial.update(104.0).time == 4.0
+    assert trial.update(101.0).time == 4.0
+    assert trial.update(math.nan).time == 4.0
     assert trial.stop(102.0, "success").time == 4.0
 
 
 def test_a_trial_that_never_started_has_no_time():
-    trial = PickMachine(STEP)
+    trial = PickTrial(STEP)
     trial.abort(3.0, "wrong object")
     assert (trial.record.outcome, trial.record.reason) == ("aborted", "wrong object")
     assert math.isnan(trial.record.time)
 
 
 def test_an_abort_after_the_limit_does_not_spoil_the_time_out():
-    trial = PickMachine(STEP)
+    trial = PickTrial(STEP)
     trial.start(0.0)
     trial.abort(25.0, "too late")
     assert (trial.record.outcome, trial.record.reason) == ("timeout", "")
 
 
 def test_a_comment_can_be_written_until_the_record_is_taken():
-    trial = PickMachine(STEP)
+    trial = PickTrial(STEP)
     trial.start(0.0)
     trial.stop(9.0, "dropped")
     trial.comment = "slipped from the finger's tip"
@@ -309,7 +309,7 @@ def test_a_comment_can_be_written_until_the_record_is_taken():
 
 
 def test_what_a_trial_cannot_do_is_refused():
-    trial = PickMachine(STEP)
+    trial = PickTrial(STEP)
     with pytest.raises(InvalidInput, match="found it waiting"):
         trial.stop(1.0, "success")
     with pytest.raises(InvalidInput, match="finite time"):
@@ -320,6 +320,6 @@ def test_what_a_trial_cannot_do_is_refused():
     with pytest.raises(InvalidInput, match="found 'timeout'"):
         trial.stop(1.0, "timeout")
     with pytest.raises(InvalidInput, match="found a rest"):
-        PickMachine(PickStep("rest"))
+        PickTrial(PickStep("rest"))
     with pytest.raises(InvalidInput, match="above 0 s"):
-        PickMachine(PickStep("trial", "ikns", "A", limit=0.0))
+        PickTrial(PickStep("trial", "ikns", "A", limit=0.0))

@@ -97,7 +97,7 @@ def test_a_drop_and_a_time_out_are_results_and_an_abort_is_not():
     assert visit.current.key == first
     visit.begin(10.0).stop(12.0, "dropped")
     assert visit.finish()
-    visit.begin(20.0).check(40.0)
+    visit.begin(20.0).update(40.0)
     assert visit.finish()
     outcomes = ["aborted", "dropped", "timeout"]
     assert [a.outcome for a in visit.attempts] == outcomes
@@ -108,7 +108,7 @@ def test_a_drop_and_a_time_out_are_results_and_an_abort_is_not():
 def test_a_trial_can_wait_for_the_participant_s_own_start():
     visit = PickVisit(STEPS)
     trial = visit.begin()
-    assert trial.check(50.0).state == "waiting"
+    assert trial.update(50.0).state == "waiting"
     assert not visit.finish()
     trial.start(51.0)
     trial.stop(55.5, "success")
@@ -170,7 +170,7 @@ def test_a_rest_that_was_cut_short_does_not_shorten_the_next(visit, attempt):
     now, rests = 0.0, []
     while visit.current is not None:
         if visit.current.kind != "rest":
-            visit.begin(now).check(now + 30.0)
+            visit.begin(now).update(now + 30.0)
             assert visit.finish()
             now += 30.0
         else:

@@ -14,10 +14,10 @@ from ikns.experiments.study import (
     Parameters,
     PickingDesign,
     TrackingDesign,
-    check_declared,
+    check_declaration,
     init_study,
-    keep_declared,
     read_study,
+    save_declaration,
     study_from_table,
 )
 from ikns.experiments.study.design import LAYOUTS
@@ -97,10 +97,10 @@ def test_an_example_replaces_nothing_unless_told_and_never_results(
         ({"cohort": {"participants": 0}}, "expected 1 to .* found 0"),
         ({"cohort": {"participants": True}}, "a whole number for participants"),
         ({"tracking": {"conditions": ["ikns"]}}, "two conditions to compare .* ikns"),
-        ({"tracking": {"conditions": ["ikns", "ikns"]}}, "conditions that differ"),
+        ({"tracking": {"conditions": ["ikns", "ikns"]}}, "distinct conditions"),
         ({"tracking": {"conditions": ["ikns", "mouse"]}}, "found 'mouse'"),
         ({"tracking": {"conditions": "ikns"}}, "a list of text for conditions"),
-        ({"tracking": {"profiles": []}}, "profiles that differ"),
+        ({"tracking": {"profiles": []}}, "distinct profiles"),
         ({"tracking": {"profiles": ["T4"]}}, "profiles of T1, T2, T3 .* 'T4'"),
         ({"tracking": {"repeats": 0}}, "found 0: no trial would be left"),
         ({"tracking": {"repeats": 1.5}}, "a whole number for repeats"),
@@ -272,18 +272,18 @@ def test_interpolation_changes_the_weights_and_not_the_points(
 
 def declare(folder: Path, **tables: dict | None) -> None:
     """Declare, and have a result, whichever it is."""
-    keep_declared(folder, study_from_table(changed(**tables)))
+    save_declaration(folder, study_from_table(changed(**tables)))
     about = {"experiment": "tracking", "participant": "01", "simulated": True}
     if not list_visits(folder):
         create_visit(folder / "visits" / "sub-01_tracking", about)
 
 
 def test_without_a_result_everything_may_change(tmp_path: Path) -> None:
-    keep_declared(tmp_path, study_from_table(SMALL))
-    keep_declared(tmp_path, study_from_table(changed(study={"seed": 1})))
+    save_declaration(tmp_path, study_from_table(SMALL))
+    save_declaration(tmp_path, study_from_table(changed(study={"seed": 1})))
     declare(tmp_path, study={"seed": 2})
     with pytest.raises(InvalidInput, match="seed = 2, found 1"):
-        check_declared(tmp_path, study_from_table(changed(study={"seed": 1})))
+        check_declaration(tmp_path, study_from_table(changed(study={"seed": 1})))
 
 
 @pytest.mark.parametrize(
@@ -299,7 +299,7 @@ def test_without_a_result_everything_may_change(tmp_path: Path) -> None:
 def test_more_of_the_same_may_be_added(tables: dict, tmp_path: Path) -> None:
     declare(tmp_path)
     declare(tmp_path, **tables)
-    check_declared(tmp_path, study_from_table(changed(**tables)))
+    check_declaration(tmp_path, study_from_table(changed(**tables)))
 
 
 @pytest.mark.parametrize(
@@ -330,17 +330,17 @@ def test_what_results_mean_may_not_change(
     }
     declare(tmp_path, **whole)
     with pytest.raises(InvalidInput, match=sentence):
-        check_declared(tmp_path, study_from_table(changed(**(whole | tables))))
+        check_declaration(tmp_path, study_from_table(changed(**(whole | tables))))
     with pytest.raises(InvalidInput, match=sentence):
-        keep_declared(tmp_path, study_from_table(changed(**(whole | tables))))
-    check_declared(tmp_path, study_from_table(changed(**whole)))
+        save_declaration(tmp_path, study_from_table(changed(**(whole | tables))))
+    check_declaration(tmp_path, study_from_table(changed(**whole)))
 
 
 def test_a_damaged_copy_of_the_declaration_is_named(tmp_path: Path) -> None:
     declare(tmp_path)
     (tmp_path / "visits" / "declared.json").write_text("{}")
     with pytest.raises(FileError, match=r"declared\.json: cannot be read"):
-        check_declared(tmp_path, study_from_table(SMALL))
+        check_declaration(tmp_path, study_from_table(SMALL))
 
 
 def test_a_declaration_is_plain(tmp_path: Path) -> None:

@@ -18,7 +18,12 @@ from scipy import stats
 
 from ikns.errors import FileError, InvalidInput
 from ikns.experiments.study import init_study
-from ikns.experiments.study.summary import RunningError, cells, digest_visit, summarize
+from ikns.experiments.study.summary import (
+    RunningError,
+    condition_means,
+    digest_visit,
+    summarize,
+)
 from ikns.experiments.study.summary.answers import picking_answer, tracking_answer
 from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_csv
 from ikns.experiments.tracking import (
@@ -30,7 +35,7 @@ from ikns.experiments.tracking import (
 )
 from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import tracking_row
-from ikns.simulation.operator import CONDITIONS, Copyist, Delay, sample_abilities
+from ikns.simulation.operator import CONDITIONS, Delay, DelayedCopy, sample_abilities
 from ikns.statistics import analyze_picking, analyze_tracking, equivalence, pair_trials
 
 BOTH = [(c, t) for c in ("ikns", "gamepad") for t in small.TRAJECTORIES]
@@ -56,7 +61,7 @@ def copied(study, who, operator, device):
 
 
 def test_a_perfect_operator_has_no_error_in_the_report(tmp_path):
-    copied(tmp_path, 1, Copyist(0, rate=50), Delay(0, rate=50))
+    copied(tmp_path, 1, DelayedCopy(0, rate=50), Delay(0, rate=50))
     found = group(tmp_path).tracking
     # 100 times the rounding of c, as without the disk between.
     assert found.table["rmse"][0] < 1e-12
@@ -64,7 +69,7 @@ def test_a_perfect_operator_has_no_error_in_the_report(tmp_path):
 
 
 def test_a_still_operator_has_the_target_s_own_spread_in_the_report(tmp_path):
-    still = Copyist(0, rate=50, gain=0.0, start=0.4)
+    still = DelayedCopy(0, rate=50, gain=0.0, start=0.4)
     _, profile = copied(tmp_path, 1, still, Delay(0, rate=50))
     y = profile.at(np.arange(round(50 * profile.seconds) + 1) / 50)
     expected = np.sqrt(np.var(y) + (np.mean(y) - 40) ** 2)
@@ -76,7 +81,7 @@ def test_a_still_operator_has_the_target_s_own_spread_in_the_report(tmp_path):
 
 @pytest.mark.parametrize("delay", [0.1, 0.26, 0.5])
 def test_a_planted_delay_comes_back_from_the_report_within_20_ms(tmp_path, delay):
-    copied(tmp_path, 1, Copyist(delay, rate=50), Delay(0, rate=50))
+    copied(tmp_path, 1, DelayedCopy(delay, rate=50), Delay(0, rate=50))
     found = group(tmp_path).tracking
     lag = cell(found.metrics["lag"], found.conditions[0]).over.mean
     assert abs(lag - delay) < 0.02
@@ -505,7 +510,7 @@ def test_cells_of_a_hand_made_table():
         "trajectory": np.array(["T1", "T2", "T1"]),
         "rmse": np.array([1.0, 5.0, 2.0]),
     }
-    found = cells(
+    found = condition_means(
         table, "rmse", level="trajectory", conditions=["x", "y"], levels=["T1", "T2"]
     )
     means = {(c.condition, c.level): c.over.mean for c in found}

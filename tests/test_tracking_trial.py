@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ikns.errors import InvalidInput
 from ikns.experiments.tracking import (
     Attempt,
-    TrialMachine,
+    TrackingTrial,
     Visit,
     draw_profile,
     schedule,
@@ -21,10 +21,10 @@ PROFILE = draw_profile("T2", 3)
 
 def played(c, *, rate=100.0, zero=0.0, trial=None):
     """Play a trial with c a function of the time in the profile."""
-    trial = trial or TrialMachine(PROFILE)
+    trial = trial or TrackingTrial(PROFILE)
     trial.start(zero)
     views = [
-        trial.frame(zero + k / rate, c(k / rate - 5.0))
+        trial.add_sample(zero + k / rate, c(k / rate - 5.0))
         for k in range(round(30 * rate) + 1)
     ]
     return trial, views
@@ -73,32 +73,32 @@ def test_neither_the_clock_s_zero_nor_its_rate_matters(zero, rate):
 
 
 def test_times_that_do_not_advance_are_not_written_down():
-    trial = TrialMachine(PROFILE)
+    trial = TrackingTrial(PROFILE)
     trial.start(10.0)
     for now in (10.0, 10.1, 10.1, 10.05, math.nan, 10.2):
-        trial.frame(now, 0.5)
+        trial.add_sample(now, 0.5)
     trial.abort(10.3, "enough")
     assert trial.record.time == pytest.approx([-5, -4.9, -4.8])
 
 
 def test_a_trial_ends_without_frames_too():
-    trial = TrialMachine(PROFILE)
+    trial = TrackingTrial(PROFILE)
     trial.start(0.0)
-    assert trial.check(29.9).state == "track"
-    assert trial.check(30.0).state == "done"
-    assert trial.frame(30.1, 0.5).state == "done"
+    assert trial.update(29.9).state == "track"
+    assert trial.update(30.0).state == "done"
+    assert trial.add_sample(30.1, 0.5).state == "done"
     assert len(trial.record.time) == 0
 
 
 def test_an_aborted_trial_keeps_what_it_has_and_why():
-    trial = TrialMachine(PROFILE)
+    trial = TrackingTrial(PROFILE)
     trial.start(0.0)
     for k in range(700):
-        trial.frame(k / 100, 0.5)
+        trial.add_sample(k / 100, 0.5)
     with pytest.raises(InvalidInput, match="track"):
         _ = trial.record
     trial.abort(7.0, "a marker fell off")
-    trial.frame(7.1, 0.5)
+    trial.add_sample(7.1, 0.5)
     record = trial.record
     assert (record.state, record.reason, len(record.c)) == (
         "aborted",
@@ -108,21 +108,21 @@ def test_an_aborted_trial_keeps_what_it_has_and_why():
 
 
 def test_an_abort_after_the_end_does_not_spoil_the_trial():
-    trial = TrialMachine(PROFILE)
+    trial = TrackingTrial(PROFILE)
     trial.start(0.0)
     trial.abort(30.5, "too late")
     assert trial.record.state == "done"
 
 
 def test_a_trial_starts_once_and_at_a_time():
-    trial = TrialMachine(PROFILE)
+    trial = TrackingTrial(PROFILE)
     with pytest.raises(InvalidInput):
         trial.start(math.nan)
     trial.start(0.0)
     with pytest.raises(InvalidInput):
         trial.start(1.0)
     with pytest.raises(InvalidInput):
-        TrialMachine(PROFILE, align=-1.0)
+        TrackingTrial(PROFILE, align=-1.0)
 
 
 # --- the visit ------------------------------------------------------------------------
@@ -132,7 +132,7 @@ STEPS = schedule(1, training=1, rest=60.0)
 
 def do_trial(visit, now=0.0):
     trial = visit.begin(now)
-    trial.frame(now + 30.0, 0.5)
+    trial.add_sample(now + 30.0, 0.5)
     assert visit.finish()
 
 
@@ -153,7 +153,7 @@ def test_a_visit_goes_through_all_steps_in_order():
 def test_an_aborted_trial_comes_again_and_both_attempts_are_kept():
     visit = Visit(STEPS)
     first = visit.current.key
-    visit.begin(0.0).frame(0.5, 0.2)
+    visit.begin(0.0).add_sample(0.5, 0.2)
     visit.abort(1.0, "cough")
     assert visit.current.key == first
     do_trial(visit)

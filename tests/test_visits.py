@@ -12,13 +12,13 @@ from hypothesis.extra.numpy import arrays
 from ikns.errors import FileError, InvalidInput
 from ikns.experiments.tracking import (
     Attempt,
-    Step,
     TrackingRecord,
+    TrackingStep,
     draw_profile,
 )
 from ikns.experiments.visits import (
     append_attempt,
-    counting,
+    counted_attempts,
     create_visit,
     list_visits,
     read_visit,
@@ -88,7 +88,7 @@ def test_the_same_rows_make_the_same_bytes() -> None:
 
 
 def test_a_recorded_trial_comes_back_as_it_was(visit: Path) -> None:
-    step = Step("trial", "ikns", "T2", seed=7, repeat=1, seconds=20.0)
+    step = TrackingStep("trial", "ikns", "T2", seed=7, repeat=1, seconds=20.0)
     profile = draw_profile("T2", 7, seconds=20.0)
     time = np.linspace(-5, 20, 2501)
     c = np.random.default_rng(0).normal(size=2501)
@@ -105,7 +105,7 @@ def test_a_recorded_trial_comes_back_as_it_was(visit: Path) -> None:
 
 
 def test_a_skipped_step_has_no_samples(visit: Path) -> None:
-    step = Step("trial", "ikns", "T1")
+    step = TrackingStep("trial", "ikns", "T1")
     attempt = Attempt(step.key, "skipped", "tired")
     append_attempt(visit, tracking_row(1, step, attempt, align=5.0, practised=0))
     (row,) = read_visit(visit).attempts
@@ -260,4 +260,4 @@ def test_the_last_final_attempt_at_each_step_counts() -> None:
         ("e", "aborted"),
     ]
     rows = [attempt_row(k, key, out) for k, (key, out) in enumerate(went, start=1)]
-    assert [row["number"] for row in counting(rows)] == [3, 5, 7]
+    assert [row["number"] for row in counted_attempts(rows)] == [3, 5, 7]

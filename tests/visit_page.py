@@ -42,8 +42,8 @@ class Page:
         while await asyncio.wait_for(self.link.read_message(), 30) is not None:
             pass
 
-    async def ask(self, name: str, text: str = "") -> None:
-        await self.link.write_message(json.dumps({"ask": name, "text": text}))
+    async def submit(self, name: str, text: str = "") -> None:
+        await self.link.write_message(json.dumps({"command": name, "text": text}))
 
     async def wait(
         self, what: Callable[[dict[str, Any]], bool], seconds: float = 60.0

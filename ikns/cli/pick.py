@@ -99,7 +99,7 @@ def pick(
     space on the participant's page. Every attempt is on disk when it ends; Ctrl-C
     breaks off, and the same command goes on.
     """
-    from ikns.experiments.conduct import Desk, PickingDesk
+    from ikns.experiments.conduct import Experiment, PickingExperiment
     from ikns.experiments.picking import OBJECT_IDS, pick_schedule
 
     identity = find_visit(
@@ -123,8 +123,8 @@ def pick(
     )
     steps = pick_schedule(identity.number, **design)
 
-    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Desk:
-        return PickingDesk(steps, rows)
+    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Experiment:
+        return PickingExperiment(steps, rows)
 
     conduct(
         identity,

@@ -111,7 +111,7 @@ def track(
     Two pages open: one for the participant, one for the experimenter. Every attempt is
     on disk when it ends; Ctrl-C breaks off, and the same command goes on.
     """
-    from ikns.experiments.conduct import Desk, TrackingDesk
+    from ikns.experiments.conduct import Experiment, TrackingExperiment
     from ikns.experiments.tracking import draw_profile, schedule
 
     identity = find_visit(
@@ -147,8 +147,8 @@ def track(
             f"{design['rest']:g}."
         )
 
-    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Desk:
-        return TrackingDesk(steps, rows, align=wait)
+    def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Experiment:
+        return TrackingExperiment(steps, rows, align=wait)
 
     conduct(
         identity,

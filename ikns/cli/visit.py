@@ -29,7 +29,7 @@ from ikns.cli.visit_identity import VisitIdentity
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.experiments.conduct import Conductor, Desk, Driver, HeldInput
+    from ikns.experiments.conduct import Conductor, Driver, Experiment, HeldInput
     from ikns.live.runtime import LoopStatus
 
 __all__ = ["conduct"]
@@ -47,7 +47,7 @@ def conduct(
     *,
     conditions: Sequence[str],
     about: Mapping[str, Any],
-    make_experiment: Callable[[Sequence[Mapping[str, Any]]], Desk],
+    make_experiment: Callable[[Sequence[Mapping[str, Any]]], Experiment],
     rest: float,
     seed: int,
     as_json: bool,
@@ -71,7 +71,7 @@ def conduct(
     as_json : bool
     """
     from ikns.experiments.cockpit import Cockpit
-    from ikns.experiments.conduct import Conductor, HeldInput, VisitBook, carry_out
+    from ikns.experiments.conduct import Conductor, HeldInput, VisitLog, run_visit
 
     subject, simulated = _checked(identity, arm, pages, conditions)
     session = arm.session or identity.folder / "session"
@@ -81,7 +81,7 @@ def conduct(
             # A source that does not answer is reported before anything is written.
             with open_arm_source(arm, subject):
                 ikns.warm_up()
-        log = VisitBook(
+        log = VisitLog(
             identity.folder,
             {
                 "participant": identity.participant,
@@ -98,9 +98,9 @@ def conduct(
             | dict(about),
         )
         if identity.study is not None:
-            from ikns.experiments.study import keep_declared
+            from ikns.experiments.study import save_declaration
 
-            keep_declared(identity.folder.parents[1], identity.study)
+            save_declaration(identity.folder.parents[1], identity.study)
         experiment: Any = make_experiment(
             log.attempts
         )  # tracking's has a trial to follow
@@ -108,7 +108,7 @@ def conduct(
         conductor = Conductor(
             experiment,
             log,
-            borne={*PAGE, "ring"},
+            page_conditions={*PAGE, "ring"},
             rest=rest,
             auto=_VIRTUAL_WAIT if virtual else None,
         )
@@ -151,7 +151,7 @@ def conduct(
             )
         )
         _announce(cockpit.url, cockpit.panel_url, browser=pages.browser)
-        carry_out(conductor, drivers, stop=stop, rate=pages.rate)
+        run_visit(conductor, drivers, stop=stop, rate=pages.rate)
     _show_attempts(identity, conductor, as_json=as_json)
 
 
@@ -235,12 +235,12 @@ def _show_attempts(
 ) -> None:
     from ikns.statistics.wording import counted
 
-    results, left = conductor.results, conductor.shown["left"]
+    results, left = conductor.results, conductor.shown["trials_left"]
     figures = "time" if identity.experiment == "picking" else "rmse"
     result = {
         "visit": identity.folder,
         "participant": identity.participant,
-        "simulated": conductor.book.simulated,
+        "simulated": conductor.log.simulated,
         "left": left,
         "stopped": conductor.emergency.is_set(),
         "attempts": results,
@@ -249,7 +249,7 @@ def _show_attempts(
     show(
         result,
         table(
-            f"{title} (simulated)" if conductor.book.simulated else title,
+            f"{title} (simulated)" if conductor.log.simulated else title,
             {
                 "": "d",
                 "step": "s",

@@ -81,10 +81,10 @@ def find_visit(
         )
     declared = None
     if study is not None:
-        from ikns.experiments.study import check_declared, read_study
+        from ikns.experiments.study import check_declaration, read_study
 
         declared = read_study(study)
-        check_declared(study, declared)
+        check_declaration(study, declared)
         if participant is None:
             raise InvalidInput("--study needs the --participant whose visit it is.")
         visit = study / "visits" / f"sub-{participant}_{experiment}"

@@ -1,1 +1,1 @@
-"""Experiments with a person in front of the cameras, step by step."""
+"""Experiments with people or virtual participants, from schedule to summary."""

@@ -1,4 +1,4 @@
-"""Where a subject is in a schedule: what counts as done, what is left, which rest."""
+"""Progress of a subject through a schedule: done, remaining, and the current rest."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ A = TypeVar("A", bound=_Attempt)
 
 
 class Progress(Generic[S, A]):
-    """Steps and the attempts at them, whatever is done in a step.
+    """Steps of a schedule and the attempts at them.
 
     Parameters
     ----------
     steps : sequence
-        Of a schedule, with ``kind`` ("rest" or another), ``key`` and ``seconds``.
+        With ``kind`` ("rest" or another), ``key`` and ``seconds``.
     attempts : iterable
-        Of a visit that was broken off, with ``key`` and ``outcome``, in order.
+        Of earlier runs of the visit, with ``key`` and ``outcome``, in order.
     final : collection of str
-        Outcomes after which a step does not come again.
+        Outcomes after which a step is not repeated.
 
     Attributes
     ----------
     attempts : list
-        Everything that was tried, in order; nothing is ever taken out.
+        All attempts in order; none is ever removed.
     """
 
     def __init__(
@@ -60,61 +60,63 @@ class Progress(Generic[S, A]):
             if step.kind == "rest" and any(s.key in self.ended for s in self.steps[i:])
         }
         known = {step.key for step in self.steps}
-        strangers = sorted({a.key for a in self.attempts} - known)
-        if strangers:
+        unknown = sorted({a.key for a in self.attempts} - known)
+        if unknown:
             raise InvalidInput(
-                f"expected attempts at steps of this schedule, found {strangers[0]}."
+                f"expected attempts at steps of this schedule, found {unknown[0]}."
             )
 
     @property
     def ended(self) -> dict[str, A]:
-        """Last attempt at each step that does not come again, by key."""
+        """Final attempt at each step that has one, by key."""
         last = {a.key: a for a in self.attempts}
         return {k: a for k, a in last.items() if a.outcome in self._final}
 
     @property
     def remaining(self) -> tuple[S, ...]:
         """Steps still to do, the current one first."""
-        return tuple(self.steps[i] for i in self._left())
+        return tuple(self.steps[i] for i in self._indices_left())
 
     @property
     def current(self) -> S | None:
-        """What is to be done now; None when all is."""
+        """Current step; None when all are done."""
         return self.remaining[0] if self.remaining else None
 
-    def to_begin(self, *, going_on: bool) -> S:
-        """Step whose trial may begin.
+    def next_trial(self, *, running: bool) -> S:
+        """Return the step whose trial can begin.
 
         Raises
         ------
         InvalidInput
-            When one goes on, a rest is due, or nothing is left.
+            When a trial is running, a rest is due, or nothing is left.
         """
         step = self.current
-        if going_on or step is None or step.kind == "rest":
-            found = "one that goes on" if going_on else "none"
-            found = "a rest" if step is not None and step.kind == "rest" else found
-            raise InvalidInput(f"expected a trial to begin, found {found}.")
+        if step is None:
+            raise InvalidInput("expected a trial to begin, found none left.")
+        if step.kind == "rest":
+            raise InvalidInput("expected a trial to begin, found a rest.")
+        if running:
+            raise InvalidInput("a trial is already running.")
         return step
 
-    def to_repeat(self, *, going_on: bool) -> str:
-        """Key of the last step that was finished or skipped.
+    def key_to_repeat(self, *, running: bool) -> str:
+        """Return the key of the last step that was finished or skipped.
 
         Raises
         ------
         InvalidInput
-            While a trial goes on, or when none was finished.
+            While a trial is running, or when none was finished.
         """
-        if going_on:
-            raise InvalidInput("expected no trial going on, found one: abort it.")
+        if running:
+            raise InvalidInput("a trial is running; abort it to repeat an earlier one.")
         ended = self.ended
         for attempt in reversed(self.attempts):
             if attempt.key in ended:
                 return attempt.key
-        raise InvalidInput("expected a step that was done to repeat, found none.")
+        raise InvalidInput("expected a finished step to repeat, found none.")
 
     def rest(self, now: float) -> float:
-        """Time left of the rest that is due, s; 0 when none is, or it is over."""
+        """Return the time left of the current rest, s; 0 without one or at its end."""
         step = self.current
         if step is None or step.kind != "rest":
             return 0.0
@@ -126,15 +128,15 @@ class Progress(Generic[S, A]):
         return max(0.0, left)
 
     def end_rest(self) -> bool:
-        """Let the rest that is due be over; say whether one was."""
+        """End the current rest; say whether there was one."""
         step = self.current
         if step is None or step.kind != "rest":
             return False
         self._rest_end = None
-        self._rested.add(self._left()[0])
+        self._rested.add(self._indices_left()[0])
         return True
 
-    def _left(self) -> list[int]:
+    def _indices_left(self) -> list[int]:
         ended, rested = self.ended, self._rested
         return [
             i

@@ -1,10 +1,10 @@
-"""The participant's screen and the experimenter's panel, as web pages served here.
+"""The participant's page and the experimenter's panel, served by a local web server.
 
-`gate` says who may come in, `link` talks with a page, `server` runs both in a thread of
-its own. The pages are the files beside: no build step, nothing from the network.
+`handlers` answers requests, `page_socket` talks with one connected page, `server` runs
+both in a thread of its own. The pages are plain files in this folder: no build step,
+and nothing is loaded from the network.
 """
 
-from ikns.experiments.cockpit.gate import Gate
 from ikns.experiments.cockpit.server import Cockpit, check_port
 
-__all__ = ["Cockpit", "Gate", "check_port"]
+__all__ = ["Cockpit", "check_port"]

@@ -1,4 +1,4 @@
-"""Doors of the cockpit: every request passes the gate, and pages load nothing else."""
+"""Request handlers of the cockpit: access is checked, and pages load nothing else."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from tornado.websocket import WebSocketHandler
 
 from ikns.experiments.cockpit.hub import Hub
 
-__all__ = ["FILES", "GuardedSocket", "Page"]
+__all__ = ["FILES", "CheckedSocket", "PageHandler"]
 
-#: What is served, and as what.
+#: Path, file and content type of everything that is served.
 FILES = {
     "/": ("participant.html", "text/html"),
     "/panel": ("panel.html", "text/html"),
@@ -25,7 +25,7 @@ FILES = {
 }
 
 
-class _Guarded(RequestHandler):
+class _CheckedHandler(RequestHandler):
     def initialize(self, cockpit: Hub) -> None:
         self.cockpit = cockpit
 
@@ -42,15 +42,11 @@ class _Guarded(RequestHandler):
             self.set_header(name, value)
 
     def prepare(self) -> None:
-        gate = self.cockpit.gate
-        if not gate.knows_host(self.request.headers.get("Host")):
+        access = self.cockpit.access
+        if not access.accepts_host(self.request.headers.get("Host")):
             self._refuse("this address does not belong to a cockpit")
-        elif not self._has_token():
+        elif not access.accepts_token(self.get_cookie(access.cookie)):
             self._refuse("open the address that the command printed")
-
-    def _has_token(self) -> bool:
-        gate = self.cockpit.gate
-        return gate.knows_token(self.get_cookie(gate.cookie))
 
     def _refuse(self, reason: str) -> None:
         self.set_status(403)
@@ -58,22 +54,22 @@ class _Guarded(RequestHandler):
         self.finish(f"Refused: {reason}.\n")
 
 
-class Page(_Guarded):
-    """A file of the cockpit."""
+class PageHandler(_CheckedHandler):
+    """Serves the files of the cockpit."""
 
     def prepare(self) -> None:
-        """Exchange a token in the address for a cookie, or pass the gate."""
-        gate, told = self.cockpit.gate, self.get_query_argument("token", None)
-        known = gate.knows_host(self.request.headers.get("Host"))
-        if known and gate.token and told is not None and gate.knows_token(told):
-            self.set_cookie(gate.cookie, gate.token, httponly=True, samesite="Lax")
-            # The token leaves the address bar, and so history and pictures.
+        """Exchange a token in the address for a cookie, or check access."""
+        access, token = self.cockpit.access, self.get_query_argument("token", None)
+        known = access.accepts_host(self.request.headers.get("Host"))
+        if known and access.token and token is not None and access.accepts_token(token):
+            self.set_cookie(access.cookie, access.token, httponly=True, samesite="Lax")
+            # The token leaves the address bar, and with it history and screenshots.
             self.redirect(self.request.path)
             return
         super().prepare()
 
     def get(self) -> None:
-        """Send it."""
+        """Send a file."""
         name, kind = FILES[self.request.path]
         view = urlsplit(str(self.cockpit.about["view"]))
         frames = f"{view.scheme}://{view.netloc}" if view.netloc else "'none'"
@@ -87,19 +83,19 @@ class Page(_Guarded):
         self.finish(files("ikns.experiments.cockpit").joinpath(name).read_bytes())
 
 
-class GuardedSocket(_Guarded, WebSocketHandler):
-    """A web socket that only our own pages may open."""
+class CheckedSocket(_CheckedHandler, WebSocketHandler):
+    """A web socket that only the cockpit's own pages may open."""
 
     def prepare(self) -> None:
-        """Pass the gate; whoever does not say that it is our own page may not.
+        """Check origin and access; a request without an origin is refused.
 
-        Tornado asks for the origin in some cases only, which differ by version.
+        Tornado checks the origin in some cases only, which differ by version.
         """
         if self.check_origin(self.request.headers.get("Origin")):
             super().prepare()
         else:
-            self._refuse("only the cockpit's own pages talk with it")
+            self._refuse("only the cockpit's own pages may connect")
 
     def check_origin(self, origin: str | None) -> bool:
         """Whether a script of our own page asks."""
-        return self.cockpit.gate.same_origin(origin, self.request.headers.get("Host"))
+        return self.cockpit.access.same_origin(origin, self.request.headers.get("Host"))

@@ -1,26 +1,26 @@
-"""What the handlers of a page need of the server; neither has to import the other."""
+"""Interfaces between server and handlers, so that neither imports the other."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, Literal, Protocol
 
-from ikns.experiments.cockpit.gate import Gate
 from ikns.experiments.conduct import Conductor
+from ikns.web_access import WebAccess
 
-__all__ = ["Hub", "PageLink", "Role"]
+__all__ = ["ConnectedPage", "Hub", "Role"]
 
-#: The first participant's page drives, others look on.
+#: The first participant's page is in control; further ones only watch.
 Role = Literal["participant", "viewer", "panel"]
 
 
-class PageLink(Protocol):
+class ConnectedPage(Protocol):
     """A connected page, as the server sees it."""
 
     role: Role
 
     def hello(self) -> None:
-        """Tell the page its role and what it is connected to."""
+        """Send the page its role and what it is connected to."""
 
     def push(self) -> None:
         """Send the newest state."""
@@ -32,18 +32,18 @@ class PageLink(Protocol):
 class Hub(Protocol):
     """The server, as its handlers see it."""
 
-    gate: Gate
+    access: WebAccess
     about: Mapping[str, Any]
     conductor: Conductor
 
-    def join(self, link: PageLink) -> None:
+    def join(self, page: ConnectedPage) -> None:
         """Add a page."""
 
-    def leave(self, link: PageLink) -> None:
-        """Remove a page; if it was driving, the next one drives."""
+    def leave(self, page: ConnectedPage) -> None:
+        """Remove a page; if it was in control, the next one is."""
 
-    def steer(self, by: str, now: float, c: float, round_trip: float) -> None:
-        """Take a control signal of the page that drives."""
+    def steer(self, condition: str, now: float, c: float, round_trip: float) -> None:
+        """Take a control signal from the page in control."""
 
     def press(self) -> None:
         """Take a press of the ring button."""

@@ -1,20 +1,19 @@
-// The web socket: newest frames come in, what is pressed goes out.
+// The web socket: newest states come in, commands and signals go out.
 
 export const find = (id) => document.getElementById(id);
 
-// Calls take[kind](message) for each message; returns what sends one.
-export function connect(role, take) {
+// Calls handlers[kind](message) for each message; returns a function that sends one.
+export function connect(role, handlers) {
   let socket = null;
   const open = () => {
     socket = new WebSocket(`ws://${location.host}/link?role=${role}`);
     socket.onopen = () => { find("lost").hidden = true; };
     socket.onmessage = (event) => {
       const message = JSON.parse(event.data);
-      take[message.kind]?.(message);
+      handlers[message.kind]?.(message);
     };
     socket.onclose = () => {
       find("lost").hidden = false;
-      take.closed?.();
       setTimeout(open, 1000);
     };
   };
@@ -24,7 +23,7 @@ export function connect(role, take) {
   };
 }
 
-// Text only where it changed: a page that is not touched costs nothing.
+// Write text only where it changed: unchanged elements are not drawn again.
 export function write(id, text) {
   const element = find(id);
   if (element.textContent !== text) element.textContent = text;

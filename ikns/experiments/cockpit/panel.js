@@ -59,7 +59,7 @@ function showSteps(list) {
 }
 
 function showPlace() {
-  const place = shown.at === null ? "" : String(shown.at);
+  const place = shown.step_index === null ? "" : String(shown.step_index);
   if (steps === place) return;
   steps = place;
   for (const element of find("steps").children) {
@@ -72,21 +72,21 @@ function showPlace() {
 const number = (value, digits, unit = "") => (known(value) ? `${value.toFixed(digits)}${unit}` : "\u2013");
 
 function facts() {
-  const drive = shown.drive, rows = [["c", number(shown.c, 3), known(shown.c) ? "" : "bad"]];
-  if (drive.kind === "page") {
-    rows.push(["Participant's page", shown.page ? "there" : "none", shown.page ? "good" : "bad"]);
-    rows.push(["Screen to answer, p99", number(known(drive.round_trip) ? 1000 * drive.round_trip : null, 0, " ms")]);
+  const source = shown.source, rows = [["c", number(shown.c, 3), known(shown.c) ? "" : "bad"]];
+  if (source.kind === "page") {
+    rows.push(["Participant's page", shown.page_connected ? "connected" : "none", shown.page_connected ? "good" : "bad"]);
+    rows.push(["Screen to answer, p99", number(known(source.round_trip) ? 1000 * source.round_trip : null, 0, " ms")]);
   }
-  if (known(drive.state)) rows.push(["Safety", drive.state, drive.state === "active" ? "good" : drive.state === "safe" ? "bad" : ""]);
-  if (known(drive.finger)) rows.push(["Finger", drive.finger, drive.finger.startsWith("safe") ? "bad" : ""]);
-  if ("flexion" in drive) rows.push(["Flexion asked", number(drive.flexion, 2)], ["Flexion measured", number(drive.measured, 2)]);
-  if ("rate" in drive) rows.push(["Frames", number(drive.rate, 0, " /s")]);
-  if ("latency" in drive) rows.push(["Receipt to command, p99", number(known(drive.latency) ? 1000 * drive.latency : null, 2, " ms")]);
-  if ("misses" in drive) rows.push(["Late frames", String(drive.misses), drive.misses ? "" : "good"]);
-  if (known(drive.refused)) rows.push(["Pose", drive.refused || "counts", drive.refused ? "bad" : ""]);
-  if ("residual" in drive) rows.push(["Residual", number(known(drive.residual) ? 1000 * drive.residual : null, 1, " mm")]);
-  if ("worst_residual" in drive) rows.push(["Farthest marker", number(known(drive.worst_residual) ? 1000 * drive.worst_residual : null, 0, " mm")]);
-  if ("inside" in drive) rows.push(["Hand", drive.inside ? "inside the points" : "outside the points", drive.inside ? "" : "bad"]);
+  if (known(source.state)) rows.push(["Safety", source.state, source.state === "active" ? "good" : source.state === "safe" ? "bad" : ""]);
+  if (known(source.finger)) rows.push(["Finger", source.finger, source.finger.startsWith("safe") ? "bad" : ""]);
+  if ("flexion" in source) rows.push(["Flexion commanded", number(source.flexion, 2)], ["Flexion measured", number(source.measured, 2)]);
+  if ("rate" in source) rows.push(["Frames", number(source.rate, 0, " /s")]);
+  if ("latency" in source) rows.push(["Receipt to command, p99", number(known(source.latency) ? 1000 * source.latency : null, 2, " ms")]);
+  if ("misses" in source) rows.push(["Late frames", String(source.misses), source.misses ? "" : "good"]);
+  if (known(source.refused)) rows.push(["Pose", source.refused || "counts", source.refused ? "bad" : ""]);
+  if ("residual" in source) rows.push(["Residual", number(known(source.residual) ? 1000 * source.residual : null, 1, " mm")]);
+  if ("worst_residual" in source) rows.push(["Farthest marker", number(known(source.worst_residual) ? 1000 * source.worst_residual : null, 0, " mm")]);
+  if ("inside" in source) rows.push(["Hand", source.inside ? "inside the points" : "outside the points", source.inside ? "" : "bad"]);
   return rows;
 }
 
@@ -95,11 +95,11 @@ function showFacts() {
   if (list.dataset.text === text) return;
   list.dataset.text = text;
   list.replaceChildren(...rows.flatMap(([name, value, kind]) => {
-    const term = document.createElement("dt"), told = document.createElement("dd");
+    const term = document.createElement("dt"), entry = document.createElement("dd");
     term.textContent = name;
-    told.textContent = value;
-    told.className = kind ?? "";
-    return [term, told];
+    entry.textContent = value;
+    entry.className = kind ?? "";
+    return [term, entry];
   }));
 }
 
@@ -133,11 +133,11 @@ function allow(id, yes) {
 }
 
 function showControls() {
-  const { state } = shown, going = ["align", "track", "ready", "running", "judge"].includes(state);
-  const ready = state === "waiting", idle = !going && state !== "stopped";
+  const { state } = shown, running = ["align", "track", "ready", "running", "judge"].includes(state);
+  const ready = state === "waiting", idle = !running && state !== "stopped";
   allow("begin", ready);
-  allow("abort", going);
-  allow("skip", going || ready || state === "rest");
+  allow("abort", running);
+  allow("skip", running || ready || state === "rest");
   allow("repeat", idle && shown.attempts.length > 0);
   allow("rest", ready);
   allow("pause", idle && state !== "finished");
@@ -145,7 +145,7 @@ function showControls() {
   allow("success", state === "running" || state === "judge");
   allow("dropped", state === "running" || state === "judge");
   write("toggle", state === "ready" ? "Start the clock" : "Stop the clock");
-  write("pause", state === "paused" ? "Go on" : "Pause");
+  write("pause", state === "paused" ? "Continue" : "Pause");
   find("connect").hidden = !shown.can_connect;
   write("end", state === "stopped" ? "Acknowledge and end the run" : "End the run");
 }
@@ -156,10 +156,10 @@ function frame() {
     write("state", STATES[state] ?? state);
     const words = step === null || step.kind === "rest" ? "" : `${step.condition} \u00b7 ${step.kind} \u00b7 ${step.what}${step.name ? ` ${step.name}` : ` \u00b7 ${step.repeat}`}`;
     write("what", words);
-    const left = state === "align" || state === "rest" ? shown.countdown : trial.left;
+    const left = state === "align" || state === "rest" ? shown.countdown : trial.time_left;
     write("clock", known(left) ? `${left.toFixed(1)} s` : "");
-    write("place", `${shown.trials - shown.left} of ${shown.trials} done`);
-    const pages = shown.page ? "Participant's page is open" : shown.borne ? `Open ${location.origin}/ for the participant` : "";
+    write("place", `${shown.trials - shown.trials_left} of ${shown.trials} done`);
+    const pages = shown.page_connected ? "Participant's page is open" : shown.page_condition ? `Open ${location.origin}/ for the participant` : "";
     write("page", pages);
     write("message", shown.fault || shown.message);
     find("message").classList.toggle("fault", Boolean(shown.fault) || state === "stopped");
@@ -175,24 +175,24 @@ function frame() {
   requestAnimationFrame(frame);
 }
 
-function ask(name) {
+function submit(name) {
   const text = find("text");
-  send({ ask: name, text: text.value });
+  send({ command: name, text: text.value });
   if (["abort", "skip", "repeat", "success", "dropped", "comment"].includes(name)) text.value = "";
 }
 
-find("emergency").addEventListener("click", () => send({ ask: "emergency" }));
-for (const button of document.querySelectorAll("[data-ask]"))
+find("emergency").addEventListener("click", () => send({ command: "emergency" }));
+for (const button of document.querySelectorAll("[data-command]"))
   button.addEventListener("click", () => {
-    ask(button.dataset.ask);
+    submit(button.dataset.command);
     button.blur();
   });
 window.addEventListener("keydown", (event) => {
-  if (event.code === "Escape") send({ ask: "emergency" });
+  if (event.code === "Escape") send({ command: "emergency" });
   if (event.target === find("text") || event.repeat) return;
   if (event.code === "Space" && hello.experiment === "picking") {
     event.preventDefault();
-    send({ ask: "toggle" });
+    send({ command: "toggle" });
   }
 });
 requestAnimationFrame(frame);

@@ -8,12 +8,12 @@ const HINTS = {
   gamepad: "Push the stick up",
   ikns: "Lift and lower the elbow, the hand stays",
   ring: "Press the button to close, again to open",
-  virtual: "A virtual operator is at work",
+  virtual: "A virtual operator is in control",
 };
 
 let hello = { role: "viewer", stick: "left", experiment: "tracking" }, shown = null;
 const plot = new Plot(find("plot"), { big: true });
-// Hands are looked at as often as a screen draws, also where it draws more slowly.
+// Input is read 60 times per second, even where the screen draws more slowly.
 const EVERY = 1000 / 60;
 const send = connect("participant", {
   hello(message) {
@@ -26,25 +26,25 @@ const send = connect("participant", {
   curve(message) { plot.begin(message); },
   now(message) { shown = message; },
 });
-const mine = () => hello.role === "participant" && shown !== null;
+const inControl = () => hello.role === "participant" && shown !== null;
 const hands = new Hands(plot, {
-  onBegin: () => mine() && send({ ask: hello.experiment === "picking" ? "toggle" : "begin" }),
+  onBegin: () => inControl() && send({ command: hello.experiment === "picking" ? "toggle" : "begin" }),
   onPress: () => {
-    if (!mine()) return;
-    if (shown.condition === "ring") send({ ask: "press" });
-    else if (hello.experiment === "tracking") send({ ask: "begin" });
+    if (!inControl()) return;
+    if (shown.condition === "ring") send({ command: "press" });
+    else if (hello.experiment === "tracking") send({ command: "begin" });
   },
-  onStop: () => send({ ask: "emergency" }),
+  onStop: () => send({ command: "emergency" }),
 });
 
 const seconds = (value) => (value >= 60 ? `${Math.floor(value / 60)}:${String(Math.ceil(value) % 60).padStart(2, "0")}` : String(Math.ceil(value)));
 
 function hint() {
-  if (hello.role !== "participant") return "Another page is in control; this one only looks on";
+  if (hello.role !== "participant") return "Another page is in control; this one only watches";
   const trigger = shown.condition === "gamepad" && hello.stick === "trigger";
   const words = trigger ? "Press the right trigger" : HINTS[shown.condition] ?? "";
   const key = { keyboard: "the space bar", mouse: "the space bar", gamepad: "the first button or the space bar" }[shown.condition];
-  return shown.state === "waiting" && shown.borne && key ? `${words}. Begin with ${key}.` : words;
+  return shown.state === "waiting" && shown.page_condition && key ? `${words}. Begin with ${key}.` : words;
 }
 
 function showTrial() {
@@ -57,16 +57,16 @@ function showTrial() {
   const rest = state === "rest", there = step !== null && step.kind !== "rest";
   write("code", there ? `Object ${step.what}` : "");
   write("name", there ? step.name : "");
-  const running = known(trial.left);
-  write("left", rest ? seconds(shown.countdown) : running ? seconds(trial.left) : "");
+  const running = known(trial.time_left);
+  write("left", rest ? seconds(shown.countdown) : running ? seconds(trial.time_left) : "");
   find("bar").hidden = !running;
-  if (running) find("bar").firstElementChild.style.width = `${(100 * trial.left) / trial.limit}%`;
+  if (running) find("bar").firstElementChild.style.width = `${(100 * trial.time_left) / trial.limit}%`;
 }
 
 function steer() {
   if (shown === null) return;
   const c = hands.c(shown.condition);
-  if (hello.role === "participant" && shown.borne) send({ by: shown.condition, c, n: shown.n });
+  if (hello.role === "participant" && shown.page_condition) send({ condition: shown.condition, c, n: shown.n });
   else send({ n: shown.n });
 }
 
@@ -74,10 +74,10 @@ function frame() {
   if (shown !== null) {
     document.body.classList.toggle("stopped", shown.state === "stopped");
     write("prompt", shown.prompt);
-    const left = shown.trials - shown.left, training = shown.step?.kind === "training";
-    write("place", shown.left ? `${training ? "Training, " : ""}${left + 1} of ${shown.trials}` : "");
+    const done = shown.trials - shown.trials_left, training = shown.step?.kind === "training";
+    write("place", shown.trials_left ? `${training ? "Training, " : ""}${done + 1} of ${shown.trials}` : "");
     write("hint", hint());
-    write("input", shown.borne && !known(shown.c) && hello.role === "participant" ? noInput() : "");
+    write("input", shown.page_condition && !known(shown.c) && hello.role === "participant" ? noInput() : "");
     showTrial();
   }
   requestAnimationFrame(frame);

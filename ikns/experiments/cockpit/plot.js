@@ -1,10 +1,10 @@
-// The whole profile, the pointer on its way across, and the trail behind it.
+// The whole profile, the pointer that crosses it, and the pointer's trail.
 import { known } from "/link.js";
 
 const INK = "#1d2430", SOFT = "#8a93a0", LINE = "#e4e7eb", RED = "#d02f1c";
 
-// Three canvases on top of each other, so that a frame costs little on any machine: the
-// lower two, grid with curve and trail, are drawn once and only added to.
+// Three canvases on top of each other, so that a frame is cheap on any machine: the grid
+// with the curve is drawn once, and the trail is only extended.
 export class Plot {
   constructor(holder, { big = false } = {}) {
     this.holder = holder;
@@ -28,7 +28,7 @@ export class Plot {
     this.size = "";
   }
 
-  // Where a height of 0 to 100 is, and what a place on the screen comes to.
+  // The plot area in pixels.
   box() {
     const { width, height } = this.holder.getBoundingClientRect();
     const side = this.big ? 0.06 * width : 34, end = this.big ? 26 : 14;
@@ -42,23 +42,23 @@ export class Plot {
 
   // state: of the visit; trial: of the snapshot; c: the control signal.
   draw({ state, trial, c }) {
-    const going = state === "align" || state === "track", box = this.box();
+    const running = state === "align" || state === "track", box = this.box();
     this.X = (share) => box.left + share * (box.right - box.left);
     this.Y = (value) => box.bottom - (value / 100) * (box.bottom - box.top);
-    this.fit(box, going);
+    this.fit(box, running);
     const [, trail, pointer] = this.pens;
     if (state === "track" && known(trial.y)) {
       const newest = this.trail[this.trail.length - 1];
       if (!newest || trial.x > newest[0]) this.trail.push([trial.x, trial.y]);
     }
-    if (going && this.trail.length > this.drawn + 1) {
+    if (running && this.trail.length > this.drawn + 1) {
       this.stroke(trail, this.trail.slice(this.drawn).map(([x, y]) => [this.X(x), this.Y(y)]), RED);
       this.drawn = this.trail.length - 1;
     }
     if (this.dot) pointer.clearRect(this.dot[0] - 20, this.dot[1] - 20, 40, 40);
-    // Between trials the pointer waits at the left and shows that it hears.
-    const y = going && known(trial.y) ? trial.y : known(c) ? 100 * Math.min(1, Math.max(0, c)) : null;
-    this.dot = y === null ? null : [this.X(going ? trial.x : 0), this.Y(y)];
+    // Between trials the pointer waits at the left and follows the signal.
+    const y = running && known(trial.y) ? trial.y : known(c) ? 100 * Math.min(1, Math.max(0, c)) : null;
+    this.dot = y === null ? null : [this.X(running ? trial.x : 0), this.Y(y)];
     if (this.dot) {
       pointer.beginPath();
       pointer.arc(...this.dot, this.big ? 13 : 6, 0, 2 * Math.PI);
@@ -70,10 +70,10 @@ export class Plot {
     }
   }
 
-  // Draw the grid anew where the size, the curve or the state has changed.
-  fit(box, going) {
+  // Redraw the grid if the size, the curve or the state has changed.
+  fit(box, running) {
     const ratio = window.devicePixelRatio || 1;
-    const size = `${box.width} ${box.height} ${ratio} ${going}`;
+    const size = `${box.width} ${box.height} ${ratio} ${running}`;
     if (size === this.size) return;
     this.size = size;
     this.drawn = 0;
@@ -93,7 +93,7 @@ export class Plot {
       this.stroke(grid, [[this.X(0), this.Y(value)], [this.X(1), this.Y(value)]], LINE, 1);
       grid.fillText(String(value), this.X(0) - (this.big ? 14 : 7), this.Y(value));
     }
-    if (this.curve && going) {
+    if (this.curve && running) {
       const heights = this.curve.heights, last = heights.length - 1;
       this.stroke(grid, heights.map((value, k) => [this.X(k / last), this.Y(value)]), INK);
     }

@@ -1,4 +1,4 @@
-"""The cockpit's server: its own thread and loop, on this machine alone by default."""
+"""The cockpit's web server, in its own thread; by default for this machine only."""
 
 from __future__ import annotations
 
@@ -7,44 +7,43 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
-from types import TracebackType
 from typing import Any, Self
 
 from ikns.errors import FileError
-from ikns.experiments.cockpit.gate import Gate
-from ikns.experiments.cockpit.hub import PageLink
+from ikns.experiments.cockpit.hub import ConnectedPage
 from ikns.experiments.conduct import Command, Conductor, HeldInput
+from ikns.web_access import WebAccess
 
 __all__ = ["Cockpit", "check_port"]
 
 _LOOPBACK = "127.0.0.1"
-#: How often pages get what is newest, 1/s.
-_PUSHED = 60.0
+#: How often pages get the newest state, 1/s.
+_PUSH_RATE = 60.0
 #: Longest message of a page, bytes.
-_MESSAGE = 4096
-#: A page that does not answer this long has gone, s.
-_PING = 5.0
+_MAX_MESSAGE = 4096
+#: Keep-alive: a page that does not answer a ping within this time is gone, s.
+_PING_TIMEOUT = 5.0
 
 
 class Cockpit:
     """Serve the participant's screen and the experimenter's panel of a visit.
 
     Use it as a context manager; leaving it stops the server. The first participant's
-    page drives; others look on, until it leaves.
+    page is in control; further ones only watch, until it closes.
 
     Parameters
     ----------
     conductor : Conductor
     held : mapping of str to HeldInput
-        What a page can drive: ``gamepad``, ``keyboard``, ``mouse``.
+        Conditions whose signal a page sends: ``gamepad``, ``keyboard``, ``mouse``.
     on_press : callable, optional
-        Called when the participant's page hears the ring button.
+        Called when the ring button is pressed on the participant's page.
     host : str
-        Any other address than a loopback one needs the token that :attr:`url` holds.
+        Address to listen on. Any but a loopback address needs the token in :attr:`url`.
     port : int
         0 takes a free one.
     about : mapping
-        What the pages say: ``participant``, ``simulated``, ``stick`` ("left" or
+        What the pages show: ``participant``, ``simulated``, ``stick`` ("left" or
         "trigger"), ``view`` (address of the 3-D view) and so on.
 
     Raises
@@ -65,16 +64,16 @@ class Cockpit:
     ) -> None:
         self.conductor, self._held, self._on_press = conductor, dict(held), on_press
         self.about: Mapping[str, Any] = {
-            "experiment": conductor.desk.experiment,
+            "experiment": conductor.experiment.name,
             "participant": "",
             "simulated": False,
             "stick": "left",
             "view": "",
         } | dict(about or {})
-        self._links: list[PageLink] = []
+        self._pages: list[ConnectedPage] = []
         host = _LOOPBACK if host == "localhost" else host
         self._socket = _listening(host, port)
-        self.gate = Gate.at(host, self._socket.getsockname()[1])
+        self.access = WebAccess.at(host, self._socket.getsockname()[1])
         self._loop = asyncio.new_event_loop()
         self._closing = asyncio.Event()
         self._thread = threading.Thread(
@@ -93,11 +92,11 @@ class Cockpit:
         return self._address("/panel")
 
     def _address(self, path: str) -> str:
-        gate = self.gate
-        host = socket.gethostname() if gate.host in ("0.0.0.0", "::") else gate.host
+        access = self.access
+        host = socket.gethostname() if access.host in ("0.0.0.0", "::") else access.host
         host = f"[{host}]" if ":" in host else host
-        token = f"?token={gate.token}" if gate.token else ""
-        return f"http://{host}:{gate.port}{path}{token}"
+        token = f"?token={access.token}" if access.token else ""
+        return f"http://{host}:{access.port}{path}{token}"
 
     def close(self) -> None:
         """Stop the server; calling it again does nothing."""
@@ -109,51 +108,46 @@ class Cockpit:
         """Return itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Stop the server."""
         self.close()
 
-    # --- from here on in the server's thread ----------------------------------------
+    # --- called in the server's thread ----------------------------------------------
 
-    def join(self, link: PageLink) -> None:
-        """Let a page in."""
-        self._links.append(link)
+    def join(self, page: ConnectedPage) -> None:
+        """Add a page."""
+        self._pages.append(page)
         self._choose()
-        if link.role != "participant":
-            link.hello()
+        if page.role != "participant":
+            page.hello()
 
-    def leave(self, link: PageLink) -> None:
-        """Let a page go; if it was driving, the one that came next drives."""
-        if link not in self._links:
+    def leave(self, page: ConnectedPage) -> None:
+        """Remove a page; if it was in control, the next one is."""
+        if page not in self._pages:
             return
-        self._links.remove(link)
-        if link.role == "participant":
+        self._pages.remove(page)
+        if page.role == "participant":
             for held in self._held.values():
-                held.lose()
-            self.conductor.ask(Command("left"))
+                held.clear()
+            self.conductor.submit(Command("page_disconnected"))
             self._choose()
 
-    def steer(self, by: str, now: float, c: float, round_trip: float) -> None:
-        """Take a control signal of the page that drives."""
-        if by in self._held:
-            self._held[by].put(now, c, round_trip=round_trip)
+    def steer(self, condition: str, now: float, c: float, round_trip: float) -> None:
+        """Take a control signal from the page in control."""
+        if condition in self._held:
+            self._held[condition].put(now, c, round_trip=round_trip)
 
     def press(self) -> None:
-        """Hear the ring button."""
+        """Take a press of the ring button."""
         if self._on_press:
             self._on_press()
 
     def _choose(self) -> None:
-        """See that one participant's page drives."""
-        pages = [link for link in self._links if link.role != "panel"]
-        if pages and all(link.role == "viewer" for link in pages):
+        """Put the oldest participant's page in control, unless one is already."""
+        pages = [page for page in self._pages if page.role != "panel"]
+        if pages and all(page.role == "viewer" for page in pages):
             pages[0].role = "participant"
-            self.conductor.ask(Command("came"))
+            self.conductor.submit(Command("page_connected"))
             pages[0].hello()
 
     def _run(self) -> None:
@@ -168,51 +162,54 @@ class Cockpit:
         from tornado.httpserver import HTTPServer
         from tornado.web import Application
 
-        from ikns.experiments.cockpit.handlers import FILES, Page
-        from ikns.experiments.cockpit.link import Link
+        from ikns.experiments.cockpit.handlers import FILES, PageHandler
+        from ikns.experiments.cockpit.page_socket import PageSocket
 
-        mine = {"cockpit": self}
+        settings = {"cockpit": self}
         application = Application(
-            [*((path, Page, mine) for path in FILES), ("/link", Link, mine)],
+            [
+                *((path, PageHandler, settings) for path in FILES),
+                ("/link", PageSocket, settings),
+            ],
             log_function=lambda handler: None,
-            websocket_max_message_size=_MESSAGE,
-            websocket_ping_interval=_PING,
-            websocket_ping_timeout=_PING,
+            websocket_max_message_size=_MAX_MESSAGE,
+            websocket_ping_interval=_PING_TIMEOUT,
+            websocket_ping_timeout=_PING_TIMEOUT,
         )
         server = HTTPServer(
-            application, max_body_size=_MESSAGE, idle_connection_timeout=60
+            application, max_body_size=_MAX_MESSAGE, idle_connection_timeout=60
         )
         server.add_sockets([self._socket])
         due = time.monotonic()
         while not self._closing.is_set():
-            for link in list(self._links):
-                link.push()
-            due = max(due + 1 / _PUSHED, time.monotonic())
+            for page in list(self._pages):
+                page.push()
+            due = max(due + 1 / _PUSH_RATE, time.monotonic())
             await asyncio.sleep(due - time.monotonic())
         server.stop()
-        for link in list(self._links):
-            link.close(1001, "the run has ended")
-        # Pages get to hear it, but are not waited for.
+        for page in list(self._pages):
+            page.close(1001, "the run has ended")
+        # Pages may answer, but none can hold up the end.
         end = time.monotonic() + 0.5
-        while self._links and time.monotonic() < end:
+        while self._pages and time.monotonic() < end:
             await asyncio.sleep(0.01)
         await server.close_all_connections()
 
 
 def check_port(host: str, port: int) -> None:
-    """Make sure, before any work, that a cockpit may listen there.
+    """Check, before any work, that a cockpit can listen on a port.
 
     Raises
     ------
     FileError
-        When it may not.
+        When it cannot.
     """
     _listening(_LOOPBACK if host == "localhost" else host, port).close()
 
 
 def _listening(host: str, port: int) -> socket.socket:
     try:
-        if not 0 <= port < 2**16:  # some systems would take the rest of it
+        if not 0 <= port < 2**16:  # some systems would take it modulo 2**16
             raise OverflowError("expected 0 to 65535")
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         made = socket.create_server(found[4][:2], family=found[0])

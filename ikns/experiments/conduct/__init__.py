@@ -1,30 +1,30 @@
-"""Conduct a visit: commands and control signals in, what screens show out.
+"""Conduct a visit: commands and control signals in, screen contents and files out.
 
-`conductor` is one visit as it goes on; `tracking` and `picking` are what it has to know
-of an experiment; `book` keeps every attempt on disk; `inputs` are where a control
-signal comes from, `live` and `ring` those with a finger; `carry` ties them to the
-clock. There is no screen here.
+`conductor` executes commands, `visit_state` is the state machine, `tracking` and
+`picking` are the two experiments, `visit_log` keeps every attempt on disk. `inputs`
+are sources of a control signal, `live` and `ring` those with a finger. `visit_loop`
+runs them all in real time. There is no screen here.
 """
 
 from ikns.experiments.conduct.conductor import Conductor
-from ikns.experiments.conduct.experiment import COMMANDS, Command, Desk
+from ikns.experiments.conduct.experiment import COMMANDS, Command, Experiment
 from ikns.experiments.conduct.inputs import Driver, HeldInput, Sample, VirtualInput
-from ikns.experiments.conduct.picking import PickingDesk
-from ikns.experiments.conduct.tracking import TrackingDesk
-from ikns.experiments.conduct.visit_log import VisitBook
-from ikns.experiments.conduct.visit_loop import carry_out
+from ikns.experiments.conduct.picking import PickingExperiment
+from ikns.experiments.conduct.tracking import TrackingExperiment
+from ikns.experiments.conduct.visit_log import VisitLog
+from ikns.experiments.conduct.visit_loop import run_visit
 
 __all__ = [
     "COMMANDS",
     "Command",
     "Conductor",
-    "Desk",
     "Driver",
+    "Experiment",
     "HeldInput",
-    "PickingDesk",
+    "PickingExperiment",
     "Sample",
-    "TrackingDesk",
+    "TrackingExperiment",
     "VirtualInput",
-    "VisitBook",
-    "carry_out",
+    "VisitLog",
+    "run_visit",
 ]

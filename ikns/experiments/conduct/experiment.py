@@ -1,20 +1,20 @@
-"""What is asked of a conductor, and what it has to know of an experiment."""
+"""Commands to a conductor, and what it needs to know of an experiment."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol
 
-__all__ = ["COMMANDS", "Command", "Desk"]
+__all__ = ["COMMANDS", "Command", "Experiment"]
 
-#: What may be asked in every experiment. The participant's page came or left; what
-#: makes the signal is to be opened once more; the run is to end.
+#: Commands of every experiment. The server itself sends ``page_connected`` and
+#: ``page_disconnected``; ``connect`` opens the source of the signal again.
 COMMANDS = frozenset(
-    "begin abort skip repeat rest pause connect emergency end came left".split()
-)
+    "begin abort skip repeat rest pause connect emergency end".split()
+) | {"page_connected", "page_disconnected"}
 
 
 class Command(NamedTuple):
-    """Something that somebody asks.
+    """A command of a page, or of the server.
 
     Parameters
     ----------
@@ -28,20 +28,20 @@ class Command(NamedTuple):
     text: str = ""
 
 
-class Desk(Protocol):
-    """An experiment, as far as it differs from the others.
+class Experiment(Protocol):
+    """An experiment while it is conducted: what differs from one to the other.
 
     Attributes
     ----------
-    experiment : str
+    name : {"tracking", "picking"}
     commands : frozenset of str
-        What may be asked beyond :data:`COMMANDS`.
+        Commands beyond :data:`COMMANDS`.
     needs_signal : bool
-        Whether a trial makes sense only with a control signal.
+        Whether a trial needs a control signal.
     visit : Visit or PickVisit
     """
 
-    experiment: str
+    name: str
     commands: frozenset[str]
     needs_signal: bool
     visit: Any
@@ -49,38 +49,38 @@ class Desk(Protocol):
     def begin(self, now: float) -> None:
         """Begin the current trial."""
 
-    def frame(self, now: float, c: float) -> None:
-        """Take a control signal."""
+    def add_sample(self, now: float, c: float) -> None:
+        """Take the control signal at a time."""
 
-    def check(self, now: float) -> None:
-        """Let time pass; put down a trial that has ended."""
+    def update(self, now: float) -> None:
+        """Let time pass; record a trial that has ended."""
 
     def abort(self, now: float, reason: str) -> None:
-        """Break the trial off that goes on; it comes again."""
+        """Abort the running trial; it is repeated."""
 
     def skip(self, now: float, reason: str) -> None:
-        """Leave the current step out."""
+        """Skip the current step."""
 
-    def ask(self, name: str, text: str, now: float) -> None:
-        """Do one of its own commands."""
+    def execute(self, name: str, text: str, now: float) -> None:
+        """Execute one of its own commands."""
 
     def state(self) -> str:
-        """Return that of the trial that goes on; empty without one."""
+        """Return the state of the running trial; empty without one."""
 
     def view(self, now: float) -> dict[str, Any]:
-        """Return what screens show of the trial that goes on."""
+        """Return what pages show of the running trial."""
 
     def prompt(self, state: str) -> str:
-        """Return what the participant is told in a state of a trial."""
+        """Return the instruction to the participant in a state of a trial."""
 
     def curve(self) -> dict[str, Any]:
-        """Return what is drawn once per trial."""
+        """Return what pages draw once per trial."""
 
-    def facts(self, step: Any) -> dict[str, Any]:
-        """Return what the panel says of a step."""
+    def describe(self, step: Any) -> dict[str, Any]:
+        """Return what pages show of a step."""
 
     def row(self, number: int, attempt: Any, *, practised: int) -> dict[str, Any]:
-        """Return an attempt as it goes to disk."""
+        """Return an attempt as a row of the visit's table."""
 
-    def result(self, attempt: Any) -> dict[str, float]:
-        """Return the figures of an attempt."""
+    def metrics(self, attempt: Any) -> dict[str, float]:
+        """Return the metrics of an attempt."""

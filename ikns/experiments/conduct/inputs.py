@@ -1,4 +1,4 @@
-"""What drives the pointer, as a conductor takes it: samples since it asked last."""
+"""Sources of a control signal: they hand over the samples since the last call."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from ikns.experiments.tracking.profiles import Profile
 from ikns.live.stream.delays import Delays
 from ikns.simulation.operator import Delay, Operator
 
-__all__ = ["Driver", "HeldInput", "Sample", "Samples", "VirtualInput"]
+__all__ = ["Driver", "HeldInput", "Sample", "SampleQueue", "VirtualInput"]
 
-#: A page that says nothing for longer than this has no control signal, s: at 60 per
-#: second twelve messages in a row are missing.
-STALE = 0.2
+#: Without a sample for longer than this there is no control signal, s: of the 60 per
+#: second that a page sends, twelve in a row are missing.
+TIMEOUT = 0.2
 
 
 class Sample(NamedTuple):
@@ -34,14 +34,14 @@ class Sample(NamedTuple):
     c: float
 
 
-class Samples:
-    """Samples on their way from the thread that makes them to the one that takes them.
+class SampleQueue:
+    """Samples from the thread that makes them to the thread that takes them.
 
     Examples
     --------
-    >>> way = Samples()
-    >>> way.put(Sample(10.0, 0.25))
-    >>> way.take(10.1), way.take(10.2), way.take(10.3)
+    >>> queue = SampleQueue()
+    >>> queue.put(Sample(10.0, 0.25))
+    >>> queue.take(10.1), queue.take(10.2), queue.take(10.3)
     ([Sample(time=10.0, c=0.25)], [], [Sample(time=10.3, c=nan)])
     """
 
@@ -50,55 +50,55 @@ class Samples:
         self._last = -math.inf
 
     def put(self, sample: Sample) -> None:
-        """Send one, from any thread."""
+        """Add a sample, from any thread."""
         self._queue.append(sample)
 
     def take(self, now: float) -> list[Sample]:
-        """Return those since the last call; one without a signal if none come."""
+        """Return the samples since the last call; after a timeout one with c NaN."""
         samples = []
         while self._queue:
             samples.append(self._queue.popleft())
         if samples:
             self._last = samples[-1].time
-        elif now - self._last > STALE:
+        elif now - self._last > TIMEOUT:
             samples.append(Sample(now, math.nan))
         return samples
 
 
 class Driver(Protocol):
-    """Something that makes a control signal.
+    """A source of a control signal.
 
     Attributes
     ----------
     fault : str
-        Why it does so no more; empty while it does.
+        Why it has ended; empty while it runs.
     """
 
     @property
     def fault(self) -> str:
-        """Why it does so no more."""
+        """Why it has ended."""
 
     def take(self, now: float) -> Sequence[Sample]:
-        """Return what came since the last call, in order."""
+        """Return the samples since the last call, in order."""
 
-    def facts(self) -> dict[str, Any]:
+    def status(self) -> dict[str, Any]:
         """Return what the panel shows of it."""
 
     def halt(self) -> None:
-        """Let nothing move any more, at once; called from any thread."""
+        """Stop all motion at once; called from any thread."""
 
-    def mark(self, name: str, text: str, now: float) -> None:
-        """Write down what happened, where it keeps a record of its own."""
+    def log_event(self, name: str, text: str, now: float) -> None:
+        """Record an event, if it keeps a recording of its own."""
 
 
 class HeldInput:
-    """A control signal that is told from elsewhere and holds until it is told again.
+    """A control signal that is sent from elsewhere and held until the next one.
 
     :meth:`put` may be called from any thread.
 
     Parameters
     ----------
-    stale : float
+    timeout : float
         Without news for longer than this there is no signal, s.
 
     Examples
@@ -111,23 +111,23 @@ class HeldInput:
 
     fault = ""
 
-    def __init__(self, *, stale: float = STALE) -> None:
-        self._stale = stale
+    def __init__(self, *, timeout: float = TIMEOUT) -> None:
+        self._timeout = timeout
         self._newest = Sample(-math.inf, math.nan)
         self._lock = threading.Lock()
         self._delays, self._count = Delays(), 0
 
     def put(self, now: float, c: float, *, round_trip: float = math.nan) -> None:
-        """Tell the signal.
+        """Set the signal.
 
         Parameters
         ----------
         now : float
             When it was received, s.
         c : float
-            Anything beyond 0 to 1 is cut off.
+            Clipped to 0 to 1.
         round_trip : float
-            From what was shown to what was answered, s, where it is known.
+            From sending a state to the page to this answer, s, where it is known.
         """
         c = min(max(c, 0.0), 1.0) if math.isfinite(c) else math.nan
         with self._lock:
@@ -136,28 +136,28 @@ class HeldInput:
             if math.isfinite(round_trip) and round_trip >= 0:
                 self._delays.add(round_trip)
 
-    def lose(self) -> None:
-        """Forget the signal: whoever told it has gone."""
+    def clear(self) -> None:
+        """Forget the signal: its sender is gone."""
         with self._lock:
             self._newest = Sample(-math.inf, math.nan)
             self._delays = Delays()
 
     def take(self, now: float) -> list[Sample]:
         """Return the signal that holds now."""
-        told, c = self._newest
-        return [Sample(now, c if now - told <= self._stale else math.nan)]
+        received, c = self._newest
+        return [Sample(now, c if now - received <= self._timeout else math.nan)]
 
-    def facts(self) -> dict[str, Any]:
-        """Return how often it was told, and how late answers are, s."""
+    def status(self) -> dict[str, Any]:
+        """Return the count of signals, and the 99th percentile of round trips, s."""
         with self._lock:
-            late = self._delays.percentile(99)
-        return {"kind": "page", "told": self._count, "round_trip": late}
+            delay = self._delays.percentile(99)
+        return {"kind": "page", "received": self._count, "round_trip": delay}
 
     def halt(self) -> None:
-        """Nothing moves here."""
+        """Do nothing: nothing moves here."""
 
-    def mark(self, name: str, text: str, now: float) -> None:
-        """Count delays anew with each trial; nothing else is kept."""
+    def log_event(self, name: str, text: str, now: float) -> None:
+        """Start measuring round trips anew with each trial; record nothing."""
         if name == "trial begins":
             with self._lock:
                 self._delays = Delays()
@@ -171,10 +171,10 @@ class VirtualInput:
     operator : Operator
         Sets the rate.
     device : Delay
-        What it holds.
+        Device that the operator holds.
     trial : callable
-        Profile of the trial that goes on and when it began or begins (s, of the clock
-        that :meth:`take` is asked by), or None: the operator then rests in the middle.
+        Returns the profile of the running trial and when the profile begins (s, on the
+        clock of :meth:`take`), or None: the operator then rests in the middle.
     """
 
     fault = ""
@@ -187,14 +187,14 @@ class VirtualInput:
     ) -> None:
         self._operator, self._device, self._trial = operator, device, trial
         self._next = math.nan
-        self._c = device.step(operator.place)
+        self._c = device.step(operator.limb)
 
     def take(self, now: float) -> list[Sample]:
         """Let the operator act until now."""
         if math.isnan(self._next):
             self._next = now
-        # Whoever was not asked for long does not catch up.
-        self._next = max(self._next, now - STALE)
+        # After a long gap, the missed time is not made up for.
+        self._next = max(self._next, now - TIMEOUT)
         trial, samples = self._trial(), []
         while self._next <= now:
             target = 0.5
@@ -207,12 +207,12 @@ class VirtualInput:
             self._next += 1 / self._operator.rate
         return samples
 
-    def facts(self) -> dict[str, Any]:
-        """Say that nobody is there."""
+    def status(self) -> dict[str, Any]:
+        """Say that the operator is virtual."""
         return {"kind": "virtual"}
 
     def halt(self) -> None:
-        """Nothing moves here."""
+        """Do nothing: nothing moves here."""
 
-    def mark(self, name: str, text: str, now: float) -> None:
-        """Nothing is kept here."""
+    def log_event(self, name: str, text: str, now: float) -> None:
+        """Do nothing: nothing is recorded here."""

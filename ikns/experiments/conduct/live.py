@@ -1,4 +1,4 @@
-"""The live loop as what drives a condition: in a thread of its own, with its finger."""
+"""The live loop as a source of the control signal, in a thread of its own."""
 
 from __future__ import annotations
 
@@ -11,40 +11,40 @@ from typing import Any
 
 from ikns.calibration.subject import Subject
 from ikns.errors import IknsError
-from ikns.experiments.conduct.inputs import Sample, Samples
+from ikns.experiments.conduct.inputs import Sample, SampleQueue
 from ikns.finger import Finger
 from ikns.live.control.controller import Decision
 from ikns.live.control.settings import ControlSettings
-from ikns.live.runtime import LoopStatus, Report, run
+from ikns.live.runtime import Report, LoopStatus, run
 from ikns.live.session import RunWriter
 from ikns.live.stream import Source
 
 __all__ = ["LiveDriver", "live_driver"]
 
-#: How often the loop says how it goes, s.
+#: How often the loop reports its status, s.
 _STATUS_EVERY = 1 / 30
-#: How long a rate is counted, s.
-_COUNTED = 1.0
+#: Frames are counted this long for a frame rate, s.
+_RATE_INTERVAL = 1.0
 
 
 class LiveDriver:
-    """A live loop that runs.
+    """A running live loop.
 
     Parameters
     ----------
     finger : Finger or None
     writer : RunWriter or None
-        Session, to which events go, too.
+        Session, which events are written to as well.
     smooth : bool
-        Whether the signal is the flexion that the finger is asked, smoothed; else the
-        map's c as it is.
+        Whether the signal is the smoothed flexion command of the finger; else the raw c
+        of the map.
     on_status : callable, optional
-        Called from the loop.
+        Called from the loop with each status.
 
     Attributes
     ----------
     fault : str
-        Why it ended; empty while it runs.
+        Why it has ended; empty while it runs.
     report : Report or None
         Once it has ended.
     """
@@ -61,9 +61,9 @@ class LiveDriver:
         self.report: Report | None = None
         self._finger, self._writer, self._smooth = finger, writer, smooth
         self._on_status = on_status
-        self._samples = Samples()
+        self._samples = SampleQueue()
         self._status: LoopStatus | None = None
-        self._finger_is = ""
+        self._finger_state = ""
         self._start = math.nan
         self._events: list[tuple[str, str, float]] = []
         self._rate, self._counted_at, self._frames = math.nan, math.nan, 0
@@ -78,7 +78,7 @@ class LiveDriver:
         *,
         realtime: bool = False,
     ) -> None:
-        """Let the loop run."""
+        """Start the loop."""
 
         def loop() -> None:
             try:
@@ -89,18 +89,18 @@ class LiveDriver:
                     settings=settings,
                     session=self._writer,
                     stop=self._stop,
-                    on_status=self._told,
+                    on_status=self._take_status,
                     status_every=_STATUS_EVERY,
-                    on_decision=self._decided,
+                    on_decision=self._take_decision,
                     realtime=realtime,
                 )
             except (IknsError, OSError) as error:
                 self.fault = str(error)
             else:
-                # Asked to stop it has no fault.
+                # A requested stop is no fault.
                 ended = f"{source.name} has ended."
                 self.fault = "" if self._stop.is_set() else ended
-            finally:  # whatever it was, nobody must wait for frames
+            finally:  # whatever failed, the visit must not wait for frames
                 if self.report is None and not self.fault:
                     self.fault = "the live loop failed."
 
@@ -108,28 +108,28 @@ class LiveDriver:
         self._thread.start()
 
     def end(self) -> None:
-        """Stop the loop, which relaxes the finger, and wait until it has."""
+        """Stop the loop, which relaxes the finger, and wait until that is done."""
         self.halt()
         if self._thread is not None:
             self._thread.join()
 
     def halt(self) -> None:
-        """Stop the loop within its next beat, 20 ms."""
+        """Stop the loop at its next cycle, within 20 ms."""
         self._stop.set()
 
     def take(self, now: float) -> list[Sample]:
-        """Return the frames since the last call, each at its receipt."""
+        """Return the samples since the last call, at the times of receipt."""
         return self._samples.take(now)
 
-    def facts(self) -> dict[str, Any]:
-        """How the loop and its finger are doing."""
+    def status(self) -> dict[str, Any]:
+        """Return the state of loop and finger."""
         status = self._status
         if status is None:
             return {"kind": "ikns"}
         return {
             "kind": "ikns",
             "state": status.state,
-            "finger": self._finger_is,
+            "finger": self._finger_state,
             "flexion": status.flexion,
             "measured": status.measured,
             "rate": self._rate,
@@ -137,34 +137,36 @@ class LiveDriver:
             "misses": status.misses,
             "residual": status.residual,
             "worst_residual": status.worst_residual,
-            "refused": status.rejection,
+            "refused": status.refused,
             "inside": status.inside,
         }
 
-    def mark(self, name: str, text: str, now: float) -> None:
-        """Put an event into the session."""
+    def log_event(self, name: str, text: str, now: float) -> None:
+        """Write an event into the session."""
         self._events.append((name, text, now))
-        # Where the session's time began is known once the loop has said so.
+        # The start of the session's time is known from the first status on.
         while self._writer is not None and self._events and self._start < math.inf:
-            told, words, at = self._events.pop(0)
+            event, words, at = self._events.pop(0)
             onset = max(0.0, at - self._start)
-            self._writer.row("events", [onset, 0.0, told, words])
+            self._writer.row("events", [onset, 0.0, event, words])
 
-    def _decided(self, received: float, flexion: float, decision: Decision) -> None:
+    def _take_decision(
+        self, received: float, flexion: float, decision: Decision
+    ) -> None:
         c = flexion if self._smooth else float(decision.solved.c[0])
         self._samples.put(Sample(received, c if decision.valid else math.nan))
 
-    def _told(self, status: LoopStatus) -> None:
+    def _take_status(self, status: LoopStatus) -> None:
         now = time.monotonic()
         if math.isnan(self._start):
             self._start = now - status.time
-        if not now - self._counted_at < _COUNTED:
+        if not now - self._counted_at < _RATE_INTERVAL:
             passed = now - self._counted_at
             self._rate = (status.frames - self._frames) / passed
             self._counted_at, self._frames = now, status.frames
         if self._finger is not None:
             state = self._finger.state()
-            self._finger_is = (
+            self._finger_state = (
                 f"{state.mode}: {state.alert}" if state.alert else state.mode
             )
         self._status = status
@@ -184,15 +186,15 @@ def live_driver(
     on_status: Callable[[LoopStatus], None] | None = None,
     realtime: bool = False,
 ) -> Iterator[LiveDriver]:
-    """Run the live loop for a while.
+    """Run the live loop while the context is open.
 
     Parameters
     ----------
     open_source : callable
-        Opens the frames.
+        Opens the source of marker frames.
     subject : Subject
     finger : callable, optional
-        Makes the finger; without one nothing moves.
+        Makes the finger; without it nothing moves.
     open_session : callable, optional
         Opens the next run of a session for a source.
     settings : ControlSettings, optional
@@ -200,7 +202,7 @@ def live_driver(
     smooth : bool
         See :class:`LiveDriver`.
     on_status : callable, optional
-        Called from the loop some 30 times a second, so it must not wait.
+        Called from the loop about 30 times per second; it must not block.
     realtime : bool
         See :func:`ikns.live.runtime.run`.
     """
@@ -211,6 +213,10 @@ def live_driver(
             finger() if finger else None, writer, smooth=smooth, on_status=on_status
         )
         stack.callback(driver.end)
-        chosen = ControlSettings() if settings is None else settings
-        driver.begin(source, subject, chosen, realtime=realtime)
+        driver.begin(
+            source,
+            subject,
+            ControlSettings() if settings is None else settings,
+            realtime=realtime,
+        )
         yield driver

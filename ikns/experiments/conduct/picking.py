@@ -1,4 +1,4 @@
-"""What a conductor has to know of the pick and place experiment."""
+"""The pick and place experiment while it is conducted."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Literal
 from ikns.errors import InvalidInput
 from ikns.experiments.picking import PickAttempt, PickStep, PickVisit, load_objects
 
-__all__ = ["PickingDesk"]
+__all__ = ["PickingExperiment"]
 
 _PROMPTS = {
     "ready": "Get ready",
@@ -18,24 +18,24 @@ _PROMPTS = {
 }
 
 
-class PickingDesk:
-    """A pick and place visit as it is conducted.
+class PickingExperiment:
+    """A pick and place visit.
 
-    ``begin`` makes a trial ready, ``toggle`` starts its clock and stops it, ``success``
-    and ``dropped`` say how it went, at once or once the clock was stopped. Within the
-    limit somebody has to stop the clock; then there is no hurry to judge.
+    ``begin`` makes a trial ready, ``toggle`` starts and stops its clock, ``success``
+    and ``dropped`` give the outcome, while the clock runs or after it was stopped. The
+    time limit holds for the clock, not for the judgment.
 
     Parameters
     ----------
     steps : sequence of PickStep
         From :func:`ikns.experiments.picking.pick_schedule`.
     rows : iterable of mapping
-        Attempts of a visit that goes on.
+        Attempts of earlier runs of the visit.
     """
 
-    experiment = "picking"
+    name = "picking"
     commands = frozenset({"toggle", "success", "dropped", "comment"})
-    #: A finger that nothing drives cannot grasp.
+    #: A finger without a signal cannot grasp.
     needs_signal = True
 
     def __init__(
@@ -52,28 +52,28 @@ class PickingDesk:
         self.visit.begin()
         self._stopped = math.nan
 
-    def frame(self, now: float, c: float) -> None:
-        """Take a control signal, which a trial does not depend on."""
+    def add_sample(self, now: float, c: float) -> None:
+        """Do nothing: the trial does not depend on the control signal."""
 
-    def check(self, now: float) -> None:
-        """Let the clock run; put down a trial that has ended."""
+    def update(self, now: float) -> None:
+        """Let the clock run; record a trial that has ended."""
         if self.visit.trial is not None:
-            self.visit.trial.check(self._time(now))
+            self.visit.trial.update(self._time(now))
             self.visit.finish()
 
     def abort(self, now: float, reason: str) -> None:
-        """Break the trial off."""
+        """Abort the trial."""
         self.visit.abort(self._time(now), reason)
 
     def skip(self, now: float, reason: str) -> None:
-        """Leave the current step out."""
+        """Skip the current step."""
         self.visit.skip(self._time(now), reason)
 
-    def ask(self, name: str, text: str, now: float) -> None:
+    def execute(self, name: str, text: str, now: float) -> None:
         """Start or stop the clock, take an outcome or a comment."""
         trial, state = self.visit.trial, self.state()
         if trial is None:
-            raise InvalidInput("expected a trial going on, found none: begin one.")
+            raise InvalidInput("no trial is running; begin one.")
         if text:
             trial.comment = text
         if name == "toggle" and state == "ready":
@@ -86,7 +86,9 @@ class PickingDesk:
             trial.stop(self._time(now), outcome)
             self.visit.finish()
         elif name != "comment":
-            raise InvalidInput(f"expected a clock that runs, found the trial {state}.")
+            raise InvalidInput(
+                f"expected a running clock for '{name}', found the trial {state}."
+            )
 
     def state(self) -> str:
         """Return ready, running or judge; empty without a trial."""
@@ -98,30 +100,30 @@ class PickingDesk:
         return "running" if math.isnan(self._stopped) else "judge"
 
     def view(self, now: float) -> dict[str, Any]:
-        """Return what screens show of the clock."""
+        """Return what pages show of the clock."""
         trial = self.visit.trial
         if trial is None or trial.state == "waiting":
             return {}
-        seen = trial.check(self._time(now))
-        return {"time": seen.time, "left": seen.left, "limit": trial.step.limit}
+        view = trial.update(self._time(now))
+        return {"time": view.time, "time_left": view.left, "limit": trial.step.limit}
 
     def prompt(self, state: str) -> str:
-        """Return what the participant is told."""
+        """Return the instruction to the participant."""
         return _PROMPTS.get(state, "")
 
     def curve(self) -> dict[str, Any]:
         """Return nothing: there is no curve."""
         return {}
 
-    def facts(self, step: PickStep) -> dict[str, Any]:
-        """Return what the panel says of a step."""
+    def describe(self, step: PickStep) -> dict[str, Any]:
+        """Return what pages show of a step."""
         name = self._names[step.object]
         return {"what": step.object, "name": name, "repeat": step.repeat + 1}
 
     def row(
         self, number: int, attempt: PickAttempt, *, practised: int
     ) -> dict[str, Any]:
-        """Return an attempt as it goes to disk."""
+        """Return an attempt as a row of the visit's table."""
         step, record = self._steps[attempt.key], attempt.record
         return {
             "number": number,
@@ -138,10 +140,10 @@ class PickingDesk:
             "comment": "" if record is None else record.comment,
         }
 
-    def result(self, attempt: PickAttempt) -> dict[str, float]:
+    def metrics(self, attempt: PickAttempt) -> dict[str, float]:
         """Return the time of an attempt, s."""
         return {} if attempt.record is None else {"time": attempt.record.time}
 
     def _time(self, now: float) -> float:
-        """Now, or when the clock was stopped."""
+        """Return now, or when the clock was stopped, s."""
         return now if math.isnan(self._stopped) else self._stopped

@@ -1,4 +1,4 @@
-"""A finger by a push button: the condition "ring", in a thread of its own."""
+"""A finger driven by a push button, the condition "ring", in a thread of its own."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from ikns.errors import IknsError
-from ikns.experiments.conduct.inputs import Sample, Samples
+from ikns.experiments.conduct.inputs import Sample, SampleQueue
 from ikns.finger import Finger
 from ikns.finger.inputs import RingButton
 
 __all__ = ["RingDriver", "ring_driver"]
 
-#: How often the finger is told, 1/s.
+#: How often the finger gets a command, 1/s.
 _RATE = 100.0
 
 
@@ -26,58 +26,58 @@ class RingDriver:
     Parameters
     ----------
     presses : queue
-        Gets something whenever the button is pressed, from any thread.
+        Gets an item for each press of the button, from any thread.
     finger : Finger or None
 
     Attributes
     ----------
     fault : str
-        Why it ended; empty while it goes on.
+        Why it has ended; empty while it runs.
     """
 
     def __init__(self, presses: SimpleQueue[None], finger: Finger | None) -> None:
         self.fault = ""
         self._presses, self._finger = presses, finger
-        self._samples = Samples()
-        self._facts: dict[str, Any] = {"kind": "ring"}
+        self._samples = SampleQueue()
+        self._status: dict[str, Any] = {"kind": "ring"}
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="ring", daemon=True)
         self._thread.start()
 
     def end(self) -> None:
-        """Stop, which relaxes the finger, and wait until it has."""
+        """Stop, which relaxes the finger, and wait until that is done."""
         self.halt()
         self._thread.join()
 
     def halt(self) -> None:
-        """Stop within a period."""
+        """Stop within one period."""
         self._stop.set()
 
     def take(self, now: float) -> list[Sample]:
-        """Return what was told the finger since the last call."""
+        """Return the commands to the finger since the last call."""
         return self._samples.take(now)
 
-    def facts(self) -> dict[str, Any]:
-        """Return how the finger is doing."""
-        return self._facts
+    def status(self) -> dict[str, Any]:
+        """Return the state of the finger."""
+        return self._status
 
-    def mark(self, name: str, text: str, now: float) -> None:
-        """Nothing is kept here."""
+    def log_event(self, name: str, text: str, now: float) -> None:
+        """Do nothing: nothing is recorded here."""
 
     def _run(self) -> None:
         try:
             with ExitStack() as stack:
                 if self._finger is not None:
                     stack.enter_context(self._finger)
-                self._go_on()
+                self._drive()
         except (IknsError, OSError) as error:
             self.fault = str(error)
         finally:
             if not self._stop.is_set():
-                self.fault = self.fault or "the ring button is not listened to."
+                self.fault = self.fault or "the ring button is no longer read."
 
-    def _go_on(self) -> None:
-        while not self._presses.empty():  # of before
+    def _drive(self) -> None:
+        while not self._presses.empty():  # presses before the start do not count
             self._presses.get()
         ring = RingButton()
         due = time.monotonic()
@@ -95,7 +95,7 @@ class RingDriver:
                 if state.mode == "safe":
                     self.fault = f"finger: {state.alert}."
                     return
-                self._facts = {
+                self._status = {
                     "kind": "ring",
                     "finger": state.mode,
                     "flexion": c,
@@ -110,14 +110,14 @@ class RingDriver:
 def ring_driver(
     presses: SimpleQueue[None], finger: Callable[[], Finger] | None = None
 ) -> Iterator[RingDriver]:
-    """Let a button drive a finger for a while.
+    """Let a button drive a finger while the context is open.
 
     Parameters
     ----------
     presses : queue
         See :class:`RingDriver`.
     finger : callable, optional
-        Makes the finger; without one nothing moves.
+        Makes the finger; without it nothing moves.
     """
     driver = RingDriver(presses, finger() if finger else None)
     try:

@@ -1,13 +1,13 @@
-"""What screens show of a visit, as plain data."""
+"""What pages show of a visit, as plain data."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from ikns.experiments.conduct.experiment import Desk
+from ikns.experiments.conduct.experiment import Experiment
 
-__all__ = ["listed", "planned", "prompt", "step_facts"]
+__all__ = ["attempt_facts", "plan_steps", "progress_facts", "prompt", "step_facts"]
 
 _PROMPTS = {
     "stopped": "Stopped",
@@ -18,17 +18,17 @@ _PROMPTS = {
 }
 
 
-def listed(row: Mapping[str, Any]) -> dict[str, Any]:
+def attempt_facts(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the panel lists of an attempt."""
     return {key: row[key] for key in ("number", "key", "outcome", "reason")}
 
 
-def planned(desk: Desk) -> list[dict[str, Any]]:
-    """Return all steps, and how those went that were done."""
-    visit = desk.visit
+def plan_steps(experiment: Experiment) -> list[dict[str, Any]]:
+    """Return all steps, with outcome and number of attempts of each."""
+    visit = experiment.visit
     ended, tried = visit.ended, [attempt.key for attempt in visit.attempts]
     return [
-        step_facts(desk, step)
+        step_facts(experiment, step)
         | {
             "key": step.key,
             "outcome": ended[step.key].outcome if step.key in ended else "",
@@ -38,12 +38,25 @@ def planned(desk: Desk) -> list[dict[str, Any]]:
     ]
 
 
-def prompt(desk: Desk, state: str) -> str:
-    """Return what the participant is told."""
-    return desk.prompt(state) or _PROMPTS.get(state, "")
+def progress_facts(
+    experiment: Experiment, remaining: tuple[Any, ...]
+) -> dict[str, Any]:
+    """Return the current step, its place in the plan, and the count of trials."""
+    steps, step = experiment.visit.steps, remaining[0] if remaining else None
+    return {
+        "step": None if step is None else step_facts(experiment, step),
+        "step_index": next((i for i, s in enumerate(steps) if s is step), None),
+        "trials": sum(s.kind != "rest" for s in steps),
+        "trials_left": sum(s.kind != "rest" for s in remaining),
+    }
 
 
-def step_facts(desk: Desk, step: Any) -> dict[str, Any]:
-    """Return what screens say of a step."""
-    facts = {} if step.kind == "rest" else desk.facts(step)
+def prompt(experiment: Experiment, state: str) -> str:
+    """Return the instruction to the participant."""
+    return experiment.prompt(state) or _PROMPTS.get(state, "")
+
+
+def step_facts(experiment: Experiment, step: Any) -> dict[str, Any]:
+    """Return what pages show of a step."""
+    facts = {} if step.kind == "rest" else experiment.describe(step)
     return {"kind": step.kind, "condition": step.condition} | facts

@@ -1,4 +1,4 @@
-"""A visit's folder while the visit goes on: each attempt on disk the moment it ends."""
+"""The files of a running visit: each attempt is on disk the moment it ends."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ikns.errors import FileError, IknsError, InvalidInput
 from ikns.experiments.visits import append_attempt, create_visit, read_visit
 from ikns.experiments.visits.parquet import table_bytes
 
-__all__ = ["VisitBook"]
+__all__ = ["VisitLog"]
 
-#: What may not change when a visit goes on.
+#: What must be the same when a visit is continued.
 _FIXED = (
     "experiment",
     "study",
@@ -28,22 +28,22 @@ _FIXED = (
 _LOG = "log.jsonl"
 
 
-class VisitBook:
-    """A visit on disk that grows.
+class VisitLog:
+    """Writes attempts and events of a running visit.
 
-    An attempt that cannot be written waits in memory and is tried again.
+    An attempt that cannot be written is kept in memory and tried again.
 
     Parameters
     ----------
     folder : str or Path
-        New, empty, or a visit that was broken off.
+        New, empty, or a visit to continue.
     about : mapping
         See :func:`ikns.experiments.visits.create_visit`.
 
     Attributes
     ----------
     attempts : list of dict
-        All rows, those of before included.
+        All rows, those of earlier runs included.
     simulated : bool
     fault : str
         Why the last attempt could not be written; empty when all are on disk.
@@ -53,17 +53,17 @@ class VisitBook:
     InvalidInput
         When the folder holds something else, another participant or another design.
     FileError
-        When what is there cannot be read.
+        When the visit cannot be read.
     """
 
     def __init__(self, folder: str | Path, about: Mapping[str, Any]) -> None:
         self.folder = Path(folder)
-        # Whoever lacks the library hears of it now, not after the first trial.
+        # A missing library is reported now, not after the first trial.
         table_bytes(about["experiment"], [])
         self.simulated = bool(about["simulated"])
         self.attempts: list[dict[str, Any]] = []
         self.fault = ""
-        self._waiting: list[Mapping[str, Any]] = []
+        self._unwritten: list[Mapping[str, Any]] = []
         if (self.folder / "visit.json").exists():
             record = read_visit(self.folder, experiment=about["experiment"])
             _check_same(self.folder, record.about, about)
@@ -71,33 +71,33 @@ class VisitBook:
         else:
             create_visit(self.folder, about)
 
-    def put(self, row: Mapping[str, Any]) -> None:
+    def append(self, row: Mapping[str, Any]) -> None:
         """Write an attempt."""
         self.attempts.append(dict(row))
-        self._waiting.append(row)
-        self.write()
+        self._unwritten.append(row)
+        self.flush()
 
-    def write(self) -> None:
-        """Try again to write what waits."""
-        while self._waiting:
+    def flush(self) -> None:
+        """Write the attempts that could not be written so far."""
+        while self._unwritten:
             try:
-                append_attempt(self.folder, self._waiting[0])
+                append_attempt(self.folder, self._unwritten[0])
             except (IknsError, OSError) as error:
                 self.fault = str(error)
                 return
-            del self._waiting[0]
+            del self._unwritten[0]
         self.fault = ""
 
-    def note(self, what: str, text: str, *, time: float) -> None:
-        """Append a line to the visit's log, which is for people.
+    def log_event(self, name: str, text: str, *, time: float) -> None:
+        """Append a line to ``log.jsonl``, which is for people.
 
         Parameters
         ----------
-        what, text : str
+        name, text : str
         time : float
-            Since this part of the visit began, s.
+            Since this run of the visit began, s.
         """
-        line = json.dumps({"time": round(time, 3), "what": what, "text": text})
+        line = json.dumps({"time": round(time, 3), "what": name, "text": text})
         try:
             with (self.folder / _LOG).open("a", encoding="utf-8") as file:
                 file.write(line + "\n")
@@ -105,17 +105,17 @@ class VisitBook:
             self.fault = f"{self.folder / _LOG}: cannot be written: {error.strerror}."
 
     def close(self) -> None:
-        """Make sure that everything is on disk.
+        """Write everything that is not on disk yet.
 
         Raises
         ------
         FileError
-            When something is not.
+            When something cannot be written.
         """
-        self.write()
-        if self._waiting:
+        self.flush()
+        if self._unwritten:
             raise FileError(
-                f"{self.folder}: {len(self._waiting)} attempts could not be written: "
+                f"{self.folder}: {len(self._unwritten)} attempts could not be written: "
                 f"{self.fault}"
             )
 
@@ -123,21 +123,23 @@ class VisitBook:
 def _check_same(
     folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]
 ) -> None:
-    """Refuse to go on with a visit as another one."""
-    told = json.loads(json.dumps(dict(now)))
+    """Refuse to continue a visit with another participant or design."""
+    about = json.loads(json.dumps(dict(now)))
     for key in _FIXED:
-        old, new = before.get(key), told.get(key)
+        old, new = before.get(key), about.get(key)
         if key == "design" and isinstance(old, dict) and isinstance(new, dict):
-            odd = next((k for k in {**old, **new} if old.get(k) != new.get(k)), None)
-            if odd is None:
+            changed = (k for k in {**old, **new} if old.get(k) != new.get(k))
+            first = next(changed, None)
+            if first is None:
                 continue
-            key, old, new = odd, old.get(odd), new.get(odd)
+            key, old, new = first, old.get(first), new.get(first)
         if old != new:
             raise InvalidInput(
-                f"{folder}: expected {key} {_said(old)}, with which this visit was "
-                f"begun, found {_said(new)}; take another folder for another visit."
+                f"{folder}: expected {key} {_value_text(old)} as when this visit was "
+                f"begun, found {_value_text(new)}; use another folder for another "
+                "visit."
             )
 
 
-def _said(value: Any) -> str:
+def _value_text(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else json.dumps(value)

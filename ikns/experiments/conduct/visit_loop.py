@@ -1,4 +1,4 @@
-"""A visit and the clock: what drives each condition is opened, asked and closed."""
+"""Runs a visit in real time, with the source of each condition's control signal."""
 
 from __future__ import annotations
 
@@ -12,98 +12,93 @@ from ikns.errors import IknsError, InvalidInput
 from ikns.experiments.conduct.conductor import Conductor
 from ikns.experiments.conduct.inputs import Driver
 
-__all__ = ["carry_out"]
+__all__ = ["run_visit"]
+
+Drivers = Mapping[str, Callable[[], AbstractContextManager[Driver]]]
 
 
-def carry_out(
-    conductor: Conductor,
-    drivers: Mapping[str, Callable[[], AbstractContextManager[Driver]]],
-    *,
-    stop: Event,
-    rate: float = 100.0,
+def run_visit(
+    conductor: Conductor, drivers: Drivers, *, stop: Event, rate: float = 100.0
 ) -> None:
-    """Go through a visit until it is ended or stopped; then everything is on disk.
+    """Run a visit until it is ended or stopped; then everything is on disk.
 
     Parameters
     ----------
     conductor : Conductor
     drivers : mapping of condition to callable
-        Each opens what makes the signal of the condition. It is open from the first
-        trial of the condition that is due to the last, and closed before another is
-        opened.
+        Each opens the source of the condition's signal. It stays open while trials of
+        the condition follow one another, and is closed before another is opened.
     stop : threading.Event
-        Set it to end: the trial that goes on is aborted and comes again.
+        Set it to end: a running trial is aborted and repeated later.
     rate : float
-        How often a signal that holds is looked at, 1/s.
+        How often samples are taken and the visit is updated, 1/s.
 
     Raises
     ------
     InvalidInput
-        When the rate is not positive, or nothing drives a condition.
+        When the rate is not positive, or a condition has no source.
     FileError
         When attempts could not be written.
     """
     if not 0 < rate <= 1000:
         raise InvalidInput(f"expected a rate from 0 to 1000 Hz, found {rate:g}.")
-    conditions = {s.condition for s in conductor.desk.visit.steps if s.condition}
+    conditions = {s.condition for s in conductor.experiment.visit.steps if s.condition}
     missing = sorted(conditions - set(drivers))
     if missing:
-        raise InvalidInput(f"expected something to drive '{missing[0]}', found none.")
-    line = _Line(conductor, drivers)
+        raise InvalidInput(
+            f"expected a source of control signals for '{missing[0]}', found none."
+        )
+    source = _CurrentSource(conductor, drivers)
     due = time.monotonic()
     try:
         while not (stop.is_set() or conductor.over):
-            line.tick(time.monotonic())
-            # A tick that was late is not made up for.
+            source.update(time.monotonic())
+            # A late update is not made up for.
             due = max(due + 1 / rate, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
     finally:
         try:
             conductor.close(time.monotonic())
         finally:
-            line.close()
+            source.close()
 
 
-class _Line:
-    """What drives the present condition."""
+class _CurrentSource:
+    """The source of the current condition's signal."""
 
-    def __init__(
-        self,
-        conductor: Conductor,
-        drivers: Mapping[str, Callable[[], AbstractContextManager[Driver]]],
-    ) -> None:
+    def __init__(self, conductor: Conductor, drivers: Drivers) -> None:
         self._conductor, self._drivers = conductor, drivers
         self._condition = ""
         self._context: AbstractContextManager[Driver] | None = None
         self._driver: Driver | None = None
         self._fault = ""
 
-    def tick(self, now: float) -> None:
-        """Change what drives if need be, and pass on what came."""
+    def update(self, now: float) -> None:
+        """Change the source if the condition changed, and pass its samples on."""
         conductor, wanted = self._conductor, self._conductor.condition
-        if wanted != self._condition or conductor.connect_again():
+        if wanted != self._condition or conductor.take_reconnect():
             self.close()
-            conductor.quiet()
+            conductor.clear_signal()
             self._condition = wanted
             self._open(wanted)
-        facts: Mapping[str, Any] = {}
+        status: Mapping[str, Any] = {}
         if self._driver is not None:
             for at, c in self._driver.take(now):
-                conductor.frame(at, c)
-            facts, fault = self._driver.facts(), self._driver.fault
+                conductor.add_sample(at, c)
+            status, fault = self._driver.status(), self._driver.fault
             if fault:
                 self.close()
-                conductor.quiet()
-                conductor.break_off(now, fault.rstrip("."))
+                conductor.clear_signal()
+                conductor.abort_trial(now, fault.rstrip("."))
                 self._fault = fault
-        conductor.driven(facts, fault=self._fault)
-        conductor.check(time.monotonic())
+        conductor.set_source_status(status, fault=self._fault)
+        conductor.update(time.monotonic())
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the source."""
         context, self._context, self._driver = self._context, None, None
-        self._conductor.at_emergency = []
-        self._conductor.on_event = None
+        self._conductor.on_emergency = []
+        self._conductor.set_event_listener(None)
         if context is not None:
             context.__exit__(None, None, None)
 
@@ -115,7 +110,7 @@ class _Line:
         try:
             self._driver = context.__enter__()
             self._context = context
-            self._conductor.at_emergency = [self._driver.halt]
-            self._conductor.on_event = self._driver.mark
+            self._conductor.on_emergency = [self._driver.halt]
+            self._conductor.set_event_listener(self._driver.log_event)
         except (IknsError, OSError) as error:
             self._fault = str(error)

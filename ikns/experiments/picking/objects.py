@@ -1,4 +1,4 @@
-"""What is picked and placed: the objects of the paper's table."""
+"""The objects that are picked and placed: those of the paper's table."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class PickObject:
         Code in the paper's table.
     name : str
     ycb : str
-        Name in the YCB catalogue.
+        Name in the YCB catalog.
     mass_kg : float
     shape : {"box", "cylinder", "sphere"}
     size_m : tuple of float
         Box: three edges. Cylinder: diameter and height. Sphere: diameter.
     source : {"paper", "ycb"}
-        Whose numbers these are.
+        Where mass and size are from.
     """
 
     id: str
@@ -44,13 +44,13 @@ class PickObject:
 
 
 def load_objects(source: Literal["paper", "ycb"] = "paper") -> dict[str, PickObject]:
-    """All objects, by code, in the order of the table.
+    """Return all objects, by code, in the order of the table.
 
     Parameters
     ----------
     source : "paper" or "ycb"
-        With "ycb", the catalogue's numbers where they are known to differ; an object
-        with the paper's numbers says so.
+        With "ycb", the numbers of the YCB catalog where they are known to differ;
+        ``PickObject.source`` says which an object has.
 
     Examples
     --------
@@ -64,8 +64,8 @@ def load_objects(source: Literal["paper", "ycb"] = "paper") -> dict[str, PickObj
     text = files("ikns.experiments.picking").joinpath("objects.toml").read_text("utf-8")
     found = {}
     for code, row in tomllib.loads(text).items():
-        told: Literal["paper", "ycb"] = source if source in row else "paper"
-        numbers = row[told]
+        used: Literal["paper", "ycb"] = source if source in row else "paper"
+        numbers = row[used]
         found[code] = PickObject(
             id=code,
             name=row["name"],
@@ -73,6 +73,6 @@ def load_objects(source: Literal["paper", "ycb"] = "paper") -> dict[str, PickObj
             mass_kg=numbers["mass_g"] / 1000,
             shape=row["shape"],
             size_m=tuple(edge / 1000 for edge in numbers["size_mm"]),
-            source=told,
+            source=used,
         )
     return found

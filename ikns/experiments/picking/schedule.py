@@ -1,4 +1,4 @@
-"""Which object with which condition, in which order: drawn beforehand."""
+"""Which object in which condition, in which order: drawn in advance."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ikns.experiments.tracking.schedule import williams
 
 __all__ = ["LIMIT", "PickStep", "pick_schedule"]
 
-#: Time for one object, s: the paper's.
+#: Time limit for one object, s (the paper's).
 LIMIT = 20.0
 
 
 @dataclass(frozen=True)
 class PickStep:
-    """One thing to do.
+    """One step of a schedule.
 
     Parameters
     ----------
@@ -28,11 +28,11 @@ class PickStep:
     condition : str
         What drives the finger; empty at a rest.
     object : str
-        Its code; empty at a rest.
+        Code of the object; empty at a rest.
     repeat : int
-        Which time the object comes in this condition, from 0; in training its number.
+        Repeat of the object in this condition, from 0; in training the trial's number.
     limit : float
-        Time allowed, or of the rest, s.
+        Time limit, or duration of the rest, s.
     """
 
     kind: Literal["training", "trial", "rest"]
@@ -43,7 +43,7 @@ class PickStep:
 
     @property
     def key(self) -> str:
-        """Name that no other step of a schedule has; rests have none."""
+        """Name that is unique in a schedule; empty for rests."""
         return (
             ""
             if self.kind == "rest"
@@ -52,7 +52,7 @@ class PickStep:
 
     @property
     def seconds(self) -> float:
-        """The limit, under the name that every kind of step has for its time, s."""
+        """The limit, under the name that steps of all schedules have for it, s."""
         return self.limit
 
 
@@ -67,10 +67,10 @@ def pick_schedule(
     training: int = 10,
     rest: float = 120.0,
 ) -> list[PickStep]:
-    """All steps of one subject: per condition training, then all objects.
+    """Return all steps of a subject: in each condition training, then all objects.
 
-    The order of the conditions changes with every subject. That of the objects is drawn
-    anew for every subject, condition and repeat.
+    The order of the conditions changes with every subject. The order of the objects is
+    drawn anew for every subject, condition and repeat.
 
     Parameters
     ----------
@@ -82,9 +82,9 @@ def pick_schedule(
     repeats : int
         Blocks in each condition; each holds every object once.
     seed : int
-        Of the orders.
+        Of the orders of objects.
     limit : float
-        Time allowed for an object, s.
+        Time limit for an object, s.
     training : int
         Objects to train with before each condition: 10, each put back within 10 s, are
         at most the paper's 5 min.
@@ -94,7 +94,7 @@ def pick_schedule(
     Raises
     ------
     InvalidInput
-        When something is twice, missing or unknown.
+        When a name is missing, duplicate or unknown, or a number is out of range.
 
     Examples
     --------
@@ -105,11 +105,11 @@ def pick_schedule(
     for name, words in (("conditions", conditions), ("objects", objects)):
         if isinstance(words, str) or not words or len(set(words)) != len(words):
             found = repr(words) if isinstance(words, str) else list(words)
-            raise InvalidInput(f"expected {name} that differ, found {found}.")
-    strangers = [code for code in objects if code not in OBJECT_IDS]
-    if strangers:
+            raise InvalidInput(f"expected distinct {name}, found {found}.")
+    unknown = [code for code in objects if code not in OBJECT_IDS]
+    if unknown:
         raise InvalidInput(
-            f"expected objects of {', '.join(OBJECT_IDS)}, found '{strangers[0]}'."
+            f"expected objects of {', '.join(OBJECT_IDS)}, found '{unknown[0]}'."
         )
     if repeats < 1 or training < 0 or subject < 0 or seed < 0:
         raise InvalidInput(
@@ -121,10 +121,10 @@ def pick_schedule(
             f"expected a limit above 0 s and a rest from 0 s, found {limit:g} and "
             f"{rest:g} s."
         )
-    ways = williams(len(conditions))
+    condition_orders = williams(len(conditions))
     steps: list[PickStep] = []
-    for place, number in enumerate(ways[subject % len(ways)]):
-        # A stream of its own: more training or repeats leave the earlier orders alone.
+    for place, number in enumerate(condition_orders[subject % len(condition_orders)]):
+        # Streams of their own: more training or repeats do not change earlier orders.
         orders = np.random.default_rng([seed, subject, int(number), 0])
         trained = np.random.default_rng([seed, subject, int(number), 1])
         condition = conditions[number]

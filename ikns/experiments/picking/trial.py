@@ -1,4 +1,4 @@
-"""One object, picked and placed. It has no clock: every call says the time."""
+"""One pick and place trial. It has no clock: each call gives the time."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Literal, NamedTuple
 from ikns.errors import InvalidInput
 from ikns.experiments.picking.schedule import PickStep
 
-__all__ = ["PickMachine", "PickRecord", "PickView"]
+__all__ = ["PickRecord", "PickTrial", "PickView"]
 
 Ended = Literal["success", "dropped", "timeout", "aborted"]
 State = Literal["waiting", "running", "success", "dropped", "timeout", "aborted"]
 
 
 class PickView(NamedTuple):
-    """What a screen would show.
+    """What a screen shows of the trial.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class PickView(NamedTuple):
 
 @dataclass(frozen=True)
 class PickRecord:
-    """What a trial left.
+    """The result of a trial.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class PickRecord:
     reason : str
         Why it was aborted.
     comment : str
-        Of the experimenter.
+        By the experimenter.
     """
 
     step: PickStep
@@ -55,25 +55,25 @@ class PickRecord:
     comment: str = ""
 
 
-class PickMachine:
-    """The trial as it goes: started and stopped by a key or a button.
+class PickTrial:
+    """A running trial, as a state machine: a key or a button starts and stops it.
 
     Parameters
     ----------
     step : PickStep
-        What to pick, and within which time.
+        Object and time limit.
 
     Attributes
     ----------
     state : str
     comment : str
-        To be written at any time before the record is taken.
+        May be set at any time before the record is read.
 
     Examples
     --------
-    >>> trial = PickMachine(PickStep("trial", "ikns", "A"))
+    >>> trial = PickTrial(PickStep("trial", "ikns", "A"))
     >>> trial.start(100.0)
-    >>> trial.check(104.0).left
+    >>> trial.update(104.0).left
     16.0
     >>> trial.stop(108.5, "success").state, trial.record.time
     ('success', 8.5)
@@ -91,7 +91,7 @@ class PickMachine:
         self._reason = ""
 
     def start(self, now: float) -> None:
-        """Let the time run.
+        """Start the clock.
 
         Raises
         ------
@@ -107,9 +107,9 @@ class PickMachine:
         self.state = "running"
 
     def stop(self, now: float, outcome: Literal["success", "dropped"]) -> PickView:
-        """Say how it went; from the limit on it is a time-out whatever is said.
+        """Set the outcome; from the limit on it is always "timeout".
 
-        A trial that has ended stays as it is: a key pressed twice changes nothing.
+        A trial that has ended does not change: a second key press has no effect.
 
         Raises
         ------
@@ -122,14 +122,14 @@ class PickMachine:
             )
         if self.state == "waiting":
             raise InvalidInput("expected a trial that was started, found it waiting.")
-        if self.check(now).state == "running":
+        if self.update(now).state == "running":
             self.state = outcome
-        return self.check(now)
+        return self.update(now)
 
-    def check(self, now: float) -> PickView:
+    def update(self, now: float) -> PickView:
         """Let time pass; at the limit the trial ends."""
         if self.state == "running" and now > self._now:
-            # As a caller adds it, so that the limit is met whatever the zero rounds.
+            # The sum as a caller computes it, so that rounding cannot miss the limit.
             end = self._zero + self.step.limit
             self._now = min(now, end)
             if now >= end:
@@ -138,18 +138,18 @@ class PickMachine:
         return PickView(self.state, time, self.step.limit - time)
 
     def abort(self, now: float, reason: str) -> None:
-        """End it without an outcome."""
-        if self.check(now).state in ("waiting", "running"):
+        """End the trial without an outcome."""
+        if self.update(now).state in ("waiting", "running"):
             self.state, self._reason = "aborted", reason
 
     @property
     def record(self) -> PickRecord:
-        """Of a trial that ended.
+        """The result of a trial that has ended.
 
         Raises
         ------
         InvalidInput
-            While it goes on.
+            While the trial is running.
         """
         if self.state == "waiting" or self.state == "running":
             raise InvalidInput(f"expected a trial that ended, found it {self.state}.")

@@ -1,4 +1,4 @@
-"""A subject's visit: the objects of the schedule, one after the other."""
+"""A subject's pick and place visit: the steps of the schedule in order."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
 from ikns.experiments.picking.schedule import PickStep
-from ikns.experiments.picking.trial import PickMachine, PickRecord
+from ikns.experiments.picking.trial import PickRecord, PickTrial
 from ikns.experiments.progress import Progress
 
-__all__ = ["PickAttempt", "PickVisit"]
+__all__ = ["FINAL", "PickAttempt", "PickVisit"]
 
-#: A drop and a time-out are results, not reasons to try again.
+#: Outcomes after which a step is not repeated: a drop and a timeout are results.
 FINAL = ("success", "dropped", "timeout", "skipped")
 
 
 class PickAttempt(NamedTuple):
-    """How a step went once.
+    """One attempt at a step.
 
     Parameters
     ----------
     key : str
         Of the step.
     outcome : {"success", "dropped", "timeout", "aborted", "skipped", "again"}
-        An aborted trial comes again. "again": what was done before is to be repeated
-        and does not count.
+        An aborted trial is repeated. "again": the attempt before it does not count, and
+        the step is repeated.
     reason : str
     record : PickRecord or None
-        None where nothing was recorded or it was not kept in memory.
+        None where nothing was recorded, or the record is no longer in memory.
     """
 
     key: str
@@ -37,21 +37,21 @@ class PickAttempt(NamedTuple):
 
 
 class PickVisit:
-    """Where a subject is in the schedule. No screen, no clock, no disk.
+    """Progress of a subject through the schedule; without screen, clock or disk.
 
     Parameters
     ----------
     steps : sequence of PickStep
         From :func:`ikns.experiments.picking.pick_schedule`.
     attempts : iterable of PickAttempt
-        Of a visit that was broken off: it goes on where it stopped.
+        Of earlier runs of the visit: it continues where it stopped.
 
     Attributes
     ----------
     attempts : list of PickAttempt
-        Everything that was tried, in order; nothing is ever taken out.
-    trial : PickMachine or None
-        The trial that goes on, or waits for its start.
+        All attempts in order; none is ever removed.
+    trial : PickTrial or None
+        The trial that is running, or ready to start.
 
     Examples
     --------
@@ -69,11 +69,11 @@ class PickVisit:
     ) -> None:
         self._progress = Progress(steps, attempts, final=FINAL)
         self.steps, self.attempts = self._progress.steps, self._progress.attempts
-        self.trial: PickMachine | None = None
+        self.trial: PickTrial | None = None
 
     @property
     def ended(self) -> dict[str, PickAttempt]:
-        """Last attempt at each step that counts or was skipped, by key."""
+        """Final attempt at each step that was done or skipped, by key."""
         return self._progress.ended
 
     @property
@@ -83,41 +83,41 @@ class PickVisit:
 
     @property
     def current(self) -> PickStep | None:
-        """What is to be done now; None when all is."""
+        """Current step; None when all are done."""
         return self._progress.current
 
-    def begin(self, now: float | None = None) -> PickMachine:
+    def begin(self, now: float | None = None) -> PickTrial:
         """Make the current trial ready, and start it when a time is given.
 
-        Without, the trial waits for its ``start``: the participant's own key.
+        Without a time, the trial waits for ``start``: the participant's own key.
 
         Raises
         ------
         InvalidInput
-            When one goes on, a rest is due, or nothing is left.
+            When a trial is running, a rest is due, or nothing is left.
         """
-        step = self._progress.to_begin(going_on=self.trial is not None)
-        trial = PickMachine(step)
+        step = self._progress.next_trial(running=self.trial is not None)
+        trial = PickTrial(step)
         if now is not None:
             trial.start(now)
         self.trial = trial
         return trial
 
     def finish(self) -> bool:
-        """Put down the trial if it has come to its end; say whether it had."""
+        """Add the attempt if the trial has ended; say whether it had."""
         if self.trial is None or self.trial.state in ("waiting", "running"):
             return False
-        self._put(self.trial.record)
+        self._add_attempt(self.trial.record)
         return True
 
     def abort(self, now: float, reason: str) -> None:
-        """Break the trial off; it comes again at once."""
+        """Abort the trial; it is repeated at once."""
         if self.trial is not None:
             self.trial.abort(now, reason)
-            self._put(self.trial.record, reason)
+            self._add_attempt(self.trial.record, reason)
 
     def skip(self, now: float, reason: str) -> None:
-        """Leave the current step out."""
+        """Skip the current step."""
         step = self.current
         if self.trial is not None:
             self.trial.abort(now, reason)
@@ -130,12 +130,12 @@ class PickVisit:
             self.attempts.append(PickAttempt(step.key, "skipped", reason))
 
     def repeat(self, reason: str) -> None:
-        """Have the last finished or skipped step again; what it gave does not count."""
-        key = self._progress.to_repeat(going_on=self.trial is not None)
+        """Repeat the last finished or skipped step; that attempt does not count."""
+        key = self._progress.key_to_repeat(running=self.trial is not None)
         self.attempts.append(PickAttempt(key, "again", reason))
 
     def rest(self, now: float) -> float:
-        """Time left of the rest that is due, s; 0 when none is, or it is over."""
+        """Return the time left of the current rest, s; 0 without one or at its end."""
         return self._progress.rest(now)
 
     def records(self) -> dict[str, PickRecord]:
@@ -146,7 +146,7 @@ class PickVisit:
             if a.outcome != "skipped" and a.record is not None
         }
 
-    def _put(self, record: PickRecord, reason: str = "") -> None:
+    def _add_attempt(self, record: PickRecord, reason: str = "") -> None:
         reason = reason or record.reason
         attempt = PickAttempt(record.step.key, record.outcome, reason, record)
         self.attempts.append(attempt)

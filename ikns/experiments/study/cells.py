@@ -1,4 +1,4 @@
-"""A cell: one virtual participant in one experiment under one variation."""
+"""Simulates the cells of a study: a participant, an experiment, a variation each."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from ikns.experiments.study.declaration import Study
 from ikns.experiments.study.design import Parameters, PickingDesign, TrackingDesign
 from ikns.experiments.study.people import study_participant
 from ikns.experiments.tracking.profiles import draw_profile
-from ikns.experiments.tracking.schedule import Step
+from ikns.experiments.tracking.schedule import TrackingStep
 from ikns.experiments.tracking.virtual import virtual_step
 from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import table_bytes, tracking_row
 from ikns.simulation.operator import Participant
 
-__all__ = ["Cell", "Task", "simulate", "visit_name"]
+__all__ = ["SimulatedVisit", "Task", "simulate", "visit_name"]
 
-S = TypeVar("S", Step, PickStep)
+S = TypeVar("S", TrackingStep, PickStep)
 
-#: What keeps one virtual person from taking part, without being a fault of the program.
+#: Errors that keep one virtual person from taking part, and do not end the run.
 _FAULTS = (IknsError, ArithmeticError, np.linalg.LinAlgError)
 _INPUTS = {
     "ikns": "virtual operator through body, cameras and map (simulated)",
@@ -42,9 +42,9 @@ _INPUTS = {
 
 @dataclass(frozen=True)
 class Task:
-    """Cells of one participant under one variation that are to be simulated.
+    """Cells to simulate of one participant under one variation.
 
-    They go to one worker together: drawing and calibrating the person takes a third of
+    One worker does them together: drawing and calibrating the person takes a third of
     the time.
 
     Parameters
@@ -63,20 +63,20 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Cell:
-    """A simulated cell, ready to be written.
+class SimulatedVisit:
+    """A simulated visit, ready to be written.
 
     Parameters
     ----------
     name : str
-        Of its visit's folder, relative to ``visits``.
+        Of its folder, relative to ``visits``.
     about : dict
-        Its ``visit.json``.
+        Content of ``visit.json``.
     attempts : bytes
-        Its Parquet file.
+        Parquet file.
     others : dict of str to bytes
-        Other files, by their names in the folder: of the first participant's subject,
-        to show what was learned from.
+        Other files, by their names in the folder: the subject of the first participant,
+        for the report.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Cell:
 
 
 def visit_name(experiment: str, number: int, variation: str = "") -> str:
-    """Folder of a participant's visit, relative to ``visits``.
+    """Return the folder of a participant's visit, relative to ``visits``.
 
     >>> visit_name("tracking", 0), visit_name("picking", 99, "gate")
     ('sub-01_tracking', 'gate/sub-100_picking')
@@ -96,11 +96,12 @@ def visit_name(experiment: str, number: int, variation: str = "") -> str:
 
 
 def check_libraries(study: Study) -> None:
-    """Refuse to begin without a library that a study's simulation needs.
+    """Check that the libraries for simulating a study are installed.
 
     Raises
     ------
     InvalidInput
+        When one is missing.
     """
     needed = {"pyarrow": "visits are written"}
     if study.picking is not None:
@@ -113,20 +114,20 @@ def check_libraries(study: Study) -> None:
             )
 
 
-def simulate(task: Task) -> list[Cell]:
-    """Simulate cells; the result depends on the task and on nothing else.
+def simulate(task: Task) -> list[SimulatedVisit]:
+    """Simulate the visits of a task; the result depends on the task alone.
 
-    A person whom nobody of 20 can replace, or whose calibration fails, has visits
-    without attempts, and ``visit.json`` says why.
+    If no one of 20 persons drawn can do the protocol, or the calibration fails, the
+    visits have no attempts, and ``visit.json`` says why.
     """
     study, parameters = task.study, task.study.parameters_of(task.variation)
-    check_libraries(study)  # a worker elsewhere may lack one: no fault of the person
+    check_libraries(study)  # a worker on another machine may lack one
     person, fault = None, ""
     try:
         person = study_participant(task.number, seed=study.seed, parameters=parameters)
     except _FAULTS as error:
         fault = str(error)
-    cells = []
+    visits = []
     for experiment in task.experiments:
         rows: list[dict[str, Any]] = []
         reason = fault
@@ -140,8 +141,9 @@ def simulate(task: Task) -> list[Cell]:
         others = {}
         if person is not None and task.number == 0:
             others = _subject_files(person.subject)
-        cells.append(Cell(name, about, table_bytes(experiment, rows), others))
-    return cells
+        attempts = table_bytes(experiment, rows)
+        visits.append(SimulatedVisit(name, about, attempts, others))
+    return visits
 
 
 def _subject_files(subject: Subject) -> dict[str, bytes]:
@@ -204,9 +206,9 @@ def _picking(
 
 
 def _trials(steps: Iterable[S]) -> Iterator[tuple[S, int]]:
-    """Go through the trials, each with how many were done in its condition before.
+    """Yield the trials, each with the count of earlier ones in its condition.
 
-    Training is counted and not simulated: what it leaves behind is its count.
+    Training trials are counted but not simulated: only their count has an effect.
     """
     done: Counter[str] = Counter()
     for step in steps:

@@ -1,4 +1,4 @@
-"""The study file: what is done, with whom, and what would count as a difference."""
+"""The study file: experiments, participants, and margins of equivalence."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ __all__ = ["FILE", "FORMAT", "Study", "read_study", "study_from_table"]
 
 #: Name of the file in a study folder, and the version of its keys.
 FILE, FORMAT = "study.toml", 1
-#: What virtual participants can do.
+#: Conditions that virtual participants can do.
 _SIMULATED = {"tracking": CONDITIONS, "picking": ("ikns", "ring")}
 _TABLES = ("study", "cohort", "tracking", "picking", "parameters", "variations")
-#: Longest cohort: participants are numbered, and drawn one by one.
-_MOST = 1_000_000
+#: Largest cohort.
+_MAX_PARTICIPANTS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study as declared.
+    """A study as its file declares it.
 
     Parameters
     ----------
     name : str
     seed : int
-        Of everything: profiles, orders, virtual participants.
+        Of profiles, orders and virtual participants.
     simulated : bool
         Whether participants are virtual.
     participants : int
     tracking : TrackingDesign or None
     picking : PickingDesign or None
     parameters : Parameters
-        Of virtual participants; nothing with people depends on them.
+        Of virtual participants; visits of people do not depend on them.
     variations : dict of str to dict
-        By name, the parameters that each changes.
+        The parameters that each variation changes, by name.
     """
 
     name: str
@@ -58,16 +58,16 @@ class Study:
 
     @property
     def designs(self) -> dict[str, TrackingDesign | PickingDesign]:
-        """The experiments that are declared, by name."""
+        """The declared experiments, by name."""
         both = {"tracking": self.tracking, "picking": self.picking}
         return {name: design for name, design in both.items() if design is not None}
 
     def parameters_of(self, variation: str = "") -> Parameters:
-        """Return the settings of a variation; of none: those of the study."""
+        """Return the parameters of a variation; without one those of the study."""
         return replace(self.parameters, **self.variations.get(variation, {}))
 
     def declared(self) -> dict[str, Any]:
-        """Return everything as text, numbers, lists and tables."""
+        """Return the whole declaration as text, numbers, lists and tables."""
         table = asdict(self)
         for name in self.designs:
             table[name] = {
@@ -101,9 +101,9 @@ def read_study(study: str | Path) -> Study:
     Raises
     ------
     FileError
-        When there is none, or it is not TOML.
+        When it is missing or not TOML.
     InvalidInput
-        When a key is unknown, or the design impossible.
+        When a key is unknown, or the design is impossible.
     """
     path = Path(study)
     path = path / FILE if path.is_dir() else path
@@ -123,12 +123,12 @@ def read_study(study: str | Path) -> Study:
 
 
 def study_from_table(table: Mapping[str, Any]) -> Study:
-    """Make a study of the tables of its file.
+    """Make a study from the tables of its file.
 
     Raises
     ------
     InvalidInput
-        When a key is unknown, or the design impossible.
+        When a key is unknown, or the design is impossible.
 
     Examples
     --------
@@ -152,9 +152,10 @@ def study_from_table(table: Mapping[str, Any]) -> Study:
             f"expected a seed from 0 to below 2**32 in [study], found {head.seed}."
         )
     participants = fill(_Cohort, table["cohort"], "cohort").participants
-    if not 1 <= participants <= _MOST:
+    if not 1 <= participants <= _MAX_PARTICIPANTS:
         raise InvalidInput(
-            f"expected 1 to {_MOST} participants in [cohort], found {participants}."
+            f"expected 1 to {_MAX_PARTICIPANTS} participants in [cohort], found "
+            f"{participants}."
         )
     tracking = picking = None
     if "tracking" in table:
@@ -176,7 +177,7 @@ def study_from_table(table: Mapping[str, Any]) -> Study:
         variations=variations,
     )
     _check_simulated(found)
-    if tracking is not None:  # a short one of its character may not exist
+    if tracking is not None:  # a short profile may not exist for its character
         for step in tracking.steps(0, seed=found.seed):
             if step.kind != "rest":
                 draw_profile(step.profile, step.seed, seconds=step.seconds)

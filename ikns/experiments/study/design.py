@@ -1,4 +1,4 @@
-"""What is declared of a study: the two experiments and the simulation's settings."""
+"""Declared parts of a study: the two experiments and the simulation's parameters."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ikns.experiments.picking.objects import OBJECT_IDS
 from ikns.experiments.picking.schedule import LIMIT, PickStep, pick_schedule
 from ikns.experiments.study.tables import choice, positive
 from ikns.experiments.tracking.profiles import CHARACTERS, draw_profile
-from ikns.experiments.tracking.schedule import Step, schedule
+from ikns.experiments.tracking.schedule import TrackingStep, schedule
 from ikns.experiments.tracking.trial import ALIGN
 
 __all__ = ["LAYOUTS", "Parameters", "PickingDesign", "TrackingDesign"]
 
-#: Points of the calibration's box, by their numbers there, that make the map.
+#: Numbers of the points of the calibration box from which the map is learned.
 LAYOUTS = {
     "box": tuple(range(10)),
     "corners": tuple(range(8)),
-    # Every second corner: no two of them share an edge of the box.
+    # Every second corner: no two share an edge of the box.
     "tetrahedron": (0, 2, 5, 7),
 }
 _INTERPOLATIONS = ("natural", "laplace", "nearest")
@@ -40,8 +40,8 @@ class TrackingDesign:
     seconds, align, rest : float
         s.
     margin : float, optional
-        Difference of RMSE, of 100, that does not matter: for the equivalence test.
-        Without it none is made.
+        Margin of equivalence for RMSE, of 100: a difference that does not matter.
+        Without it equivalence is not tested.
     """
 
     conditions: tuple[str, ...] = ("ikns", "gamepad")
@@ -54,7 +54,7 @@ class TrackingDesign:
     margin: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be done or compared."""
+        """Check that the design is possible and has conditions to compare."""
         _check_blocks("tracking", self.conditions, self.repeats, self.training)
         _check_different("tracking", "profiles", self.profiles)
         for name in self.profiles:
@@ -65,7 +65,7 @@ class TrackingDesign:
             positive("tracking", margin=self.margin)
 
     def arguments(self, *, seed: int) -> dict[str, Any]:
-        """Return what the schedule depends on besides the participant's number."""
+        """Return the schedule's arguments, except for the participant's number."""
         return {
             "conditions": list(self.conditions),
             "profiles": list(self.profiles),
@@ -76,7 +76,7 @@ class TrackingDesign:
             "rest": self.rest,
         }
 
-    def steps(self, number: int, *, seed: int) -> list[Step]:
+    def steps(self, number: int, *, seed: int) -> list[TrackingStep]:
         """Return the schedule of a participant, counted from 0."""
         return schedule(number, **self.arguments(seed=seed))
 
@@ -93,7 +93,7 @@ class PickingDesign:
     limit, rest : float
         s.
     margin_s : float, optional
-        Difference of time that does not matter, s.
+        Margin of equivalence for time, s: a difference that does not matter.
     """
 
     conditions: tuple[str, ...] = ("ikns", "ring")
@@ -105,7 +105,7 @@ class PickingDesign:
     margin_s: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be done or compared."""
+        """Check that the design is possible and has conditions to compare."""
         _check_blocks("picking", self.conditions, self.repeats, self.training)
         _check_different("picking", "objects", self.objects)
         for code in self.objects:
@@ -116,7 +116,7 @@ class PickingDesign:
             positive("picking", margin_s=self.margin_s)
 
     def arguments(self, *, seed: int) -> dict[str, Any]:
-        """Return what the schedule depends on besides the participant's number."""
+        """Return the schedule's arguments, except for the participant's number."""
         return {
             "conditions": list(self.conditions),
             "objects": list(self.objects),
@@ -134,27 +134,28 @@ class PickingDesign:
 
 @dataclass(frozen=True)
 class Parameters:
-    """How virtual participants are filmed, calibrated and connected.
+    """Parameters of virtual participants: recording, calibration, live control.
 
     Parameters
     ----------
     rate : float
         Frames per second.
     max_hand_speed : float
-        Gate of the calibration, m/s.
+        Hand speed below which the calibration uses a sample, m/s.
     n_points : int
-        Points of the box that are visited, 5 to 10.
+        Points of the calibration box, 5 to 10.
     layout : {"box", "corners", "tetrahedron"}
-        Which of them make the map: all, the eight corners, every second corner.
+        From which of them the map is learned: all, the corners, every second corner.
     interpolation : {"natural", "laplace", "nearest"}
-        Between the points: natural neighbors by volume or by area, or the nearest one.
+        Between the points: natural neighbors by volume or by area, or the nearest
+        point.
     outside : {"nearest", "project", "nan"}
-        Of the map. While tracking, the hand is held in the middle of the points, so
-        this matters in picking only.
+        Extrapolation of the map. It matters in picking only: while tracking, the hand
+        is held in the middle of the points.
     point_seconds : float
-        Stay at each point, s.
+        Time at each point, s.
     marker_noise : float
-        Of the cameras, m, standard deviation per axis.
+        Camera noise, m, standard deviation per axis.
     occluded : float
         Share of marker frames that the cameras miss.
     soft_tissue : float
@@ -162,8 +163,8 @@ class Parameters:
     latency : float
         From a posture to its c, s.
     smoothing : bool
-        Whether the operator who tracks sees c smoothed as the live loop does it. The
-        finger that picks is always driven by the live controller.
+        Whether c is smoothed in tracking as the live loop does it. In picking the live
+        controller always drives the finger.
     """
 
     rate: float = 100.0
@@ -180,7 +181,7 @@ class Parameters:
     smoothing: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what nothing can be simulated with."""
+        """Check that the parameters are possible."""
         where = "parameters"
         positive(
             where,
@@ -214,7 +215,7 @@ class Parameters:
 
     @property
     def points(self) -> tuple[int, ...]:
-        """Numbers of the points that make the map, from 0."""
+        """Numbers of the points from which the map is learned, from 0."""
         return tuple(k for k in LAYOUTS[self.layout] if k < self.n_points)
 
 
@@ -241,7 +242,7 @@ def _check_blocks(
 def _check_different(where: str, key: str, words: Sequence[str]) -> None:
     if not words or "" in words or len(set(words)) != len(words):
         raise InvalidInput(
-            f"expected {key} that differ in [{where}], found {list(words)}."
+            f"expected distinct {key} in [{where}], found {list(words)}."
         )
 
 

@@ -1,4 +1,4 @@
-"""The study that ships: the paper's two experiments with virtual participants."""
+"""The example study: the paper's two experiments with virtual participants."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ def init_study(folder: str | Path, *, force: bool = False) -> Path:
     folder : str or Path
         New; its parent must exist.
     force : bool
-        Whether to replace a study file. A folder with results is never replaced.
+        Whether to replace an existing study file. A folder with results is never
+        replaced.
 
     Returns
     -------
     Path
-        Of the file.
+        Path of the file.
 
     Raises
     ------
     InvalidInput
-        When something is in the way.
+        When the folder exists and may not be replaced.
     """
     text = files("ikns.experiments.study").joinpath("example.toml").read_bytes()
     check_output_folder(folder, (FILE,), force=force)

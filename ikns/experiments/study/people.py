@@ -1,4 +1,4 @@
-"""Virtual participants of a study: drawn, and calibrated under its parameters."""
+"""Virtual participants of a study: drawn, and calibrated with its parameters."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from ikns.simulation.protocol import Protocol
 
 __all__ = ["recalibrated", "study_participant"]
 
-#: Parameters that change what is made of the recordings, not the recordings.
+#: Parameters of the calibration, which do not change the recordings.
 _OF_CALIBRATION = ("max_hand_speed", "layout", "outside")
 
 
 def study_participant(number: int, *, seed: int, parameters: Parameters) -> Participant:
-    """Draw a participant and calibrate it as the parameters say.
+    """Draw a participant and calibrate it with the parameters.
 
-    The same number and seed give the same body, ability, habits and luck under any
-    parameters. Only where another number of points makes the protocol possible or not
-    may another person take a place; `redrawn` then differs.
+    The same number and seed give the same body, ability, habits and noise for all
+    parameters, with one exception: where the number of points decides whether a person
+    can do the protocol, another person may be drawn, and `redrawn` differs.
 
     Raises
     ------
     InvalidInput
-        When nobody of 20 can do the protocol.
+        When no one of 20 persons drawn can do the protocol.
     NotEnoughData
         When the calibration fails.
     """
@@ -53,7 +53,7 @@ def study_participant(number: int, *, seed: int, parameters: Parameters) -> Part
 
 
 def recalibrated(person: Participant, parameters: Parameters) -> Participant:
-    """Return the same participant with a map made of the same recordings otherwise.
+    """Return the participant with a map learned with other calibration parameters.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def recalibrated(person: Participant, parameters: Parameters) -> Participant:
         subject = _calibrated(person.protocol, parameters)
         person = dataclasses.replace(person, subject=subject)
     if parameters.interpolation != "natural":
-        learned = _between(
+        learned = _with_interpolation(
             person.subject.null_space_map,
             parameters.interpolation,
             outside=parameters.outside,
@@ -76,7 +76,7 @@ def recalibrated(person: Participant, parameters: Parameters) -> Participant:
 
 
 def _calibrated(protocol: Protocol, parameters: Parameters) -> Subject:
-    """Calibrate anew from the same recordings."""
+    """Calibrate again from the same recordings."""
     adult, points = protocol.subject.adult, parameters.points
     recordings = [protocol.points.recording]
     if len(points) < len(protocol.places):
@@ -93,7 +93,7 @@ def _calibrated(protocol: Protocol, parameters: Parameters) -> Subject:
 
 
 def _at_point(protocol: Protocol, point: int) -> Recording:
-    """Cut out the stay at one point."""
+    """Cut out the samples at one point."""
     rows = np.flatnonzero(protocol.points.point == point)
     whole = protocol.points.recording
     return Recording(
@@ -104,8 +104,10 @@ def _at_point(protocol: Protocol, point: int) -> Recording:
     )
 
 
-def _between(learned: NullSpaceMap, method: str, *, outside: str) -> NullSpaceMap:
-    """Return the map with other weights between its points."""
+def _with_interpolation(
+    learned: NullSpaceMap, method: str, *, outside: str
+) -> NullSpaceMap:
+    """Return the map with another interpolation between its points."""
     changed = copy.copy(learned)
     changed.interpolator_ = (
         NearestPoint(learned.centers_)

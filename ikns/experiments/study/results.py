@@ -1,4 +1,4 @@
-"""What a study folder holds so far: what was declared, which cells are done."""
+"""State of a study folder: the saved declaration, and the missing visits."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ikns.experiments.study.cells import Task, visit_name
 from ikns.experiments.study.declaration import FILE, Study
 from ikns.experiments.visits import EXPERIMENTS, list_visits
 
-__all__ = ["alone", "check_declared", "keep_declared", "tasks"]
+__all__ = ["check_declaration", "missing_tasks", "run_lock", "save_declaration"]
 
-#: Copy of the declaration that the results were made under, and the lock of a run.
+#: Copy of the declaration from before the first result, and lock file of a run.
 _DECLARED, _LOCK = "declared.json", ".run.lock"
 
 
-def check_declared(folder: Path, study: Study) -> None:
-    """Make sure that results and study file mean the same.
+def check_declaration(folder: Path, study: Study) -> None:
+    """Check that the study file still agrees with the results.
 
-    More participants, another experiment, more variations and another name are no
-    change of what is there. A margin is: it has to be declared before the results.
+    More participants, another experiment, more variations and another name are allowed.
+    A changed margin is not: it must be declared before the results.
 
     Raises
     ------
@@ -33,23 +33,25 @@ def check_declared(folder: Path, study: Study) -> None:
     FileError
         When the copy of the declaration is damaged.
     """
-    before, now = _before(folder), study.declared()
+    before, now = _saved_declaration(folder), study.declared()
     if before is None:
         return
     place = folder / FILE
     for key in ("seed", "simulated", "parameters"):
-        _same(place, key, before.get(key), now[key])
+        _check_unchanged(place, key, before.get(key), now[key])
     for key in EXPERIMENTS:
         if before.get(key) is not None:
-            _same(place, key, before[key], now[key])
+            _check_unchanged(place, key, before[key], now[key])
     for name, changes in before.get("variations", {}).items():
-        _same(place, f"variations.{name}", changes, now["variations"].get(name))
+        _check_unchanged(
+            place, f"variations.{name}", changes, now["variations"].get(name)
+        )
 
 
-def keep_declared(folder: Path, study: Study) -> None:
-    """Write down what was declared, before the first result; later what was added."""
-    check_declared(folder, study)
-    before, now = _before(folder), study.declared()
+def save_declaration(folder: Path, study: Study) -> None:
+    """Save the declaration before the first result, and later what was added."""
+    check_declaration(folder, study)
+    before, now = _saved_declaration(folder), study.declared()
     kept = now if before is None else {**now, "participants": before["participants"]}
     if before is not None:
         for key in EXPERIMENTS:
@@ -64,13 +66,13 @@ def keep_declared(folder: Path, study: Study) -> None:
 
 
 @contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Keep a second run off the same study; a killed one is in nobody's way.
+def run_lock(folder: Path) -> Iterator[None]:
+    """Hold the lock of a study; the lock of a killed run is released.
 
     Raises
     ------
     InvalidInput
-        When another run goes on.
+        When another run holds it.
     """
     visits = folder / "visits"
     visits.mkdir(exist_ok=True)
@@ -79,21 +81,20 @@ def alone(folder: Path) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise InvalidInput(
-                f"{folder}: expected to run a study once at a time, found another run "
-                "that goes on."
+                f"{folder}: expected to run a study once at a time, found another run."
             ) from None
         yield
 
 
-def tasks(folder: Path, study: Study, *, participants: int) -> Iterator[Task]:
-    """Go through what is not there yet, one participant after the other.
+def missing_tasks(folder: Path, study: Study, *, participants: int) -> Iterator[Task]:
+    """Yield the missing visits, participant by participant.
 
-    Lazily: whether a visit is there is asked when its turn comes.
+    Lazily: each visit is looked for when its turn comes.
 
     Raises
     ------
     FileError
-        When a visit's folder is there without its table.
+        When a visit's folder exists without its ``visit.json``.
     """
     for variation in ("", *study.variations):
         for number in range(participants):
@@ -119,8 +120,8 @@ def _done(visit: Path) -> bool:
     return True
 
 
-def _before(folder: Path) -> dict[str, Any] | None:
-    if not list_visits(folder):  # a run that came to nothing declares nothing
+def _saved_declaration(folder: Path) -> dict[str, Any] | None:
+    if not list_visits(folder):  # a declaration without results may change
         return None
     place = folder / "visits" / _DECLARED
     try:
@@ -131,16 +132,16 @@ def _before(folder: Path) -> dict[str, Any] | None:
     except OSError as error:
         raise FileError(f"{place}: cannot be read: {error.strerror}.") from None
     except (ValueError, LookupError, TypeError):
-        raise FileError(f"{place}: cannot be read as what was declared.") from None
+        raise FileError(f"{place}: cannot be read as a declaration.") from None
     return dict(table)
 
 
-def _same(place: Path, key: str, before: Any, now: Any) -> None:
+def _check_unchanged(place: Path, key: str, before: Any, now: Any) -> None:
     if before == now:
         return
     if isinstance(before, dict) and isinstance(now, dict):
         for name in before:
-            _same(place, f"{key}.{name}", before[name], now.get(name))
+            _check_unchanged(place, f"{key}.{name}", before[name], now.get(name))
     raise InvalidInput(
         f"{place}: there are results with {key} = {before}, found {now}; restore it "
         "or make a new study."

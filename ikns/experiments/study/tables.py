@@ -1,4 +1,4 @@
-"""A table of a study file as a dataclass: unknown keys and wrong kinds are refused."""
+"""Tables of a study file as dataclasses; unknown keys and wrong types are errors."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _WORDS = {
 
 
 def fill(kind: type[T], table: Any, where: str) -> T:
-    """Make a dataclass of a table; what the table leaves out has its default.
+    """Make a dataclass from a table; missing keys get their defaults.
 
     Raises
     ------
     InvalidInput
-        When a key is unknown or missing, or a value is of another kind.
+        When a key is unknown or missing, or a value is of another type.
     """
     if not isinstance(table, Mapping):
         raise InvalidInput(f"expected a table [{where}], found {table!r}.")
@@ -47,7 +47,7 @@ def fill(kind: type[T], table: Any, where: str) -> T:
 
 
 def check_keys(table: Iterable[str], known: Iterable[str], where: str) -> None:
-    """Refuse a key that is not known, and name the nearest one that is."""
+    """Raise if a key is unknown, and name the most similar known one."""
     names = list(known)
     for key in table:
         if key in names:
@@ -59,7 +59,7 @@ def check_keys(table: Iterable[str], known: Iterable[str], where: str) -> None:
 
 
 def positive(where: str, **numbers: float) -> None:
-    """Refuse numbers that are not above 0 and finite."""
+    """Raise if a number is not above 0 and finite."""
     for name, value in numbers.items():
         if not 0 < value < math.inf:
             raise InvalidInput(
@@ -68,7 +68,7 @@ def positive(where: str, **numbers: float) -> None:
 
 
 def choice(where: str, key: str, found: str, known: Iterable[str]) -> None:
-    """Refuse a word that is none of those known."""
+    """Raise if a word is none of the known ones."""
     names = list(known)
     if found not in names:
         raise InvalidInput(

@@ -1,7 +1,7 @@
-"""Where cells are computed: in this process, on all cores, or on a Dask cluster.
+"""Runs tasks in this process, in several processes, or on a Dask cluster.
 
-Workers compute and hand back; only the process that runs the study writes. So workers
-need no common disk, and what happens to them leaves no trace.
+Workers only compute and return results; the process that runs the study writes them. So
+workers need no shared disk, and a failed worker leaves no files behind.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ __all__ = ["compute", "processes"]
 T = TypeVar("T")
 R = TypeVar("R")
 
-#: How long a scheduler may take to answer, s.
-_PATIENCE = 10.0
-#: How often a worker looks whether the run goes on, s.
-_LOOK = 0.5
-_GOES_ON = "what was finished is kept, and the same command goes on from there"
+#: A scheduler must answer within this time, s.
+_CONNECT_TIMEOUT = 10.0
+#: How often a worker checks that the run is alive, s.
+_POLL_INTERVAL = 0.5
+_RESUMES = "finished visits are kept, and the same command continues from there"
 
 
 def compute(
@@ -37,41 +37,42 @@ def compute(
     n_jobs: int = -1,
     scheduler: str | None = None,
 ) -> Iterator[R]:
-    """Yield results as they come, in any order; tasks are taken as workers get free.
+    """Yield results as they finish, in any order.
 
-    Linear algebra uses one thread a worker, so that sums are added up in one order.
+    Linear algebra uses one thread per worker, so that the order of sums is fixed.
 
     Parameters
     ----------
     work : callable
     tasks : iterable
-        Taken lazily: two for each worker at a time.
+        Taken lazily, two per worker at a time.
     n_jobs : int
-        Processes; as in joblib, -1 is one for each core. 1 is this process.
+        Processes; as in joblib, -1 is one per core. 1 is this process.
     scheduler : str, optional
-        Address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``; instead of
-        processes here.
+        Address of a Dask scheduler to use instead, such as ``tcp://10.0.0.1:8786``.
 
     Raises
     ------
     InvalidInput
-        With no workers, or without Dask.
+        Without workers, or without Dask.
     StreamError
         When the scheduler does not answer, or a worker dies.
     """
     if scheduler is not None:
-        return _on_dask(work, tasks, scheduler)
+        return _on_cluster(work, tasks, scheduler)
     n = processes(n_jobs)
-    return _here(work, tasks) if n == 1 else _on_cores(work, tasks, n)
+    if n == 1:
+        return _in_this_process(work, tasks)
+    return _in_processes(work, tasks, n)
 
 
 def processes(n_jobs: int) -> int:
-    """Return how many processes are meant; as in joblib, -1 is one for each core.
+    """Return the number of processes; as in joblib, -1 is one per core.
 
     Raises
     ------
     InvalidInput
-        When that is none.
+        When it is below 1.
     """
     n = (os.cpu_count() or 1) + 1 + n_jobs if n_jobs < 0 else n_jobs
     if n < 1:
@@ -79,32 +80,34 @@ def processes(n_jobs: int) -> int:
     return n
 
 
-def _here(work: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
+def _in_this_process(work: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
     for task in tasks:
         with threadpool_limits(limits=1):
             result = work(task)
         yield result
 
 
-def _on_cores(work: Callable[[T], R], tasks: Iterable[T], n: int) -> Iterator[R]:
+def _in_processes(work: Callable[[T], R], tasks: Iterable[T], n: int) -> Iterator[R]:
     from joblib import Parallel, delayed, parallel_config
     from joblib.externals.loky import get_reusable_executor
 
-    begin = {"initializer": _leave_with, "initargs": (os.getpid(),)}
+    begin = {"initializer": _exit_with_parent, "initargs": (os.getpid(),)}
     try:
         with parallel_config("loky", n_jobs=n, inner_max_num_threads=1, **begin):
             yield from Parallel(return_as="generator_unordered", batch_size=1)(
-                delayed(_alone)(work, task) for task in tasks
+                delayed(_single_threaded)(work, task) for task in tasks
             )
     except BrokenExecutor:
         raise StreamError(
-            f"a worker process died, perhaps for want of memory; {_GOES_ON}."
+            f"a worker process died, perhaps out of memory; {_RESUMES}."
         ) from None
     finally:
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
 
 
-def _on_dask(work: Callable[[T], R], tasks: Iterable[T], scheduler: str) -> Iterator[R]:
+def _on_cluster(
+    work: Callable[[T], R], tasks: Iterable[T], scheduler: str
+) -> Iterator[R]:
     try:
         from distributed import Client, KilledWorker, as_completed
     except ImportError:
@@ -113,7 +116,7 @@ def _on_dask(work: Callable[[T], R], tasks: Iterable[T], scheduler: str) -> Iter
             "pip install 'ikns[cluster]'."
         ) from None
     try:
-        client = Client(scheduler, timeout=_PATIENCE)
+        client = Client(scheduler, timeout=_CONNECT_TIMEOUT)
     except (OSError, ValueError) as error:
         raise StreamError(
             f"{scheduler}: no Dask scheduler answers ({_first_line(error)})."
@@ -125,7 +128,7 @@ def _on_dask(work: Callable[[T], R], tasks: Iterable[T], scheduler: str) -> Iter
         waiting = iter(tasks)
 
         def submit(task: T) -> Any:
-            return client.submit(_alone, work, task, pure=False)
+            return client.submit(_single_threaded, work, task, pure=False)
 
         running = as_completed([submit(t) for t in islice(waiting, 2 * threads)])
         for future in running:
@@ -133,8 +136,8 @@ def _on_dask(work: Callable[[T], R], tasks: Iterable[T], scheduler: str) -> Iter
                 result = future.result()
             except (KilledWorker, CancelledError, OSError) as error:
                 raise StreamError(
-                    f"{scheduler}: the Dask cluster broke off ({_first_line(error)}); "
-                    f"{_GOES_ON}."
+                    f"{scheduler}: the Dask cluster failed ({_first_line(error)}); "
+                    f"{_RESUMES}."
                 ) from None
             future.release()
             for task in islice(waiting, 1):
@@ -142,23 +145,23 @@ def _on_dask(work: Callable[[T], R], tasks: Iterable[T], scheduler: str) -> Iter
             yield result
 
 
-def _leave_with(parent: int) -> None:
-    """Let this worker end when the process that started it does.
+def _exit_with_parent(parent: int) -> None:
+    """Let this worker exit when the process that started it does.
 
-    Otherwise the workers of a killed run wait for work for minutes, or for ever where
-    it was killed while it held their queue.
+    Otherwise the workers of a killed run would wait for minutes, or forever if it was
+    killed while it held the lock of their queue.
     """
 
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(_LOOK)
+            time.sleep(_POLL_INTERVAL)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _alone(work: Callable[[T], R], task: T) -> R:
-    """Do a task in a worker, which is ours: its threads need not be given back."""
+def _single_threaded(work: Callable[[T], R], task: T) -> R:
+    """Run a task in a worker; the thread limit may stay, as the worker is ours."""
     threadpool_limits(limits=1)
     return work(task)
 

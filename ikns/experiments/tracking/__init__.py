@@ -1,4 +1,4 @@
-"""Experiment 1: a pointer driven by c follows a curve. No screen, no clock."""
+"""Experiment 1: a pointer driven by c follows a curve; without screen or clock."""
 
 from ikns.experiments.tracking.metrics import (
     Metrics,
@@ -9,8 +9,8 @@ from ikns.experiments.tracking.metrics import (
     spectral_arc_length,
 )
 from ikns.experiments.tracking.profiles import CHARACTERS, Profile, draw_profile
-from ikns.experiments.tracking.schedule import Step, schedule, williams
-from ikns.experiments.tracking.trial import TrackingRecord, TrialMachine, View
+from ikns.experiments.tracking.schedule import TrackingStep, schedule, williams
+from ikns.experiments.tracking.trial import TrackingRecord, TrackingTrial, TrackingView
 from ikns.experiments.tracking.virtual import virtual_step, virtual_trial
 from ikns.experiments.tracking.visit import Attempt, Visit
 
@@ -19,10 +19,10 @@ __all__ = [
     "Attempt",
     "Metrics",
     "Profile",
-    "Step",
     "TrackingRecord",
-    "TrialMachine",
-    "View",
+    "TrackingStep",
+    "TrackingTrial",
+    "TrackingView",
     "Visit",
     "draw_profile",
     "error_over_time",

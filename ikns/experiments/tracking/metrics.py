@@ -1,4 +1,4 @@
-"""How well a pointer followed: error, lag, overshoot, smoothness. y is 0 to 100."""
+"""How well a pointer followed: error, lag, overshoot, smoothness; y is 0 to 100."""
 
 from __future__ import annotations
 
@@ -24,21 +24,22 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Rate at which lag and smoothness look at a trial, 1/s.
+#: Trials are resampled to this rate for lag and smoothness, 1/s.
 RATE = 100.0
-#: Longest lag or lead looked for, s: people follow within half a second.
+#: Longest lag or lead searched for, s: people follow within half a second.
 LONGEST_LAG = 1.5
-#: Smoothness is that of the movement below this, Hz: voluntary tracking lies there, and
-#: of the noise above it one frequency more or less over the threshold would decide.
+#: Cut-off of the low-pass before smoothness, Hz: voluntary tracking lies below. The
+#: noise above would make the result depend on which of its frequencies happen to exceed
+#: the amplitude threshold.
 _VOLUNTARY_HZ = 5.0
-#: Highest frequency and smallest amplitude that smoothness looks at, and by which power
-#: of two the spectrum is made denser: the authors' values.
-_HIGHEST_HZ, _SMALLEST, _DENSER = 10.0, 0.05, 4
+#: Highest frequency (Hz) and smallest amplitude of the spectral arc length, and power
+#: of two by which the signal is zero-padded: the authors' values.
+_HIGHEST_HZ, _SMALLEST, _PADDING = 10.0, 0.05, 4
 
 
 @dataclass(frozen=True)
 class Metrics:
-    """What a trial comes to, from the profile's beginning to its end.
+    """Metrics of a trial, from the profile's beginning to its end.
 
     Parameters
     ----------
@@ -46,16 +47,17 @@ class Metrics:
         Root mean square and mean absolute error, of 100, over the samples (as in the
         paper).
     lag : float
-        How far the pointer is behind, s; NaN where it never moved.
+        How far the pointer lags behind, s; NaN where it never moved.
     correlation : float
         With the target at that lag.
     overshoot : float
-        How far moves went past their end, on average over the moves, of 100.
+        Mean overshoot at the end of the profile's moves, of 100.
     smoothness, target_smoothness : float
         Spectral arc length of the pointer and of the profile, negative; the nearer to
-        0 the smoother. The longer and the richer a profile, the lower it is by itself.
+        0 the smoother. It is lower for longer profiles with more moves, so compare it
+        with that of the target.
     unseen : float
-        Share of samples without a control signal; the pointer stood still there.
+        Share of samples without a control signal, in which the pointer stood still.
     samples : int
     """
 
@@ -71,7 +73,7 @@ class Metrics:
 
 
 def measure(record: TrackingRecord) -> Metrics:
-    """All metrics of a trial.
+    """Compute all metrics of a trial.
 
     Raises
     ------
@@ -86,7 +88,7 @@ def measure(record: TrackingRecord) -> Metrics:
             f"found {int(kept.sum())} samples."
         )
     error = y[kept] - record.target[kept]
-    # Evenly spaced, as correlation and spectrum ask for; frames of a camera nearly are.
+    # Correlation and spectrum need even spacing, which frames have only nearly.
     first, last = time[kept][[0, -1]]
     even = first + np.arange(int((last - first) * RATE) + 1) / RATE
     pointer = np.interp(even, time[kept], y[kept])
@@ -111,10 +113,11 @@ def measure(record: TrackingRecord) -> Metrics:
 def lag(
     target: ArrayLike, follower: ArrayLike, *, rate: float, longest: float = LONGEST_LAG
 ) -> tuple[float, float]:
-    """How far one signal is behind another, by cross-correlation.
+    """Lag of one signal behind another, by cross-correlation.
 
-    At every shift the Pearson correlation over what overlaps, so that neither the level
-    nor the shorter overlap counts; the peak is put between samples by a parabola.
+    The Pearson correlation is taken over the overlap at each shift, so that neither the
+    level nor the length of the overlap matters; a parabola through the peak gives the
+    lag between samples.
 
     Parameters
     ----------
@@ -143,19 +146,19 @@ def lag(
         raise InvalidInput(
             f"expected two signals of one length, found {a.shape} and {b.shape}."
         )
-    most = min(int(round(longest * rate)), len(a) // 2)
+    limit = min(int(round(longest * rate)), len(a) // 2)
     found = np.array(
         [
             _pearson(
                 a[max(0, -k) : len(a) - max(0, k)], b[max(0, k) : len(b) + min(0, k)]
             )
-            for k in range(-most, most + 1)
+            for k in range(-limit, limit + 1)
         ]
     )
     if not np.isfinite(found).any():
         return np.nan, np.nan
     best = int(np.nanargmax(found))
-    shift = float(best - most)
+    shift = float(best - limit)
     if 0 < best < len(found) - 1:
         before, here, after = found[best - 1 : best + 2]
         bend = before - 2 * here + after
@@ -165,7 +168,7 @@ def lag(
 
 
 def overshoot(profile: Profile, time: ArrayLike, y: ArrayLike) -> Array:
-    """How far the pointer went past the end of each move before the next one began.
+    """Overshoot of the pointer at the end of each move, before the next one begins.
 
     Parameters
     ----------
@@ -176,7 +179,7 @@ def overshoot(profile: Profile, time: ArrayLike, y: ArrayLike) -> Array:
     Returns
     -------
     (K,) array
-        0 where it did not get there.
+        0 where the pointer did not reach the end.
     """
     t, height = np.asarray(time), np.asarray(y)
     ends = np.append(profile.start[1:], profile.seconds)
@@ -190,7 +193,7 @@ def overshoot(profile: Profile, time: ArrayLike, y: ArrayLike) -> Array:
 
 
 def spectral_arc_length(velocity: ArrayLike, *, rate: float) -> float:
-    """Smoothness of a movement: minus the length of its speed's normalized spectrum.
+    """Smoothness of a movement: minus the arc length of its speed's spectrum.
 
     S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami and E. Burdet (2015), On the
     analysis of movement smoothness, J. NeuroEng. Rehabil. 12:112 (SPARC). It depends
@@ -199,14 +202,14 @@ def spectral_arc_length(velocity: ArrayLike, *, rate: float) -> float:
     Parameters
     ----------
     velocity : (T,) array
-        Evenly sampled; its absolute value counts.
+        Evenly sampled; its absolute value is used.
     rate : float
         Samples per second, more than 20.
 
     Returns
     -------
     float
-        Negative; NaN for what does not move.
+        Negative; NaN without movement.
     """
     speed = np.abs(np.asarray(velocity, dtype=np.float64))
     if speed.ndim != 1 or len(speed) < 2 or not rate > 2 * _HIGHEST_HZ:
@@ -216,7 +219,7 @@ def spectral_arc_length(velocity: ArrayLike, *, rate: float) -> float:
         )
     if not speed.sum() > 0:
         return np.nan
-    n = 2 ** (int(np.ceil(np.log2(len(speed)))) + _DENSER)
+    n = 2 ** (int(np.ceil(np.log2(len(speed)))) + _PADDING)
     size = np.abs(np.fft.rfft(speed, n))
     hertz = np.arange(len(size)) * rate / n
     low = hertz <= _HIGHEST_HZ
@@ -229,7 +232,7 @@ def spectral_arc_length(velocity: ArrayLike, *, rate: float) -> float:
 def error_over_time(
     records: Sequence[TrackingRecord], *, rate: float = 20.0
 ) -> tuple[Array, Array]:
-    """Error of every trial on one time axis, for pictures over subjects.
+    """Error of every trial on one time axis, to compare trials and subjects.
 
     Parameters
     ----------
@@ -243,7 +246,7 @@ def error_over_time(
     time : (T,) array
         From the profile's beginning, s.
     error : (N, T) array
-        Pointer less target; NaN outside of what was recorded.
+        Pointer minus target; NaN outside of the recorded time.
     """
     lengths = {record.profile.seconds for record in records}
     if len(lengths) != 1:
@@ -263,7 +266,7 @@ def error_over_time(
 def _pearson(a: Array, b: Array) -> float:
     u, v = a - a.mean(), b - b.mean()
     size = float(np.sqrt((u @ u) * (v @ v)))
-    # Rounding alone is not a movement.
+    # Variation within rounding is not a movement.
     least = (
         len(a) * (1e-9 * max(1.0, float(np.abs(a).max()), float(np.abs(b).max()))) ** 2
     )

@@ -1,8 +1,8 @@
 """Curves to follow: pseudo-random levels joined by minimum-jerk moves.
 
 The paper draws three, T1 to T3, "pseudo-randomly" and shows them only as small
-pictures. What it says of them is their character: all begin flat, T1 is slow, T2 falls
-from 90 to about 30 in less than 3 s, T3 lies between. Numbers beyond that are ours.
+pictures. It describes their character: all begin flat, T1 is slow, T2 falls from 90 to
+about 30 in less than 3 s, T3 lies between. All other numbers are ours.
 """
 
 from __future__ import annotations
@@ -20,28 +20,27 @@ Array = NDArray[np.float64]
 
 #: Peak speed of a minimum-jerk move over its mean speed (Flash and Hogan 1985).
 PEAK = 1.875
-#: Levels between which the pointer goes, of 0 to 100: away from both ends, where c is
-#: cut off.
+#: Lowest and highest level, of 0 to 100: away from both ends, where c is clipped.
 LOWEST, HIGHEST = 8.0, 92.0
-#: Flat trend at the start and rests between moves, s.
+#: Shortest and longest flat start, and rest between moves, s.
 _FLAT, _REST = (1.0, 2.0), (0.3, 1.2)
-#: Moves are at least so slow, as a share of the fastest.
+#: Slowest move, as a share of the fastest.
 _SLOWEST = 0.5
 _TRIES = 1000
 
 
 @dataclass(frozen=True)
 class Character:
-    """What makes a kind of profile, whatever the seed.
+    """What profiles of one kind have in common, whatever the seed.
 
     Parameters
     ----------
     fastest : (float, float)
-        Between which the peak speed of its fastest move lies, 1/s; a fall apart.
+        Range of the peak speed of the fastest move other than the fall, 1/s.
     step : (float, float)
         Smallest and largest move.
     fall : tuple of float, optional
-        From, to, and the shortest and longest time of a fall that it must hold, s.
+        Start level, end level, shortest and longest time (s) of a required fall.
     """
 
     fastest: tuple[float, float]
@@ -63,19 +62,19 @@ CHARACTERS = {
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A curve of 0 to 100 over time: rests, and minimum-jerk moves between them.
+    """A curve of 0 to 100 over time: rests joined by minimum-jerk moves.
 
     Parameters
     ----------
     name : str
-        Of its character.
+        Of the character.
     seed : int
-        What it was drawn from.
+        That it was drawn from.
     seconds : float
     levels : (K + 1,) array
         0 to 100.
     start, duration : (K,) array
-        Of the moves, s; no two at a time.
+        Of the moves, s; moves do not overlap.
     """
 
     name: str
@@ -86,7 +85,7 @@ class Profile:
     duration: Array
 
     def at(self, time: ArrayLike) -> Array:
-        """Value at any time, s; before 0 and after the end it stays as it is."""
+        """Value at any time, s; constant before the first and after the last move."""
         s = self._share(time)
         way = s**3 * (10 - 15 * s + 6 * s**2)
         return np.asarray(self.levels[0] + way @ np.diff(self.levels))
@@ -117,7 +116,7 @@ def draw_profile(name: str, seed: int, *, seconds: float = 25.0) -> Profile:
     seed : int
         Same seed, same profile.
     seconds : float
-        Length, at least 12.
+        Duration, at least 12.
 
     Examples
     --------
@@ -134,7 +133,7 @@ def draw_profile(name: str, seed: int, *, seconds: float = 25.0) -> Profile:
     if not 12.0 <= seconds < np.inf:
         raise InvalidInput(f"expected a profile of at least 12 s, found {seconds:g} s.")
     character = CHARACTERS[name]
-    # The three of one seed have nothing in common.
+    # Profiles of one seed but different names are independent.
     rng = np.random.default_rng([seed, *name.encode()])
     for _ in range(_TRIES):
         profile = _drawn(name, character, seed, seconds, rng)
@@ -173,7 +172,7 @@ def _drawn(
             duration.append(PEAK * abs(levels[-1] - before) / speed)
         start.append(now)
         now += duration[-1] + rng.uniform(*_REST)
-    # The last move is left out where the time is too short for it.
+    # The last move is dropped if it would end too late.
     if start[-1] + duration[-1] > seconds:
         levels, start, duration = levels[:-1], start[:-1], duration[:-1]
     return Profile(
@@ -191,9 +190,9 @@ def _next_level(before: float, character: Character, rng: np.random.Generator) -
 
 
 def _fits(profile: Profile, character: Character) -> bool:
-    """Whether it holds moves enough, the fast one, and the fall where there is one.
+    """Whether it has enough moves, a fast one, and the fall if one is required.
 
-    A level clipped at the border makes a shorter move, a start near 90 a tiny one.
+    A level clipped at its limit makes a move shorter, a start near 90 makes it tiny.
     """
     levels, peaks = profile.levels, np.abs(profile.peaks)
     steps = np.abs(np.diff(levels))

@@ -1,4 +1,4 @@
-"""What each subject does, in which order: balanced, and known beforehand."""
+"""The schedule of each subject: balanced, and known in advance."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Step", "schedule", "williams"]
+__all__ = ["TrackingStep", "schedule", "williams"]
 
 
 @dataclass(frozen=True)
-class Step:
-    """One thing to do.
+class TrackingStep:
+    """One step of a schedule.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Step:
     seed : int
         Of the profile. All subjects follow the same ones; training has others.
     repeat : int
-        Which time the profile comes in this condition, from 0; in training its number.
+        Repeat of the profile in this condition, from 0; in training the trial's number.
     seconds : float
         Of the profile or the rest.
     """
@@ -42,7 +42,7 @@ class Step:
 
     @property
     def key(self) -> str:
-        """Name that no other step of a schedule has; rests have none."""
+        """Name that is unique in a schedule; empty for rests."""
         return (
             ""
             if self.kind == "rest"
@@ -51,10 +51,11 @@ class Step:
 
 
 def williams(n: int) -> NDArray[np.int64]:
-    """Orders of n treatments, balanced for place and for what came just before.
+    """Orders of n treatments, balanced for position and first-order carryover.
 
-    Each treatment comes equally often at each place, and each after each other one
-    equally often. E. J. Williams (1949), Aust. J. Sci. Res. A 2:149.
+    Each treatment comes equally often at each position, and equally often right after
+    each other one: a Williams design, E. J. Williams (1949), Aust. J. Sci. Res. A
+    2:149.
 
     Parameters
     ----------
@@ -88,12 +89,12 @@ def schedule(
     seconds: float = 25.0,
     training: int = 10,
     rest: float = 120.0,
-) -> list[Step]:
-    """All steps of one subject: per condition training, then blocks of all profiles.
+) -> list[TrackingStep]:
+    """Return all steps of a subject: in each condition training, then all profiles.
 
     The order of the conditions changes with every subject, that of the profiles with
     every second one, so that both are balanced against each other. With two conditions
-    and three repeats everybody meets each of the six orders of three profiles once.
+    and three repeats each subject gets each of the six orders of three profiles once.
 
     Parameters
     ----------
@@ -114,24 +115,24 @@ def schedule(
     Raises
     ------
     InvalidInput
-        When something is twice or missing.
+        When a name is missing or duplicate, or a number is out of range.
     """
     for name, words in (("conditions", conditions), ("profiles", profiles)):
         if not words or len(set(words)) != len(words):
-            raise InvalidInput(f"expected {name} that differ, found {list(words)}.")
+            raise InvalidInput(f"expected distinct {name}, found {list(words)}.")
     if repeats < 1 or training < 0 or subject < 0:
         raise InvalidInput(
             "expected a subject and training from 0 and repeats from 1, found "
             f"{subject}, {training} and {repeats}."
         )
-    ways, orders = williams(len(conditions)), williams(len(profiles))
-    steps: list[Step] = []
-    for place, number in enumerate(ways[subject % len(ways)]):
+    condition_orders, orders = williams(len(conditions)), williams(len(profiles))
+    steps: list[TrackingStep] = []
+    for place, number in enumerate(condition_orders[subject % len(condition_orders)]):
         condition = conditions[number]
         if place:
-            steps.append(Step("rest", seconds=rest))
+            steps.append(TrackingStep("rest", seconds=rest))
         steps.extend(
-            Step(
+            TrackingStep(
                 "training",
                 condition,
                 profiles[k % len(profiles)],
@@ -142,14 +143,14 @@ def schedule(
             for k in range(training)
         )
         for block in range(repeats):
-            row = subject // len(ways) + block + repeats * place
+            row = subject // len(condition_orders) + block + repeats * place
             steps.extend(
-                Step("trial", condition, profiles[i], seed, block, seconds)
+                TrackingStep("trial", condition, profiles[i], seed, block, seconds)
                 for i in orders[row % len(orders)]
             )
     return steps
 
 
 def _training_seed(seed: int, k: int) -> int:
-    """Nobody trains on the profiles of the study."""
+    """Return a seed for a training profile that no profile of the study has."""
     return int(np.random.SeedSequence([seed, k, 1]).generate_state(1)[0]) | 1 << 32

@@ -1,4 +1,4 @@
-"""One tracking trial: align, then follow. It has no clock: every call says the time."""
+"""One tracking trial: align, then track. It has no clock: each call gives the time."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from ikns.errors import InvalidInput
 from ikns.experiments.tracking.profiles import Profile
 
-__all__ = ["ALIGN", "TrackingRecord", "TrialMachine", "View"]
+__all__ = ["ALIGN", "TrackingRecord", "TrackingTrial", "TrackingView"]
 
 Array = NDArray[np.float64]
 State = Literal["waiting", "align", "track", "done", "aborted"]
 
-#: Time to bring the pointer to the start of the profile, s: the paper's.
+#: Time to bring the pointer to the start of the profile, s (the paper's).
 ALIGN = 5.0
-#: A frame at the very end counts, whatever a clock of large numbers rounds, s.
+#: Tolerance for a sample at the very end, s: large clock times round.
 _ROUNDING = 1e-6
 
 
-class View(NamedTuple):
-    """What a screen would show.
+class TrackingView(NamedTuple):
+    """What a screen shows of the trial.
 
     Parameters
     ----------
@@ -32,11 +32,11 @@ class View(NamedTuple):
     time : float
         Since the profile began, s; negative while aligning.
     x : float
-        Where the pointer is on its way across, 0 to 1, at constant speed.
+        Horizontal position of the pointer, 0 to 1, at constant speed.
     y : float
-        Its height, 100 c, 0 to 100; NaN before the first c.
+        Height of the pointer, 100 c, 0 to 100; NaN before the first c.
     target : float
-        Height that it should have.
+        Height of the profile.
     """
 
     state: State
@@ -48,7 +48,7 @@ class View(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrackingRecord:
-    """What a trial left.
+    """The recording of a trial.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class TrackingRecord:
     target : (T,) array
         0 to 100.
     c : (T,) array
-        As it came: not cut off, NaN where there was none.
+        As received: not clipped, NaN where there was none.
     state : {"done", "aborted"}
     reason : str
         Why it was aborted.
@@ -73,21 +73,21 @@ class TrackingRecord:
 
     @property
     def y(self) -> Array:
-        """Height of the pointer: 100 c within 0 to 100, the last one where c is NaN."""
+        """Height of the pointer: 100 c clipped to 0 to 100, held where c is NaN."""
         known = np.isfinite(self.c)
         last = np.maximum.accumulate(np.where(known, np.arange(len(self.c)), -1))
         return np.where(last < 0, np.nan, 100.0 * np.clip(self.c[last], 0.0, 1.0))
 
 
-class TrialMachine:
-    """The trial as it goes.
+class TrackingTrial:
+    """A running trial, as a state machine.
 
     Parameters
     ----------
     profile : Profile
-        What to follow.
+        Curve to follow.
     align : float
-        Time before it begins, s.
+        Time before the profile begins, s.
 
     Attributes
     ----------
@@ -96,10 +96,10 @@ class TrialMachine:
     Examples
     --------
     >>> from ikns.experiments.tracking.profiles import draw_profile
-    >>> trial = TrialMachine(draw_profile("T1", seed=0))
+    >>> trial = TrackingTrial(draw_profile("T1", seed=0))
     >>> trial.start(100.0)
     >>> for k in range(3001):
-    ...     view = trial.frame(100.0 + k / 100, c=0.5)
+    ...     view = trial.add_sample(100.0 + k / 100, c=0.5)
     >>> trial.state, view.y, round(view.x, 9)
     ('done', 50.0, 1.0)
     """
@@ -115,12 +115,12 @@ class TrialMachine:
         self._rows: list[tuple[float, float]] = []
 
     def start(self, now: float) -> None:
-        """Begin to align.
+        """Begin with the alignment.
 
         Raises
         ------
         InvalidInput
-            When it was begun already, or the time is not finite.
+            When it was started already, or the time is not finite.
         """
         if self.state != "waiting" or not math.isfinite(now):
             raise InvalidInput(
@@ -130,15 +130,14 @@ class TrialMachine:
         self._now, self._zero = now, now + self.align
         self.state = "align" if self.align else "track"
 
-    def frame(self, now: float, c: float) -> View:
-        """Take the control signal of a frame; NaN where it has none.
+    def add_sample(self, now: float, c: float) -> TrackingView:
+        """Take the control signal at a time; NaN where there is none.
 
-        A time that is not later than the last frame's shows nothing new and is not
-        written down.
+        A sample that is not later than the last one is not recorded.
         """
         before = self._rows[-1][0] if self._rows else -math.inf
         running = self.state in ("align", "track")
-        view = self.check(now)
+        view = self.update(now)
         if not running or view.time > self.profile.seconds + _ROUNDING:
             return view
         if math.isfinite(c):
@@ -147,8 +146,8 @@ class TrialMachine:
             self._rows.append((view.time, float(c)))
         return view._replace(y=self._y)
 
-    def check(self, now: float) -> View:
-        """Let time pass while no frame comes."""
+    def update(self, now: float) -> TrackingView:
+        """Let time pass without a sample."""
         if now > self._now and self.state in ("align", "track"):
             self._now = now
             time = now - self._zero
@@ -158,7 +157,7 @@ class TrialMachine:
                 self.state = "track"
         time = self._now - self._zero if self.state != "waiting" else -self.align
         seconds = self.profile.seconds
-        return View(
+        return TrackingView(
             self.state,
             time,
             min(max(time / seconds, 0.0), 1.0),
@@ -167,20 +166,20 @@ class TrialMachine:
         )
 
     def abort(self, now: float, reason: str) -> None:
-        """End it before its time; what was recorded stays."""
+        """End the trial early; what was recorded is kept."""
         if self.state in ("waiting", "align", "track"):
-            self.check(now)
+            self.update(now)
         if self.state in ("waiting", "align", "track"):
             self.state, self._reason = "aborted", reason
 
     @property
     def record(self) -> TrackingRecord:
-        """Of a trial that ended.
+        """The recording of a trial that has ended.
 
         Raises
         ------
         InvalidInput
-            While it goes on.
+            While the trial is running.
         """
         if self.state not in ("done", "aborted"):
             raise InvalidInput(f"expected a trial that ended, found it {self.state}.")

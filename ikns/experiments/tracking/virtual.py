@@ -1,4 +1,4 @@
-"""Tracking trials of virtual operators: simulated, through the same trial machine."""
+"""Simulated tracking trials: virtual operators in the same trials as people."""
 
 from __future__ import annotations
 
@@ -8,25 +8,29 @@ import numpy as np
 
 from ikns.errors import InvalidInput
 from ikns.experiments.tracking.profiles import Profile
-from ikns.experiments.tracking.schedule import Step
-from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrialMachine
+from ikns.experiments.tracking.schedule import TrackingStep
+from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrackingTrial
 from ikns.simulation.operator import CONDITIONS, Delay, Operator, Participant, track
-from ikns.simulation.operator.loop import Driven, Steering
+from ikns.simulation.operator.loop import ControlledElement, TrackingOperator
 
 __all__ = ["virtual_step", "virtual_trial"]
 
 
 def virtual_trial(
-    operator: Steering, driven: Driven, profile: Profile, *, align: float = ALIGN
+    operator: TrackingOperator,
+    element: ControlledElement,
+    profile: Profile,
+    *,
+    align: float = ALIGN,
 ) -> TrackingRecord:
-    """Let an operator go through one trial.
+    """Simulate one trial.
 
     Parameters
     ----------
-    operator : Operator or Copyist
-        Fresh; it sets the rate.
-    driven : Driven
-        What it drives, fresh too.
+    operator : Operator or DelayedCopy
+        New; it sets the rate.
+    element : ControlledElement
+        What the operator controls, new as well.
     profile : Profile
     align : float
         Time before the profile begins, s.
@@ -44,20 +48,20 @@ def virtual_trial(
     done = track(
         operator,
         lambda time: profile.at(time) / 100,
-        driven,
+        element,
         start=-align,
         end=profile.seconds,
     )
-    trial = TrialMachine(profile, align=align)
+    trial = TrackingTrial(profile, align=align)
     trial.start(float(done.time[0]))
     for time, c in zip(done.time.tolist(), done.c.tolist(), strict=True):
-        trial.frame(time, c)
+        trial.add_sample(time, c)
     return trial.record
 
 
 def virtual_step(
     participant: Participant,
-    step: Step,
+    step: TrackingStep,
     profile: Profile,
     *,
     practised: int,
@@ -67,21 +71,22 @@ def virtual_step(
     align: float = ALIGN,
     **arm_loop: Any,
 ) -> TrackingRecord:
-    """Let a participant do one step of a schedule, training or trial.
+    """Simulate one step of a schedule, training or trial.
 
-    With the elbow ("ikns") through the whole chain, with a stick ("gamepad") at once.
-    Same participant, step and settings, same record, whatever was done before.
+    With the elbow ("ikns") the signal passes through the whole chain of body, cameras
+    and map; with a stick ("gamepad") it is direct. The record depends on participant,
+    step and settings alone, not on what was simulated before.
 
     Parameters
     ----------
     participant : Participant
-    step : Step
+    step : TrackingStep
     profile : Profile
         Of the step.
     practised : int
-        Trials done in this condition before, training included.
+        Earlier trials in this condition, training included.
     direct : bool
-        Leave body, cameras and map out: c is where the limb is, for comparison.
+        Leave out body, cameras and map, for comparison: c is the limb's position.
     rate : float
         Frames per second.
     latency : float
@@ -100,7 +105,7 @@ def virtual_step(
     seeds = np.random.SeedSequence([participant.seed, *name])
     noise, body = (int(word) for word in seeds.generate_state(2, np.uint64))
     ability = participant.abilities[step.condition].practised(practised)
-    driven: Driven
+    element: ControlledElement
     if step.condition == "ikns" and not direct:
         loop = participant.arm_loop(
             seconds=align + profile.seconds,
@@ -109,8 +114,8 @@ def virtual_step(
             latency=latency,
             **arm_loop,
         )
-        driven, start = loop, loop.comfortable
+        element, start = loop, loop.comfortable
     else:
-        driven, start = Delay(latency, rate=rate), 0.5
+        element, start = Delay(latency, rate=rate), 0.5
     operator = Operator(ability, rate=rate, seed=noise, start=start)
-    return virtual_trial(operator, driven, profile, align=align)
+    return virtual_trial(operator, element, profile, align=align)

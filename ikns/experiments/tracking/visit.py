@@ -1,4 +1,4 @@
-"""A subject's visit: the steps of the schedule, one after the other."""
+"""A subject's tracking visit: the steps of the schedule in order."""
 
 from __future__ import annotations
 
@@ -7,25 +7,28 @@ from typing import Literal, NamedTuple
 
 from ikns.experiments.progress import Progress
 from ikns.experiments.tracking.profiles import draw_profile
-from ikns.experiments.tracking.schedule import Step
-from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrialMachine
+from ikns.experiments.tracking.schedule import TrackingStep
+from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrackingTrial
 
-__all__ = ["Attempt", "Visit"]
+__all__ = ["FINAL", "Attempt", "Visit"]
+
+#: Outcomes after which a step is not repeated.
+FINAL = ("done", "skipped")
 
 
 class Attempt(NamedTuple):
-    """How a step went once.
+    """One attempt at a step.
 
     Parameters
     ----------
     key : str
         Of the step.
     outcome : {"done", "aborted", "skipped", "again"}
-        An aborted trial comes again. "again": what was done before is to be repeated
-        and does not count.
+        An aborted trial is repeated. "again": the attempt before it does not count, and
+        the step is repeated.
     reason : str
     record : TrackingRecord or None
-        None where nothing was recorded or it was not kept in memory.
+        None where nothing was recorded, or the record is no longer in memory.
     """
 
     key: str
@@ -35,23 +38,23 @@ class Attempt(NamedTuple):
 
 
 class Visit:
-    """Where a subject is in the schedule. No screen, no clock, no disk.
+    """Progress of a subject through the schedule; without screen, clock or disk.
 
     Parameters
     ----------
-    steps : sequence of Step
+    steps : sequence of TrackingStep
         From :func:`ikns.experiments.tracking.schedule`.
     attempts : iterable of Attempt
-        Of a visit that was broken off: it goes on where it stopped.
+        Of earlier runs of the visit: it continues where it stopped.
     align : float
         Time before each profile, s.
 
     Attributes
     ----------
     attempts : list of Attempt
-        Everything that was tried, in order; nothing is ever taken out.
-    trial : TrialMachine or None
-        The trial that goes on.
+        All attempts in order; none is ever removed.
+    trial : TrackingTrial or None
+        The running trial.
 
     Examples
     --------
@@ -60,78 +63,80 @@ class Visit:
     >>> trial = visit.begin(0.0)
     >>> visit.abort(2.0, "a marker fell off")
     >>> trial = visit.begin(60.0)
-    >>> trial.check(90.0).state, visit.finish(), len(visit.remaining)
+    >>> trial.update(90.0).state, visit.finish(), len(visit.remaining)
     ('done', True, 18)
     """
 
     def __init__(
         self,
-        steps: Sequence[Step],
+        steps: Sequence[TrackingStep],
         attempts: Iterable[Attempt] = (),
         *,
         align: float = ALIGN,
     ) -> None:
-        self._progress = Progress(steps, attempts, final=("done", "skipped"))
+        self._progress = Progress(steps, attempts, final=FINAL)
         self.steps, self.attempts = self._progress.steps, self._progress.attempts
         self.align = align
-        self.trial: TrialMachine | None = None
+        self.trial: TrackingTrial | None = None
 
     @property
     def ended(self) -> dict[str, Attempt]:
-        """Last attempt at each step that counts as done or was skipped, by key."""
+        """Final attempt at each step that was done or skipped, by key."""
         return self._progress.ended
 
     @property
-    def remaining(self) -> tuple[Step, ...]:
+    def remaining(self) -> tuple[TrackingStep, ...]:
         """Steps still to do, the current one first."""
         return self._progress.remaining
 
     @property
-    def current(self) -> Step | None:
-        """What is to be done now; None when all is."""
+    def current(self) -> TrackingStep | None:
+        """Current step; None when all are done."""
         return self._progress.current
 
-    def begin(self, now: float) -> TrialMachine:
+    def begin(self, now: float) -> TrackingTrial:
         """Start the current trial.
 
         Raises
         ------
         InvalidInput
-            When one goes on, a rest is due, or nothing is left.
+            When a trial is running, a rest is due, or nothing is left.
         """
-        step = self._progress.to_begin(going_on=self.trial is not None)
+        step = self._progress.next_trial(running=self.trial is not None)
         profile = draw_profile(step.profile, step.seed, seconds=step.seconds)
-        self.trial = TrialMachine(profile, align=self.align)
+        self.trial = TrackingTrial(profile, align=self.align)
         self.trial.start(now)
         return self.trial
 
     def finish(self) -> bool:
-        """Put down the trial if it has come to its end; say whether it had."""
+        """Add the attempt if the trial has ended; say whether it had."""
         if self.trial is None or self.trial.state != "done":
             return False
-        self._put("done", "")
+        self._add_attempt("done", "")
         return True
 
     def abort(self, now: float, reason: str) -> None:
-        """Break the trial off; it comes again at once."""
+        """Abort the trial; it is repeated at once."""
         if self.trial is not None:
             self.trial.abort(now, reason)
-            self._put("done" if self.trial.state == "done" else "aborted", reason)
+            self._add_attempt(
+                "done" if self.trial.state == "done" else "aborted", reason
+            )
 
     def skip(self, now: float, reason: str) -> None:
-        """Leave the current step out."""
+        """Skip the current step."""
         if self.trial is not None:
             self.trial.abort(now, reason)
         if self.current is not None and not self._progress.end_rest():
-            self._put("skipped", reason)
+            self._add_attempt("skipped", reason)
 
     def repeat(self, reason: str) -> None:
-        """Have the last finished or skipped step again; what it gave does not count."""
-        key = self._progress.to_repeat(going_on=self.trial is not None)
+        """Repeat the last finished or skipped step; that attempt does not count."""
+        key = self._progress.key_to_repeat(running=self.trial is not None)
         self.attempts.append(Attempt(key, "again", reason))
 
     def rest(self, now: float) -> float:
-        """Time left of the rest that is due, s; 0 when none is, or it is over."""
+        """Return the time left of the current rest, s; 0 without one or at its end."""
         return self._progress.rest(now)
 
     def records(self) -> dict[str, TrackingRecord]:
@@ -142,7 +147,9 @@ class Visit:
             if a.outcome == "done" and a.record is not None
         }
 
-    def _put(self, outcome: Literal["done", "aborted", "skipped"], reason: str) -> None:
+    def _add_attempt(
+        self, outcome: Literal["done", "aborted", "skipped"], reason: str
+    ) -> None:
         step, record = self.current, None
         assert step is not None
         if self.trial is not None:

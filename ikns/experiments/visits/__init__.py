@@ -1,32 +1,30 @@
-"""Visits on disk: what one participant did in one experiment, real or simulated.
+"""Visits on disk: one participant in one experiment, real or simulated.
 
 A visit is a folder ``visits/[<variation>/]sub-<NN>_<experiment>`` of a study::
 
-    visit.json             who, which design, simulated or not, which versions
-    attempt-0001.parquet   one row: an attempt of a person, on disk when it ends
-    attempts.parquet       or all of them at once: a virtual participant
+    visit.json             participant, design, simulated or not, versions
+    attempt-0001.parquet   one row: an attempt of a person, written when it ends
+    attempts.parquet       or all rows at once: a virtual participant
 
-Attempts are numbered from 1 in the order in which they were made; nothing is ever taken
-out, and an attempt that is made again is a new one. Times are in s, c from 0 to 1.
-Reading and writing needs ``pip install 'ikns[study]'``.
+Attempts are numbered from 1 in the order in which they were made. None is ever removed;
+repeating one adds another. Times are in s, c from 0 to 1. Reading and writing needs
+``pip install 'ikns[study]'``.
 """
 
-from ikns.experiments.visits.folder import (
-    FORMAT,
-    VisitRecord,
-    append_attempt,
-    create_visit,
-    list_visits,
-    read_visit,
-    write_attempts,
-    write_visit,
-)
+from ikns.experiments.visits.header import FORMAT
 from ikns.experiments.visits.parquet import table_bytes
+from ikns.experiments.visits.reading import VisitRecord, list_visits, read_visit
 from ikns.experiments.visits.rows import (
     EXPERIMENTS,
-    counting,
+    counted_attempts,
     tracking_record,
     tracking_row,
+)
+from ikns.experiments.visits.writing import (
+    append_attempt,
+    create_visit,
+    write_attempts,
+    write_visit,
 )
 
 __all__ = [
@@ -34,7 +32,7 @@ __all__ = [
     "FORMAT",
     "VisitRecord",
     "append_attempt",
-    "counting",
+    "counted_attempts",
     "create_visit",
     "list_visits",
     "read_visit",

@@ -22,12 +22,12 @@ def table_bytes(experiment: str, rows: Sequence[Mapping[str, Any]]) -> bytes:
     experiment : {"tracking", "picking"}
     rows : sequence of mapping
         All with the same columns: those of the experiment, and any others of text,
-        numbers or truth.
+        numbers or booleans.
 
     Raises
     ------
     InvalidInput
-        When a column is missing or holds something else.
+        When a column is missing or of another type.
     """
     pa, parquet = _arrow()
     columns = COLUMNS[experiment]
@@ -66,8 +66,8 @@ def table_bytes(experiment: str, rows: Sequence[Mapping[str, Any]]) -> bytes:
     table = pa.table(arrays)
     texts = [f.name for f in table.schema if pa.types.is_string(f.type)]
     sink = pa.BufferOutputStream()
-    # A dictionary of numbers would take all NaN for one; bytes side by side keep every
-    # bit, and compress better than plain ones.
+    # A dictionary would merge all NaN; byte stream split keeps every bit and compresses
+    # better than plain encoding.
     parquet.write_table(
         table,
         sink,
@@ -89,7 +89,7 @@ def read_rows(path: Path, experiment: str) -> list[dict[str, Any]]:
     """
     pa, parquet = _arrow()
     try:
-        # Without memory maps, so that a file may go while its numbers are in use.
+        # Not memory-mapped, so that the file may be deleted while its data are in use.
         table = parquet.ParquetFile(path, memory_map=False).read()
     except (pa.ArrowException, OSError) as error:
         first = " ".join(str(error).split())[:200]

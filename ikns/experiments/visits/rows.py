@@ -1,4 +1,4 @@
-"""What an attempt is as a row of a table, and which attempts count."""
+"""An attempt as a row of a table, and which attempts count."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ from typing import Any
 import numpy as np
 
 from ikns.errors import InvalidInput
+from ikns.experiments.picking.visit import FINAL as PICKING_FINAL
 from ikns.experiments.tracking.profiles import draw_profile
-from ikns.experiments.tracking.schedule import Step
+from ikns.experiments.tracking.schedule import TrackingStep
 from ikns.experiments.tracking.trial import TrackingRecord
+from ikns.experiments.tracking.visit import FINAL as TRACKING_FINAL
 from ikns.experiments.tracking.visit import Attempt
 
 __all__ = [
     "COLUMNS",
     "EXPERIMENTS",
-    "FINAL",
-    "counting",
+    "counted_attempts",
     "tracking_record",
     "tracking_row",
 ]
 
-#: Columns that every attempt of an experiment has, and what they hold. ``series`` is a
-#: list of doubles of any length; a table may have more columns of single values.
+#: Columns that every attempt of an experiment has, and their types. ``series`` is a
+#: list of doubles of any length; a table may have further columns of single values.
 COLUMNS: dict[str, dict[str, str]] = {
     "tracking": {
         "number": "int",
@@ -57,30 +58,25 @@ COLUMNS: dict[str, dict[str, str]] = {
     },
 }
 EXPERIMENTS = tuple(COLUMNS)
-#: Outcomes after which a step is not due any more.
-FINAL = {
-    "tracking": ("done", "skipped"),
-    "picking": ("success", "dropped", "timeout", "skipped"),
-}
-_ENDED = {outcome for outcomes in FINAL.values() for outcome in outcomes}
+_FINAL = {*TRACKING_FINAL, *PICKING_FINAL}
 
 
 def tracking_row(
-    number: int, step: Step, attempt: Attempt, *, align: float, practised: int
+    number: int, step: TrackingStep, attempt: Attempt, *, align: float, practised: int
 ) -> dict[str, Any]:
-    """Put an attempt at a tracking step into a row.
+    """Return an attempt at a tracking step as a row.
 
     Parameters
     ----------
     number : int
         In the order of the visit, from 1.
-    step : Step
+    step : TrackingStep
     attempt : Attempt
-        At this step.
+        An attempt at this step.
     align : float
         Time before the profile, s.
     practised : int
-        Trials done before in this condition.
+        Earlier trials in this condition.
     """
     if attempt.key != step.key:
         raise InvalidInput(
@@ -107,7 +103,7 @@ def tracking_row(
 
 
 def tracking_record(row: Mapping[str, Any]) -> TrackingRecord:
-    """Return what a row recorded; its profile is drawn again from its seed."""
+    """Return the record of a row; its profile is drawn again from its seed."""
     profile = draw_profile(
         row["trajectory"], row["profile_seed"], seconds=row["seconds"]
     )
@@ -121,17 +117,17 @@ def tracking_record(row: Mapping[str, Any]) -> TrackingRecord:
     )
 
 
-def counting(attempts: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the attempts that count: of each step the last, if it was final.
+def counted_attempts(attempts: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return the attempts that count: the last one at each step, if it was final.
 
-    Final is what need not come again: done, or in picking success, dropped and timeout,
-    and in both skipped, which holds no data. An aborted attempt counts for nothing, and
-    so does one that was followed by "again". Training is among them.
+    Final outcomes are done, or in picking success, dropped and timeout, and in both
+    skipped, which has no data. An aborted attempt does not count, nor does one that was
+    followed by "again". Attempts in training are included.
 
     Examples
     --------
     >>> went = [("a", "done"), ("b", "aborted"), ("b", "done"), ("a", "again")]
-    >>> counting({"key": key, "outcome": outcome} for key, outcome in went)
+    >>> counted_attempts({"key": key, "outcome": outcome} for key, outcome in went)
     [{'key': 'b', 'outcome': 'done'}]
     """
     rows = [dict(row) for row in attempts]
@@ -139,5 +135,5 @@ def counting(attempts: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [
         row
         for k, row in enumerate(rows)
-        if last[row["key"]] == k and row["outcome"] in _ENDED
+        if last[row["key"]] == k and row["outcome"] in _FINAL
     ]

@@ -1,4 +1,4 @@
-"""Virtual operators: simulated people who track, and what they act through."""
+"""Virtual operators: simulated people who track, and the elements they control."""
 
 from ikns.simulation.operator.ability import (
     CONDITIONS,
@@ -13,19 +13,19 @@ from ikns.simulation.operator.cohort import (
     draw_participant,
     tracking_place,
 )
-from ikns.simulation.operator.delayed_copy import Copyist
-from ikns.simulation.operator.loop import Delay, Tracked, track
+from ikns.simulation.operator.delayed_copy import DelayedCopy
+from ikns.simulation.operator.loop import Delay, TrackingTrace, track
 from ikns.simulation.operator.model import Operator, closed_loop, open_loop
 
 __all__ = [
     "CONDITIONS",
     "Ability",
     "ArmLoop",
-    "Copyist",
     "Delay",
+    "DelayedCopy",
     "Operator",
     "Participant",
-    "Tracked",
+    "TrackingTrace",
     "closed_loop",
     "draw_participant",
     "open_loop",

@@ -1,4 +1,4 @@
-"""How able a virtual operator is: numbers, typical or drawn from a population."""
+"""Parameters of a virtual operator, typical or drawn from a population."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ikns.errors import InvalidInput
+from ikns.simulation.parameter_table import draw_parameters
 
 __all__ = [
     "CONDITIONS",
@@ -22,35 +23,37 @@ __all__ = [
     "typical",
 ]
 
-#: What an operator may hold: the elbow, or a stick.
+#: Conditions that an operator can do: with the elbow, or with a stick.
 CONDITIONS = ("ikns", "gamepad")
-#: People lower their gain rather than swing: a draw with less is drawn again, rad.
+#: Smallest phase margin, rad; a draw with less is repeated, as people lower their gain
+#: rather than oscillate.
 #: Phase margins measured with the crossover model are 30 to 60 deg (recalled from
-#: McRuer and Jex 1967); below 20 deg nobody tracks.
+#: McRuer and Jex 1967); tracking is not possible below 20 deg.
 LEAST_MARGIN = math.radians(20.0)
 _TRIES = 1000
 
 
 @dataclass(frozen=True)
 class Ability:
-    """Parameters of a virtual operator; where each is from: ``parameters.toml``.
+    """Parameters of a virtual operator; ``parameters.toml`` gives their sources.
 
     Parameters
     ----------
     crossover : float
         Gain of the loop, rad/s.
     delay : float
-        From seeing to acting, s.
+        Visuomotor delay, s.
     preview : float
-        How far ahead of the pointer the person looks, s.
+        How far ahead of the pointer the person sees the curve, s.
     limb_frequency, limb_damping : float
-        Of the second-order lag of nerves and muscles, rad/s and 1.
+        Natural frequency (rad/s) and damping ratio of the second-order neuromuscular
+        lag.
     remnant, remnant_bandwidth : float
         Standard deviation (c) and bandwidth (rad/s) of noise at the perceived error.
     signal_noise : float
-        Noise in proportion to the command.
+        Standard deviation of noise in proportion to the command.
     novice, practice : float
-        Both noises are ``1 + novice exp(-trial / practice)`` as large in a trial.
+        Both noises are multiplied by ``1 + novice exp(-trial / practice)``.
     """
 
     crossover: float
@@ -65,7 +68,7 @@ class Ability:
     practice: float
 
     def __post_init__(self) -> None:
-        """Refuse what nobody can be."""
+        """Check that all parameters are possible."""
         above = {"crossover", "delay", "limb_frequency", "limb_damping"}
         above |= {"remnant_bandwidth", "practice"}
         for field in fields(self):
@@ -87,13 +90,13 @@ class Ability:
         )
 
     def noiseless(self) -> Ability:
-        """Return the same person without any noise: a linear system."""
+        """Return the same person without noise: a linear system."""
         return replace(self, remnant=0.0, signal_noise=0.0, novice=0.0)
 
 
 @cache
 def parameters(condition: str = "ikns") -> dict[str, dict[str, Any]]:
-    """Table of all parameters with unit, spread, limits and source."""
+    """Return the table of all parameters with unit, spread, limits and source."""
     if condition not in CONDITIONS:
         raise InvalidInput(
             f"expected a condition of {', '.join(CONDITIONS)}, found '{condition}'."
@@ -120,8 +123,8 @@ def sample_abilities(
 ) -> list[Ability]:
     """Draw virtual operators, independently of one another.
 
-    The same person with another device keeps the place in the population: with one
-    seed, whoever is slow with the elbow is slow with the stick.
+    A person has the same rank in the population with every device: with one seed, who
+    is slow with the elbow is slow with the stick.
 
     Parameters
     ----------
@@ -130,24 +133,24 @@ def sample_abilities(
         The first k of n are those of k with the same seed.
     condition : {"ikns", "gamepad"}
     latency : float
-        Of the system that they learn, s: it counts in the phase margin, which is never
-        below :data:`LEAST_MARGIN`.
+        Of the system, s: it lowers the phase margin, which is never below
+        :data:`LEAST_MARGIN`.
     """
     table = parameters(condition)
     return [_drawn(table, np.random.default_rng([seed, k]), latency) for k in range(n)]
 
 
 def phase_margin(ability: Ability, *, latency: float = 0.0) -> float:
-    """How far the loop is from swinging, rad, by the crossover model with the limb.
+    """Phase margin of the loop, rad: crossover model with the limb's lag.
 
-    Found where ``w_c |limb(j w)| / w = 1``, the only such frequency for a damping of
-    0.5 and more.
+    It is taken where ``w_c |limb(j w)| / w = 1``, a unique frequency for a damping
+    ratio of at least 0.5.
     """
     low, high = 0.0, 2 * ability.crossover + ability.limb_frequency
     for _ in range(80):
         middle = (low + high) / 2
-        louder = ability.crossover * abs(_limb(ability, middle)) > middle
-        low, high = (middle, high) if louder else (low, middle)
+        above = ability.crossover * abs(_limb(ability, middle)) > middle
+        low, high = (middle, high) if above else (low, middle)
     phase = -np.pi / 2 + float(np.angle(_limb(ability, low)))
     return float(np.pi + phase - low * (ability.delay + latency))
 
@@ -161,18 +164,11 @@ def _drawn(
     table: dict[str, dict[str, Any]], rng: np.random.Generator, latency: float
 ) -> Ability:
     for _ in range(_TRIES):
-        # A fixed number of draws a try: devices differ in the table, not in the luck.
-        luck = rng.normal(size=len(table))
-        values = {}
-        for (name, row), z in zip(table.items(), luck, strict=True):
-            if row.get("log"):
-                value = row["mean"] * math.exp(row["sd"] * z)
-            else:
-                value = row["mean"] + row["sd"] * z
-            values[name] = float(min(max(value, row["low"]), row["high"]))
-        ability = Ability(**values)
+        # The same number of draws for each device keeps a person's rank.
+        ability = Ability(**draw_parameters(table, rng))
         if phase_margin(ability, latency=latency) >= LEAST_MARGIN:
             return ability
     raise InvalidInput(
-        f"no operator keeps a phase margin with a latency of {latency:g} s."
+        f"no operator has enough phase margin with a latency of {latency:g} s; choose "
+        "a shorter one."
     )

@@ -1,4 +1,4 @@
-"""A yardstick, not a person: it copies the target after a known delay."""
+"""A reference without a human model: it copies the target after a known delay."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections import deque
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Copyist"]
+__all__ = ["DelayedCopy"]
 
 
-class Copyist:
-    """An operator that does not look at the pointer.
+class DelayedCopy:
+    """An operator without feedback, to check metrics against known answers.
 
-    Through a perfect device a delay of 0 gives no error at all, and any other delay is
-    the lag to be measured; a gain of 0 is an operator that keeps still.
+    Through an ideal device a delay of 0 gives no error, and any other delay is the lag
+    that metrics must find; with a gain of 0 the limb does not move.
 
     Parameters
     ----------
@@ -25,12 +25,12 @@ class Copyist:
     gain : float
         Of the target's distance from `start`.
     start : float
-        Where the limb is at first, and before the delay has passed.
+        Position of the limb until the delay has passed.
 
     Examples
     --------
-    >>> copyist = Copyist(0.02, rate=100)
-    >>> [copyist.step(x, 0.0) for x in (0.1, 0.2, 0.3, 0.4)]
+    >>> copy = DelayedCopy(0.02, rate=100)
+    >>> [copy.step(x, 0.0) for x in (0.1, 0.2, 0.3, 0.4)]
     [0.5, 0.5, 0.1, 0.2]
     """
 
@@ -43,19 +43,19 @@ class Copyist:
                 f"{delay:g} s and {rate:g}."
             )
         self.rate, self.gain, self.start = rate, gain, start
-        self.place = start
-        later = round(delay * rate)
-        self._past: deque[float] = deque([math.nan] * later, maxlen=later + 1)
+        self.limb = start
+        samples = round(delay * rate)
+        self._past: deque[float] = deque([math.nan] * samples, maxlen=samples + 1)
 
     @property
     def preview(self) -> float:
-        """One sample: what is copied now is shown with the next."""
+        """One sample: what is copied now shows in the next one."""
         return 1 / self.rate
 
     def step(self, ahead: float, seen: float) -> float:
-        """Go on by a sample; what is seen does not matter."""
+        """Advance by one sample; what is seen has no effect."""
         self._past.append(ahead)
         copied = self._past[0]
         if not math.isnan(copied):
-            self.place = (1 - self.gain) * self.start + self.gain * copied
-        return self.place
+            self.limb = (1 - self.gain) * self.start + self.gain * copied
+        return self.limb

@@ -1,4 +1,4 @@
-"""An operator and what it drives, in a closed loop, sample by sample."""
+"""Operator and controlled element in a closed loop, sample by sample."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Delay", "Driven", "Steering", "Tracked", "track"]
+__all__ = ["ControlledElement", "Delay", "TrackingOperator", "TrackingTrace", "track"]
 
 Array = NDArray[np.float64]
 
 
-class Steering(Protocol):
-    """What an operator is: it looks ahead and at the pointer, and moves a limb."""
+class TrackingOperator(Protocol):
+    """An operator: it sees the curve ahead and the pointer, and moves a limb."""
 
     @property
     def rate(self) -> float:
@@ -27,29 +27,29 @@ class Steering(Protocol):
 
     @property
     def preview(self) -> float:
-        """How far ahead it looks, s."""
+        """How far ahead it sees the curve, s."""
         ...
 
     @property
-    def place(self) -> float:
-        """Where the limb is at first, 0 to 1."""
+    def limb(self) -> float:
+        """Position of the limb, 0 to 1."""
         ...
 
     def step(self, ahead: float, seen: float) -> float:
-        """Take what is seen now; give the limb of the next sample."""
+        """Take what is seen now; return the limb's position at the next sample."""
         ...
 
 
-class Driven(Protocol):
-    """What an operator drives: where the limb is in, the control signal out."""
+class ControlledElement(Protocol):
+    """What an operator controls: position of the limb in, control signal out."""
 
     def step(self, limb: float) -> float:
-        """Take the limb of the next sample, 0 to 1; give the c seen then."""
+        """Take the limb's next position, 0 to 1; return the c that is seen then."""
         ...
 
 
 class Delay:
-    """A device that shows the limb as it is, some time later: a stick, simulated.
+    """A device that returns the limb's position after a delay: a simulated stick.
 
     Parameters
     ----------
@@ -62,24 +62,23 @@ class Delay:
     def __init__(self, seconds: float, *, rate: float) -> None:
         if not 0 <= seconds < math.inf:
             raise InvalidInput(f"expected a delay of at least 0 s, found {seconds:g}.")
-        self._later = round(seconds * rate)
-        self._past: deque[float] = deque(maxlen=self._later + 1)
+        self._past: deque[float] = deque(maxlen=round(seconds * rate) + 1)
 
     def step(self, limb: float) -> float:
-        """Return the limb of some samples ago; before, where it was at first."""
+        """Return the position one delay ago; at first, the first one."""
         self._past.append(limb)
         return self._past[0]
 
 
-class Tracked(NamedTuple):
-    """What came of it; simulated.
+class TrackingTrace(NamedTuple):
+    """Signals of simulated tracking.
 
     Parameters
     ----------
     time : (T,) array
         s.
     target, limb, c : (T,) array
-        0 to 1; c as seen, not cut off.
+        0 to 1; c as seen, not clipped.
     """
 
     time: Array
@@ -89,22 +88,22 @@ class Tracked(NamedTuple):
 
 
 def track(
-    operator: Steering,
+    operator: TrackingOperator,
     target: Callable[[ArrayLike], Array],
-    driven: Driven,
+    element: ControlledElement,
     *,
     start: float,
     end: float,
-) -> Tracked:
-    """Let an operator follow a curve with something, by what it sees.
+) -> TrackingTrace:
+    """Simulate an operator that follows a curve in a closed loop.
 
     Parameters
     ----------
-    operator : Operator or Copyist
-        Fresh; it sets the rate.
+    operator : Operator or DelayedCopy
+        New; it sets the rate.
     target : callable
-        Curve of 0 to 1 at times (s); it is looked at ahead of time.
-    driven : Driven
+        Curve of 0 to 1 as a function of times (s), also ahead of the current time.
+    element : ControlledElement
         A :class:`Delay`, or an :class:`ikns.simulation.operator.ArmLoop` for the whole
         chain of body, cameras and map.
     start, end : float
@@ -112,7 +111,7 @@ def track(
 
     Returns
     -------
-    Tracked
+    TrackingTrace
     """
     n = round((end - start) * operator.rate) + 1
     if n < 2:
@@ -122,9 +121,9 @@ def track(
     time = start + np.arange(n) / operator.rate
     ahead = target(time + operator.preview)
     limb, c = np.empty(n), np.empty(n)
-    limb[0] = operator.place
-    c[0] = driven.step(limb[0])
+    limb[0] = operator.limb
+    c[0] = element.step(limb[0])
     for k in range(1, n):
         limb[k] = operator.step(float(ahead[k - 1]), float(c[k - 1]))
-        c[k] = driven.step(limb[k])
-    return Tracked(time, target(time), limb, c)
+        c[k] = element.step(limb[k])
+    return TrackingTrace(time, target(time), limb, c)

@@ -1,15 +1,15 @@
-"""The operator: from a curve ahead and a pointer seen to where the limb goes.
+"""The model of a human operator: from curve and pointer to the position of a limb.
 
-A linear model of a person who tracks, with noise:
+A linear model with noise:
 
     e(t) = target(t + preview - delay) - seen(t - delay) + remnant(t)
     du/dt = crossover (1 + signal noise) e
     p'' = w^2 (u - p) - 2 z w p'            limb; w limb_frequency, z limb_damping
 
-With a device that passes the limb on as it is (seen = p) it is the crossover model of
-McRuer and Jex 1967 with a look ahead (van der El et al. 2016). The step is exact for an
-error that is straight between samples; the delay, which may fall between samples, takes
-the error straight there, too.
+With a device that returns the limb's position (seen = p) it is the crossover model of
+McRuer and Jex 1967 with preview (van der El et al. 2016). The discrete step is exact
+for an error that is linear between samples (first-order hold); a delay that is no
+multiple of the sample time interpolates the error linearly, too.
 """
 
 from __future__ import annotations
@@ -24,43 +24,43 @@ from scipy.linalg import expm
 from ikns.errors import InvalidInput
 from ikns.simulation.operator.ability import Ability
 
-__all__ = ["Operator", "closed_loop", "open_loop", "straight_step"]
+__all__ = ["Operator", "closed_loop", "discrete_step", "open_loop"]
 
 Array = NDArray[np.float64]
 
-#: How far the wish may run past what the limb can reach, c. Nobody winds up more.
-_BEYOND = 0.05
-#: Bandwidth of the signal-dependent noise, rad/s: that of the limb, beyond which none
-#: would show (assumption).
+#: Anti-windup: how far the command u may exceed the limits of the limb, c.
+_WINDUP = 0.05
+#: Bandwidth of the signal-dependent noise, rad/s: about that of the limb, which filters
+#: out what is faster (assumption).
 _SIGNAL_BANDWIDTH = 10.0
 #: Samples of noise drawn at a time.
 _BLOCK = 256
 
 
 class Operator:
-    """A virtual operator at work.
+    """A virtual operator in a trial.
 
     Parameters
     ----------
     ability : Ability
-        With :meth:`Ability.practised` already applied, if at all.
+        After :meth:`Ability.practised`, if that is wanted.
     rate : float
         Samples per second.
     seed : int or numpy.random.Generator
         Of the noise.
     start : float
-        Where the limb is at first.
+        Initial position of the limb.
     limits : (float, float)
-        Between which the limb can go: it stops there.
+        Lowest and highest position of the limb.
 
     Examples
     --------
     >>> from ikns.simulation.operator.ability import typical
     >>> operator = Operator(typical().noiseless(), rate=100, seed=0, start=0.2)
-    >>> place = 0.2
+    >>> limb = 0.2
     >>> for _ in range(1000):
-    ...     place = operator.step(0.7, place)
-    >>> round(place, 4)
+    ...     limb = operator.step(0.7, limb)
+    >>> round(limb, 4)
     0.7
     """
 
@@ -81,11 +81,11 @@ class Operator:
         self.ability, self.rate = ability, rate
         self._limits = limits
         self._rng = np.random.default_rng(seed)
-        self._A, self._B0, self._B1 = straight_step(ability, rate)
+        self._A, self._B0, self._B1 = discrete_step(ability, rate)
         self._x = np.array([start, start, 0.0])
         whole = int(ability.delay * rate + 1e-9)
         self._part = max(0.0, ability.delay * rate - whole)
-        # Errors of the last samples. Before the beginning there was none to correct.
+        # Errors of the last samples; before the start they are 0.
         self._errors: deque[float] = deque([0.0] * (whole + 1), maxlen=whole + 1)
         self._before, self._pointer = 0.0, math.nan
         keep = [
@@ -98,51 +98,51 @@ class Operator:
 
     @property
     def preview(self) -> float:
-        """How far ahead the person looks, s."""
+        """How far ahead the person sees the curve, s."""
         return self.ability.preview
 
     @property
-    def place(self) -> float:
-        """Where the limb is, within the limits."""
+    def limb(self) -> float:
+        """Position of the limb, within the limits."""
         return float(min(max(self._x[1], self._limits[0]), self._limits[1]))
 
     def step(self, ahead: float, seen: float) -> float:
-        """Go on by a sample.
+        """Advance by one sample.
 
         Parameters
         ----------
         ahead : float
-            The target where the person looks, ``preview`` s from now, 0 to 1.
+            The target ``preview`` s from now, 0 to 1.
         seen : float
-            Where the pointer is now; NaN: it stands where it was.
+            Position of the pointer now; NaN: it has not moved.
 
         Returns
         -------
         float
-            Where the limb is at the next sample, within the limits.
+            Position of the limb at the next sample, within the limits.
         """
         if math.isfinite(seen):
             self._pointer = seen
         error = ahead - self._pointer
         self._errors.append(0.0 if math.isnan(error) else error)
-        # The end of the coming sample, less the delay, lies between the oldest two.
-        old, young = self._errors[0], self._errors[1]
+        # The end of the coming sample, minus the delay, lies between the oldest two.
+        old, new = self._errors[0], self._errors[1]
         a = self.ability
         if not self._drawn:  # many at a time, for speed
             self._drawn = list(self._rng.normal(size=(_BLOCK, 2)))
         self._noise = self._keep * self._noise + self._fresh * self._drawn.pop()
-        late = (1 - self._part) * young + self._part * old
+        late = (1 - self._part) * new + self._part * old
         late += a.remnant * self._noise[0]
         late *= 1 + a.signal_noise * self._noise[1]
         self._x = self._A @ self._x + self._B0 * self._before + self._B1 * late
         self._before = late
         low, high = self._limits
-        self._x[0] = min(max(self._x[0], low - _BEYOND), high + _BEYOND)
-        return self.place
+        self._x[0] = min(max(self._x[0], low - _WINDUP), high + _WINDUP)
+        return self.limb
 
 
-def straight_step(ability: Ability, rate: float) -> tuple[Array, Array, Array]:
-    """Exact step of wish, limb and its speed for an error straight between samples.
+def discrete_step(ability: Ability, rate: float) -> tuple[Array, Array, Array]:
+    """Exact step of command, limb and its speed for a first-order hold of the error.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def straight_step(ability: Ability, rate: float) -> tuple[Array, Array, Array]:
     M[0, 3] = ability.crossover
     M[1, 2] = 1.0
     M[2, :3] = w**2, -(w**2), -2 * z * w
-    M[3, 4] = rate  # slope of the error over one sample, for an end one higher
+    M[3, 4] = rate  # slope of the error over one sample, for a unit change
     E = expm(M / rate)
     return E[:3, :3], E[:3, 3] - E[:3, 4], E[:3, 4]
 
@@ -163,7 +163,16 @@ def straight_step(ability: Ability, rate: float) -> tuple[Array, Array, Array]:
 def open_loop(
     ability: Ability, omega: ArrayLike, *, latency: float = 0.0
 ) -> NDArray[np.complex128]:
-    """Person and device, from the error to what is seen, at frequencies (rad/s)."""
+    """Transfer function of person and device, from error to pointer.
+
+    Parameters
+    ----------
+    ability : Ability
+    omega : array
+        rad/s, above 0.
+    latency : float
+        Of the device, s.
+    """
     s = 1j * np.asarray(omega, dtype=np.float64)
     w, z = ability.limb_frequency, ability.limb_damping
     limb = w**2 / (s**2 + 2 * z * w * s + w**2)
@@ -175,9 +184,9 @@ def open_loop(
 def closed_loop(
     ability: Ability, omega: ArrayLike, *, latency: float = 0.0
 ) -> NDArray[np.complex128]:
-    """From the target to what is seen, at frequencies (rad/s).
+    """Transfer function from target to pointer, without noise.
 
-    ``L exp(preview s) / (1 + L)``, L the open loop; noise is left out.
+    ``L exp(preview s) / (1 + L)`` with the open loop ``L``.
 
     Parameters
     ----------

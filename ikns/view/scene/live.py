@@ -10,7 +10,6 @@ from __future__ import annotations
 import threading
 import webbrowser
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -23,6 +22,7 @@ from ikns.view.scene.commands import ROOT
 from ikns.view.scene.finger import flexion_commands
 from ikns.view.scene.page import packed_json, scene_html
 from ikns.view.scene.scene import Scene
+from ikns.web_access import WebAccess
 
 __all__ = ["LiveView"]
 
@@ -166,12 +166,7 @@ class LiveView:
         """Return the view itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Stop the server."""
         self.close()
 
@@ -195,16 +190,14 @@ class _Server(ThreadingHTTPServer):
     def __init__(self, address: tuple[str, int], view: LiveView) -> None:
         self.view = view
         super().__init__(address, _Handler)
-        host, port = address[0], self.server_address[1]
-        self.hosts = {f"{host}:{port}", f"localhost:{port}"}
+        self.access = WebAccess(address[0], self.server_address[1])
 
 
 class _Handler(BaseHTTPRequestHandler):
     server: _Server
 
     def do_GET(self) -> None:
-        # A foreign page may have its name lead here; its browser still says the name.
-        if self.headers.get("Host") not in self.server.hosts:
+        if not self.server.access.accepts_host(self.headers.get("Host")):
             self.send_error(403)
         elif self.path == "/":
             page = self.server.view._page

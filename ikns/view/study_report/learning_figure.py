@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ikns.experiments.study.summary import TrackingSummary
-from ikns.experiments.study.summary.cells import Columns
+from ikns.experiments.study.summary.trials import Columns
 from ikns.statistics import LearningCurve, LearningCurves
 from ikns.view.study_report.drawing import looks, outside_legend, study_figure
 from ikns.view.style import GREEN, GREY, INK, PALE, PURPLE, house_style

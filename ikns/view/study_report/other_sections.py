@@ -9,7 +9,7 @@ from ikns.experiments.study.summary import (
     PickingSummary,
     StudySummary,
     TrackingSummary,
-    Varied,
+    VariationMean,
 )
 from ikns.experiments.study.summary.answers import people
 from ikns.experiments.study.summary.methods import methods, setting_text
@@ -123,7 +123,7 @@ def variation_section(group: Group) -> Section | None:
     )
 
 
-def _varied(quantity: str, unit: str, found: list[Varied]) -> Table:
+def _varied(quantity: str, unit: str, found: list[VariationMean]) -> Table:
     rows: list[list[Cell]] = []
     for each in found:
         against = each.against

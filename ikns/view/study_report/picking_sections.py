@@ -6,7 +6,11 @@ import math
 from collections.abc import Iterator
 
 from ikns.experiments.picking import load_objects
-from ikns.experiments.study.summary import ObjectCell, PickComparison, PickingSummary
+from ikns.experiments.study.summary import (
+    ObjectResult,
+    PickComparison,
+    PickingSummary,
+)
 from ikns.experiments.study.summary.answers import people, worded
 from ikns.view.parts import Cell, Picture, Section, Table
 from ikns.view.study_report.effect_figure import effect_figure
@@ -170,7 +174,7 @@ def _time_table(found: PickingSummary) -> Table:
     )
 
 
-def _by_object(found: PickingSummary) -> Iterator[tuple[str, list[ObjectCell]]]:
+def _by_object(found: PickingSummary) -> Iterator[tuple[str, list[ObjectResult]]]:
     """Name of each object as in the paper's table, and its cells by condition."""
     known = load_objects()
     for code in (*found.objects, ""):

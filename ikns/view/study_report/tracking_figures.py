@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ikns.experiments.study.summary import TrackingSummary
-from ikns.experiments.study.summary.cells import subject_means
+from ikns.experiments.study.summary.means import subject_means
 from ikns.view.study_report.drawing import (
     looks,
     outside_legend,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from ikns.experiments.study.summary import Comparison, TrackingSummary
+from ikns.experiments.study.summary import TrackingComparison, TrackingSummary
 from ikns.experiments.study.summary.answers import people, worded
 from ikns.experiments.study.summary.tracking import UNITS
 from ikns.statistics.printed import PAPER
@@ -143,7 +143,7 @@ def tracking_sections(found: TrackingSummary, drawn: list[Drawn]) -> Iterator[Se
 
 
 def _comparison(
-    compared: Comparison, pictures: list[Picture], *, many: bool
+    compared: TrackingComparison, pictures: list[Picture], *, many: bool
 ) -> Section:
     a, b = compared.names
     title = f"Tracking: {a} against {b}"

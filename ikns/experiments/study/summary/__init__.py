@@ -1,39 +1,44 @@
 """From visits on disk to the numbers of a report.
 
-Everything is computed again from the attempts, one visit at a time; stored metrics are
-not believed. People and simulated participants are never added up.
+Everything is computed from the attempts, one visit at a time; stored metrics are not
+used. People and simulated participants are never pooled.
 """
 
-from ikns.experiments.study.summary.cells import Cell, Mean, cells, mean_of
-from ikns.experiments.study.summary.digest import Digest, LeftOut, digest_visit
+from ikns.experiments.study.summary.digest import Digest, ExcludedVisit, digest_visit
+from ikns.experiments.study.summary.means import (
+    ConditionMean,
+    Mean,
+    condition_means,
+    mean_of,
+)
 from ikns.experiments.study.summary.picking import (
-    ObjectCell,
+    ObjectResult,
     PickComparison,
     PickingSummary,
 )
 from ikns.experiments.study.summary.running_error import ErrorOverTime, RunningError
 from ikns.experiments.study.summary.study import Group, StudySummary, summarize
-from ikns.experiments.study.summary.tracking import Comparison, TrackingSummary
-from ikns.experiments.study.summary.variations import Varied, variations
+from ikns.experiments.study.summary.tracking import TrackingComparison, TrackingSummary
+from ikns.experiments.study.summary.variations import VariationMean, compare_variations
 
 __all__ = [
-    "Cell",
-    "Comparison",
+    "ConditionMean",
     "Digest",
     "ErrorOverTime",
+    "ExcludedVisit",
     "Group",
-    "LeftOut",
     "Mean",
-    "ObjectCell",
+    "ObjectResult",
     "PickComparison",
     "PickingSummary",
     "RunningError",
     "StudySummary",
+    "TrackingComparison",
     "TrackingSummary",
-    "Varied",
-    "cells",
+    "VariationMean",
+    "compare_variations",
+    "condition_means",
     "digest_visit",
     "mean_of",
     "summarize",
-    "variations",
 ]

@@ -1,4 +1,4 @@
-"""Visits of one experiment added up, one after the other: people, or simulated ones."""
+"""Collects the visits of one experiment, one after the other."""
 
 from __future__ import annotations
 
@@ -19,17 +19,23 @@ from ikns.experiments.study.summary.digest import (
 )
 from ikns.experiments.study.summary.running_error import ErrorOverTime, RunningError
 
-__all__ = ["Gathered"]
+__all__ = ["VisitAccumulator"]
 
-#: What visits say of themselves that the methods tell, and of how many that differ.
-_SAID, _MOST_SAID = ("design", "versions", "input", "training", "parameters"), 10
+#: Parts of ``visit.json`` that the methods text needs, and how many different ones.
+_SETTINGS, _MAX_SETTINGS = ("design", "versions", "input", "training", "parameters"), 10
 
 
-class Gathered:
-    """What is kept of the visits of one experiment.
+class VisitAccumulator:
+    """Trials and settings of the visits of one experiment.
 
-    Per trial a row of numbers, per condition and trajectory a running mean over time;
-    no traces. Error over time is that of the first variation only.
+    It keeps a row of numbers per trial, and per condition and trajectory a running mean
+    over time, but no traces. The error over time is that of the first variation only.
+
+    Parameters
+    ----------
+    experiment : {"tracking", "picking"}
+    simulated : bool
+        Whether the visits are of people or of simulated participants.
 
     Attributes
     ----------
@@ -37,14 +43,19 @@ class Gathered:
     columns : dict of str to list
     attempts : Counter
         By (condition, kind, outcome).
-    abouts : list of dict
-        What visits say of design, versions, input and simulation, once each; the first
-        ten.
+    settings : list of dict
+        Design, versions, inputs and simulation parameters of the visits, the first ten
+        that differ.
     unmeasured : list of str
+        Trials without a second of control signal.
     sessions : dict of (variation, participant) to str
         Of visits that recorded one, relative to the visit.
     faults : list of str
         Why virtual persons could not take part.
+    redrawn : int
+        Persons who were replaced because they could not do the protocol.
+    variations : dict of str to dict
+        Settings by variation, in the order in which they came.
     """
 
     def __init__(self, experiment: str, *, simulated: bool) -> None:
@@ -54,17 +65,17 @@ class Gathered:
         }
         self.folders: dict[tuple[str, str], Path] = {}
         self.attempts: Counter[tuple[str, str, str]] = Counter()
-        self.abouts: list[dict[str, Any]] = []
+        self.settings: list[dict[str, Any]] = []
         self.unmeasured: list[str] = []
         self.sessions: dict[tuple[str, str], str] = {}
         self.faults: list[str] = []
         self.redrawn = 0
-        self.planned: dict[str, dict[str, Any]] = {}
+        self.variations: dict[str, dict[str, Any]] = {}
         self._errors: dict[tuple[str, str, float], RunningError] = {}
 
     def add(self, digest: Digest) -> str:
-        """Take a visit in; say why not where its participant was there already."""
-        who = str(digest.about["participant"])
+        """Add a visit; return why not if its participant had one already."""
+        about, who = digest.about, str(digest.about["participant"])
         key = (digest.variation, who)
         if key in self.folders:
             return (
@@ -76,17 +87,17 @@ class Gathered:
             values.extend(digest.table[name])
         self.attempts += digest.attempts
         self.unmeasured += [f"{who}: {name}" for name in digest.unmeasured]
-        if isinstance(digest.about.get("session"), str):
-            self.sessions[key] = digest.about["session"]
-        if digest.about.get("reason"):
-            self.faults.append(f"{who}: {digest.about['reason']}")
-        self.redrawn += int(digest.about.get("redrawn") or 0)
-        self.planned.setdefault(
-            digest.variation, dict(digest.about.get("variation_settings") or {})
+        if isinstance(about.get("session"), str):
+            self.sessions[key] = about["session"]
+        if about.get("reason"):
+            self.faults.append(f"{who}: {about['reason']}")
+        self.redrawn += int(about.get("redrawn") or 0)
+        self.variations.setdefault(
+            digest.variation, dict(about.get("variation_settings") or {})
         )
-        said = {name: digest.about[name] for name in _SAID if name in digest.about}
-        if said not in self.abouts and len(self.abouts) < _MOST_SAID:
-            self.abouts.append(said)
+        settings = {name: about[name] for name in _SETTINGS if name in about}
+        if settings not in self.settings and len(self.settings) < _MAX_SETTINGS:
+            self.settings.append(settings)
         if digest.variation == self.base:
             for at, error in digest.errors.items():
                 if at not in self._errors:
@@ -96,22 +107,12 @@ class Gathered:
 
     @property
     def base(self) -> str:
-        """First variation: that without a name where there is one."""
-        return next(iter(self.planned), "")
-
-    @property
-    def variations(self) -> list[str]:
-        """In the order in which they came."""
-        return list(self.planned)
-
-    def participants(self, variation: str | None = None) -> list[str]:
-        """Who came, in order; of one variation or any."""
-        who = [p for v, p in self.folders if variation is None or v == variation]
-        return list(dict.fromkeys(who))
+        """First variation: the one without a name if there is one."""
+        return next(iter(self.variations), "")
 
     def table(self) -> dict[str, NDArray[Any]]:
-        """Trials by column."""
-        # Of a type of its own even where there is no trial.
+        """Return all trials by column."""
+        # Types are given so that they are right even without any trial.
         kind = dict.fromkeys(TEXTS, np.str_) | dict.fromkeys(WHOLE, np.int64)
         return {
             name: np.asarray(values, dtype=kind.get(name, np.float64))
@@ -119,10 +120,27 @@ class Gathered:
         }
 
     def error_over_time(self) -> dict[tuple[str, str], ErrorOverTime]:
-        """By condition and trajectory; of the length that most subjects had."""
+        """By condition and trajectory, of the length that most subjects had."""
         found: dict[tuple[str, str], ErrorOverTime] = {}
         for (condition, trajectory, _), running in self._errors.items():
             result, key = running.result(), (condition, trajectory)
             if key not in found or result.count.max() > found[key].count.max():
                 found[key] = result
         return found
+
+    def summary_fields(self) -> dict[str, Any]:
+        """Return what the summaries of both experiments have in common."""
+        base = self.base
+        return {
+            "simulated": self.simulated,
+            "participants": list(
+                dict.fromkeys(who for name, who in self.folders if name == base)
+            ),
+            "base": base,
+            "attempts": self.attempts,
+            "settings": self.settings,
+            "redrawn": self.redrawn,
+            "faults": self.faults,
+            "sessions": self.sessions,
+            "folders": self.folders,
+        }

@@ -1,19 +1,23 @@
-"""The paper's two research questions, answered in plain sentences from the tests.
+"""Answers to the paper's two research questions, in sentences from the tests.
 
-That no difference was found is never taken for equality: equivalence needs a margin
-that was declared before the data were seen, and a test of its own.
+A difference that was not found is not taken for equality: equivalence needs a margin
+declared before the data were seen, and a test of its own.
 """
 
 from __future__ import annotations
 
 from ikns.experiments.study.summary.picking import PickComparison, PickingSummary
-from ikns.experiments.study.summary.tracking import UNITS, Comparison, TrackingSummary
+from ikns.experiments.study.summary.tracking import (
+    UNITS,
+    TrackingComparison,
+    TrackingSummary,
+)
 from ikns.statistics import Equivalence, PairedT, SuccessTest
 from ikns.statistics.wording import counted, interval_text, number, p_text
 
 __all__ = ["people", "picking_answer", "tracking_answer", "worded"]
 
-#: How conditions are called in sentences; others by their own name.
+#: Names of conditions in sentences; others keep their own.
 _WORDS = {
     "ikns": "the null space (ikns)",
     "gamepad": "the gamepad",
@@ -24,7 +28,7 @@ _WORDS = {
 
 
 def worded(condition: str) -> str:
-    """Name a condition in a sentence.
+    """Return the name of a condition for a sentence.
 
     >>> worded("ikns"), worded("foot pedal")
     ('the null space (ikns)', 'foot pedal')
@@ -33,7 +37,7 @@ def worded(condition: str) -> str:
 
 
 def people(count: int, *, simulated: bool) -> str:
-    """Say how many, and that they are simulated if they are.
+    """Return a number of participants in words, marked if they are simulated.
 
     >>> people(1, simulated=True), people(10, simulated=False)
     ('1 simulated participant', '10 participants')
@@ -45,7 +49,7 @@ def people(count: int, *, simulated: bool) -> str:
 def tracking_answer(
     summary: TrackingSummary | None, *, simulated: bool
 ) -> list[tuple[str, list[str]]]:
-    """Questions about tracking, each with sentences that answer it."""
+    """Return the questions about tracking, each with the sentences of its answer."""
     if summary is None:
         question = "Does tracking with the null space differ from another device?"
         return [(question, ["Not tested: there is no visit of tracking."])]
@@ -66,7 +70,7 @@ def tracking_answer(
 def picking_answer(
     summary: PickingSummary | None, *, simulated: bool
 ) -> list[tuple[str, list[str]]]:
-    """Questions about pick and place, each with sentences that answer it."""
+    """Return the questions about picking, each with the sentences of its answer."""
     if summary is None:
         question = "Does pick and place with the null space differ?"
         return [(question, ["Not tested: there is no visit of pick and place."])]
@@ -94,12 +98,12 @@ def _only(conditions: list[str]) -> str:
 
 
 def _tracking_sentences(
-    summary: TrackingSummary, compared: Comparison, simulated: bool
+    summary: TrackingSummary, compared: TrackingComparison, simulated: bool
 ) -> list[str]:
     if compared.analysis is None:
         return [compared.why]
     found = compared.analysis
-    said = [
+    sentences = [
         _difference(
             "RMSE",
             found.subjects,
@@ -114,24 +118,24 @@ def _tracking_sentences(
         p = found.model.interaction_p
         depends = "depends" if p < 0.05 else "is not shown to depend"
         tested = f", and {depends} on it ({p_text(p)})" if p == p else ""
-        said.append(
+        sentences.append(
             f"By trajectory the difference of the means is {', '.join(parts)} "
             f"{UNITS['rmse']}{tested}."
         )
-    return said
+    return sentences
 
 
 def _picking_sentences(compared: PickComparison, simulated: bool) -> list[str]:
-    said = []
+    sentences = []
     if compared.success is not None:
-        said.append(_success(compared.success, simulated))
+        sentences.append(_success(compared.success, simulated))
     if compared.analysis is None:
-        return [*said, compared.why]
+        return [*sentences, compared.why]
     time = compared.analysis.time
     if time.over_subjects is None:
-        said.append("Times do not vary, so they were not tested.")
+        sentences.append("Times do not vary, so they were not tested.")
     else:
-        said.append(
+        sentences.append(
             _difference(
                 "the time to success (failures counted at the limit of "
                 f"{number(time.limit, 's')})",
@@ -140,13 +144,13 @@ def _picking_sentences(compared: PickComparison, simulated: bool) -> list[str]:
                 people(time.subjects, simulated=simulated),
             )
         )
-    return said
+    return sentences
 
 
 def _difference(
     quantity: str, test: PairedT, same: Equivalence | None, whose: str
 ) -> str:
-    """Differs, equivalent, both, or open; a number with interval, p and n each time."""
+    """Say whether means differ, are equivalent, both, or neither is shown."""
     a, b = (worded(name) for name in test.names)
     size = (
         f"mean difference {number(test.difference, test.unit)}, "
@@ -190,7 +194,7 @@ def _difference(
 
 
 def _success(test: SuccessTest, simulated: bool) -> str:
-    """Say the counts, and both ways to test them."""
+    """Give the counts of successes and both tests of them."""
     a, b = (worded(name) for name in test.names)
     counts = (
         f"{test.succeeded[0]} of {test.pairs} trials succeeded with {a}, "

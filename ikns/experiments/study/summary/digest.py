@@ -1,6 +1,6 @@
-"""What a visit comes to, computed again from its attempts; nothing stored is believed.
+"""Measures the trials of a visit, from its attempts alone.
 
-One visit is in memory at a time. What is kept of it does not hold its traces.
+One visit is in memory at a time; its traces are not kept.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ikns.errors import FileError, IknsError, NotEnoughData, naming
 from ikns.experiments.tracking import error_over_time, measure
 from ikns.experiments.visits import (
     VisitRecord,
-    counting,
+    counted_attempts,
     read_visit,
     tracking_record,
 )
@@ -30,7 +30,7 @@ __all__ = [
     "TRACKING",
     "WHOLE",
     "Digest",
-    "LeftOut",
+    "ExcludedVisit",
     "digest_visit",
 ]
 
@@ -60,8 +60,8 @@ RATE = 20.0
 
 
 @dataclass(frozen=True)
-class LeftOut:
-    """A visit that could not be used, and why."""
+class ExcludedVisit:
+    """A visit that could not be used, and the reason."""
 
     folder: Path
     reason: str
@@ -69,21 +69,21 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Digest:
-    """What is kept of a visit.
+    """A visit reduced to its measured trials.
 
     Parameters
     ----------
     folder : Path
     about : dict
-        Of ``visit.json``.
+        Content of ``visit.json``.
     table : dict of str to list
-        The trials that count and could be measured, training among them, by column.
+        Trials that count and could be measured, training included, by column.
     attempts : Counter
-        How many, by (condition, kind, outcome).
+        Number of attempts, by (condition, kind, outcome).
     errors : dict of (condition, trajectory, seconds) to (T,) array
-        Pointer less target at ``RATE``, of 100, mean over repeats.
+        Pointer minus target at ``RATE``, of 100, mean over repeats.
     unmeasured : list of str
-        Trials that were done but hold no second of control signal.
+        Finished trials with less than a second of control signal.
     """
 
     folder: Path
@@ -100,12 +100,12 @@ class Digest:
 
     @property
     def variation(self) -> str:
-        """Empty for the study as it was planned."""
+        """Name of the variation; empty for the study as planned."""
         return str(self.about.get("variation") or "")
 
 
-def digest_visit(folder: Path) -> Digest | LeftOut:
-    """Read a visit, measure its trials, and let the rest go."""
+def digest_visit(folder: Path) -> Digest | ExcludedVisit:
+    """Read a visit and measure its trials."""
     try:
         with naming(str(folder)):
             visit = read_visit(folder)
@@ -113,11 +113,11 @@ def digest_visit(folder: Path) -> Digest | LeftOut:
                 return _tracking(visit)
             return _picking(visit)
     except IknsError as error:
-        return LeftOut(folder, str(error))
+        return ExcludedVisit(folder, str(error))
 
 
 def _tracking(visit: VisitRecord) -> Digest:
-    digest = _begun(visit, TRACKING)
+    digest = _new_digest(visit, TRACKING)
     traces: dict[tuple[str, str, float], list[Array]] = {}
     for row, trial in _trials(visit, ("done",)):
         _check_trace(row)
@@ -129,7 +129,7 @@ def _tracking(visit: VisitRecord) -> Digest:
             continue
         _append(
             digest.table,
-            _who(digest, row)
+            _identity(digest, row)
             | {name: row[name] for name in ("trajectory", "align", "seconds")}
             | {"trial": trial}
             | {name: getattr(found, name) for name in METRICS},
@@ -144,7 +144,7 @@ def _tracking(visit: VisitRecord) -> Digest:
 
 
 def _picking(visit: VisitRecord) -> Digest:
-    digest = _begun(visit, PICKING)
+    digest = _new_digest(visit, PICKING)
     for row, trial in _trials(visit, ("success", "dropped", "timeout")):
         time, limit = row["time"], row["limit"]
         if row["outcome"] == "success" and not 0 <= time < np.inf or not limit > 0:
@@ -154,7 +154,7 @@ def _picking(visit: VisitRecord) -> Digest:
             )
         _append(
             digest.table,
-            _who(digest, row)
+            _identity(digest, row)
             | {name: row[name] for name in ("object", "outcome", "time", "limit")}
             | {"comment": row["comment"], "trial": trial}
             | {"success": row["outcome"] == "success"},
@@ -163,7 +163,7 @@ def _picking(visit: VisitRecord) -> Digest:
 
 
 def _check_trace(row: dict[str, Any]) -> None:
-    """Refuse frames that do not follow one another."""
+    """Raise if times do not increase, or there are not as many values of c."""
     time, c = row["time"], row["c"]
     if (
         len(time) != len(c)
@@ -176,7 +176,7 @@ def _check_trace(row: dict[str, Any]) -> None:
         )
 
 
-def _begun(visit: VisitRecord, columns: tuple[str, ...]) -> Digest:
+def _new_digest(visit: VisitRecord, columns: tuple[str, ...]) -> Digest:
     attempts = Counter(
         (str(row["condition"]), str(row["kind"]), str(row["outcome"]))
         for row in visit.attempts
@@ -187,17 +187,17 @@ def _begun(visit: VisitRecord, columns: tuple[str, ...]) -> Digest:
 def _trials(
     visit: VisitRecord, outcomes: tuple[str, ...]
 ) -> list[tuple[dict[str, Any], int]]:
-    """List the attempts that count, each with its number among those of its kind."""
+    """Return the attempts that count, each with its number within its kind."""
     seen: Counter[tuple[str, str]] = Counter()
     found = []
-    for row in counting(visit.attempts):
+    for row in counted_attempts(visit.attempts):
         if row["outcome"] in outcomes:
             seen[row["condition"], row["kind"]] += 1
             found.append((row, seen[row["condition"], row["kind"]]))
     return found
 
 
-def _who(digest: Digest, row: dict[str, Any]) -> dict[str, Any]:
+def _identity(digest: Digest, row: dict[str, Any]) -> dict[str, Any]:
     same = ("condition", "kind", "repeat", "number", "practised")
     return {
         "subject": digest.about["participant"],
@@ -211,7 +211,7 @@ def _append(table: dict[str, list[Any]], row: dict[str, Any]) -> None:
 
 
 def _mean(errors: Array) -> Array:
-    """Mean over the first axis of what is there."""
+    """Return the mean over the first axis, NaN excluded."""
     known = np.isfinite(errors)
     count = known.sum(axis=0)
     total = np.where(known, errors, 0.0).sum(axis=0)

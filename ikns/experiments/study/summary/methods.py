@@ -1,4 +1,4 @@
-"""Methods paragraphs written from what was configured, to be pasted into a paper."""
+"""Paragraphs for the methods section of a paper, from the settings of the visits."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ikns.statistics.wording import number
 
 __all__ = ["methods", "setting_text"]
 
-#: What the paragraphs already tell of a design.
-_TOLD = {
+#: Keys of a design that the paragraphs mention.
+_MENTIONED = {
     "conditions",
     "profiles",
     "repeats",
@@ -29,17 +29,17 @@ _TOLD = {
 
 
 def methods(group: Group) -> list[str]:
-    """Paragraphs for the people, or the simulated participants, of a study."""
-    said = [_participants(group)]
+    """Return the paragraphs for the people, or the simulated participants."""
+    paragraphs = [_participants(group)]
     if group.tracking is not None:
-        said += [_tracking(group.tracking), _tracking_tests(group.tracking)]
+        paragraphs += [_tracking(group.tracking), _tracking_tests(group.tracking)]
     if group.picking is not None:
-        said += [_picking(group.picking), _picking_tests(group.picking)]
-    return [*said, *_versions(group)]
+        paragraphs += [_picking(group.picking), _picking_tests(group.picking)]
+    return [*paragraphs, *_versions(group)]
 
 
 def setting_text(settings: Mapping[str, Any]) -> str:
-    """Write settings as ``name = value``, those of a table inside like the others.
+    """Write settings as ``name = value``, nested tables flattened.
 
     >>> setting_text({"latency": 0.1, "parameters": {"n_points": 6}})
     'latency = 0.1, n_points = 6'
@@ -70,7 +70,7 @@ def _participants(group: Group) -> str:
         if redrawn
         else ""
     )
-    first = next((each.said[0] for each in both if each.said), {})
+    first = next((each.settings[0] for each in both if each.settings), {})
     settings = setting_text(first.get("parameters") or {})
     more = f" Parameters of the simulation: {settings}." if settings else ""
     return (
@@ -80,9 +80,9 @@ def _participants(group: Group) -> str:
 
 
 def _tracking(found: TrackingSummary) -> str:
-    said = _design(found.said)
-    seconds = said.get("seconds", _only(found.table["seconds"]))
-    align = said.get("align", _only(found.table["align"]))
+    design = _design(found.settings)
+    seconds = design.get("seconds", _only(found.table["seconds"]))
+    align = design.get("align", _only(found.table["align"]))
     parts = [
         "Tracking: a pointer crossed the screen at constant speed and was to follow a "
         "pseudo-random curve; its height was 100 c, c being the control signal cut "
@@ -96,13 +96,13 @@ def _tracking(found: TrackingSummary) -> str:
             "" if align is None else f"{number(float(align), 's')} to align and then "
         )
         parts.append(f"A trial gave {before}{number(float(seconds), 's')} to track.")
-    parts += _block(said, "every curve", _training(found.said))
+    parts += _block(design, "every curve", _training(found.settings))
     parts.append(_order(found.conditions, "curves"))
-    return " ".join(part for part in parts if part) + _inputs(found.said)
+    return " ".join(part for part in parts if part) + _inputs(found.settings)
 
 
 def _picking(found: PickingSummary) -> str:
-    said = _design(found.said)
+    design = _design(found.settings)
     parts = [
         f"Pick and place: {len(found.objects)} objects ({', '.join(found.objects)}), "
         f"conditions {', '.join(map(worded, found.conditions))}."
@@ -112,33 +112,33 @@ def _picking(found: PickingSummary) -> str:
             f"A trial ended with success, with the object dropped, or after "
             f"{number(found.limit, 's')}."
         )
-    parts += _block(said, "every object", _training(found.said))
+    parts += _block(design, "every object", _training(found.settings))
     parts.append(_order(found.conditions, "objects"))
-    return " ".join(part for part in parts if part) + _inputs(found.said)
+    return " ".join(part for part in parts if part) + _inputs(found.settings)
 
 
-def _training(said: list[dict[str, Any]]) -> str:
-    """Say how visits trained, where they did not as a person would."""
-    told = {str(each["training"]) for each in said if each.get("training")}
-    return f" (training: {' or '.join(sorted(told))})" if told else ""
+def _training(settings: list[dict[str, Any]]) -> str:
+    """Describe the training of visits that did not train as people do."""
+    found = {str(each["training"]) for each in settings if each.get("training")}
+    return f" (training: {' or '.join(sorted(found))})" if found else ""
 
 
-def _block(said: Mapping[str, Any], each: str, training: str) -> list[str]:
+def _block(design: Mapping[str, Any], each: str, training: str) -> list[str]:
     parts = []
-    if "repeats" in said:
-        parts.append(f"In each condition {each} came {said['repeats']} times.")
-        if said["repeats"] == 1:
+    if "repeats" in design:
+        parts.append(f"In each condition {each} came {design['repeats']} times.")
+        if design["repeats"] == 1:
             parts[-1] = f"In each condition {each} came once."
-    if said.get("training"):
+    if design.get("training"):
         parts.append(
-            f"{said['training']} training trials came before each condition and do "
+            f"{design['training']} training trials came before each condition and do "
             f"not count{training}."
         )
-    if said.get("rest"):
-        parts.append(f"Rest between conditions: {number(float(said['rest']), 's')}.")
-    if "seed" in said:
-        parts.append(f"Seed of the schedule: {said['seed']}.")
-    other = {k: v for k, v in said.items() if k not in _TOLD and v is not None}
+    if design.get("rest"):
+        parts.append(f"Rest between conditions: {number(float(design['rest']), 's')}.")
+    if "seed" in design:
+        parts.append(f"Seed of the schedule: {design['seed']}.")
+    other = {k: v for k, v in design.items() if k not in _MENTIONED and v is not None}
     if other:
         parts.append(f"Also set: {setting_text(other)}.")
     return parts
@@ -191,16 +191,17 @@ def _picking_tests(found: PickingSummary) -> str:
 def _versions(group: Group) -> list[str]:
     found: dict[str, str] = {}
     for each in (group.tracking, group.picking):
-        for said in [] if each is None else each.said:
-            found |= {k: str(v) for k, v in (said.get("versions") or {}).items()}
+        for settings in [] if each is None else each.settings:
+            versions = settings.get("versions") or {}
+            found |= {name: str(version) for name, version in versions.items()}
     if not found:
         return []
     return [f"Software: {', '.join(f'{k} {v}' for k, v in sorted(found.items()))}."]
 
 
-def _design(said: list[dict[str, Any]]) -> dict[str, Any]:
-    """Design of the first visit; keys that differ between visits are left out."""
-    designs = [dict(each.get("design") or {}) for each in said]
+def _design(settings: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the design of the visits, without keys in which they differ."""
+    designs = [dict(each.get("design") or {}) for each in settings]
     if not designs:
         return {}
     return {
@@ -210,9 +211,9 @@ def _design(said: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _inputs(said: list[dict[str, Any]]) -> str:
+def _inputs(settings: list[dict[str, Any]]) -> str:
     found: dict[str, list[str]] = {}
-    for each in said:
+    for each in settings:
         for condition, text in (each.get("input") or {}).items():
             found.setdefault(str(condition), [])
             if str(text) not in found[str(condition)]:

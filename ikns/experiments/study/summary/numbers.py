@@ -1,4 +1,4 @@
-"""Everything a report says in numbers, as plain tables for JSON and CSV."""
+"""All numbers of a report, as plain tables for JSON and CSV."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["error_csv", "numbers", "trials_csv"]
 
 
 def numbers(summary: StudySummary) -> dict[str, Any]:
-    """Return all numbers of a study: dicts, lists, text and floats (NaN: none)."""
+    """Return all numbers of a study: dicts, lists, text and floats, NaN for missing."""
     return {
         "study": summary.name,
         "simulated": [group.simulated for group in summary.groups],
@@ -34,7 +34,7 @@ def numbers(summary: StudySummary) -> dict[str, Any]:
 
 
 def trials_csv(summary: StudySummary, experiment: str) -> str:
-    """Return all trials of an experiment as CSV, people first; nothing without any.
+    """Return all trials of an experiment as CSV, people first; empty without any.
 
     Parameters
     ----------
@@ -51,17 +51,19 @@ def trials_csv(summary: StudySummary, experiment: str) -> str:
         if not header:
             header = ["simulated", *found.table]
             writer.writerow(header)
-        said = "yes" if group.simulated else "no"
+        simulated = "yes" if group.simulated else "no"
         for row in zip(*(v.tolist() for v in found.table.values()), strict=True):
-            writer.writerow([said, *("" if cell != cell else cell for cell in row)])
+            writer.writerow(
+                [simulated, *("" if cell != cell else cell for cell in row)]
+            )
     return text.getvalue()
 
 
 def error_csv(summary: StudySummary) -> str:
-    """Return the error over time of tracking as CSV, people first; or nothing.
+    """Return the error over time of tracking as CSV, people first; empty without any.
 
-    Per condition, trajectory and time (s): how many participants, mean, standard
-    deviation and percentiles of pointer less target, of 100.
+    For each condition, trajectory and time (s): number of participants, mean, standard
+    deviation and percentiles of pointer minus target, of 100.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -76,10 +78,10 @@ def error_csv(summary: StudySummary) -> str:
                 writer.writerow(header)
                 header = ()
             columns = [getattr(error, name).tolist() for name in names]
-            said = "yes" if group.simulated else "no"
+            simulated = "yes" if group.simulated else "no"
             for row in zip(*columns, strict=True):
-                cells = ["" if cell != cell else cell for cell in row]
-                writer.writerow([said, condition, trajectory, *cells])
+                values = ["" if value != value else value for value in row]
+                writer.writerow([simulated, condition, trajectory, *values])
     return text.getvalue()
 
 

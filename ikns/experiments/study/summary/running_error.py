@@ -1,4 +1,4 @@
-"""Error over time of ever more subjects, in memory that does not grow with them."""
+"""Running statistics of the error over time, in memory of fixed size."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["ErrorOverTime", "RunningError"]
 
 Array = NDArray[np.float64]
 
-#: Errors lie within this, of 100, and are counted in bins of this width.
+#: Range and bin width of the histograms of errors, of 100.
 _FARTHEST, _BIN = 100.0, 0.5
 _BINS = round(2 * _FARTHEST / _BIN)
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorOverTime:
-    """Error over time across subjects: pointer less target, of 100.
+    """Error over time across subjects: pointer minus target, of 100.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ class ErrorOverTime:
     count : (T,) array
         Subjects with a pointer at that time.
     mean : (T,) array
-        NaN where there was none.
+        NaN without a subject.
     deviation : (T,) array
         Standard deviation; NaN with fewer than 2.
     low, middle, high : (T,) array
-        10th, 50th and 90th percentile, right to half a bin: 0.25 of 100.
+        10th, 50th and 90th percentile, accurate to half a bin, 0.25 of 100.
     """
 
     time: Array
@@ -46,10 +46,10 @@ class ErrorOverTime:
 
 
 class RunningError:
-    """Mean, spread and percentiles over subjects, taken in one after the other.
+    """Mean, spread and percentiles over subjects who are added one by one.
 
-    Mean and variance as by Welford (1962, Technometrics 4:419); percentiles from a
-    histogram at every time.
+    Mean and variance by the method of Welford (1962, Technometrics 4:419); percentiles
+    from a histogram at each time.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class RunningError:
         self._bins = np.zeros((n, _BINS), dtype=np.uint32)
 
     def add(self, error: ArrayLike) -> None:
-        """Take in one subject: (T,), NaN where there was no pointer."""
+        """Add the error of one subject: (T,), NaN where there was no pointer."""
         value = np.asarray(error, dtype=np.float64)
         if value.shape != self.time.shape:
             raise InvalidInput(
@@ -91,7 +91,7 @@ class RunningError:
         self._bins[at, place] += 1
 
     def result(self) -> ErrorOverTime:
-        """Return what it comes to so far."""
+        """Return the statistics of the subjects added so far."""
         n = self._count
         with np.errstate(divide="ignore", invalid="ignore"):
             deviation = np.sqrt(self._squares / (n - 1))
@@ -104,10 +104,10 @@ class RunningError:
         )
 
     def _quantile(self, share: float) -> Array:
-        """Where the histogram's cumulative share comes to it, inside of the bin."""
+        """Quantile from the histogram, interpolated within its bin."""
         below = np.cumsum(self._bins, axis=1, dtype=np.float64)
         wanted = share * self._count
-        # The first bin in which the count is reached; an empty one reaches nothing.
+        # The first bin that is not empty and reaches the count.
         k = np.argmax((below >= wanted[:, None]) & (self._bins > 0), axis=1)
         rows = np.arange(len(k))
         inside = self._bins[rows, k].astype(np.float64)

@@ -1,4 +1,4 @@
-"""A study folder, or one visit, from its files to tables and statistics."""
+"""Summarizes a study folder, or one visit: tables and statistics."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from pathlib import Path
 from typing import Any
 
 from ikns.errors import FileError
-from ikns.experiments.study import check_declared, read_study
+from ikns.experiments.study import check_declaration, read_study
 from ikns.experiments.study.declaration import FILE
-from ikns.experiments.study.summary.accumulate import Gathered
-from ikns.experiments.study.summary.digest import Digest, LeftOut, digest_visit
+from ikns.experiments.study.summary.accumulate import VisitAccumulator
+from ikns.experiments.study.summary.digest import Digest, ExcludedVisit, digest_visit
 from ikns.experiments.study.summary.picking import PickingSummary, summarize_picking
 from ikns.experiments.study.summary.tracking import TrackingSummary, summarize_tracking
 from ikns.experiments.visits import list_visits
 
 __all__ = ["Group", "StudySummary", "summarize"]
 
-#: With fewer visits, starting more processes takes longer than it spares.
-_FEW = 40
+#: With fewer visits, several processes take longer to start than they save.
+_MIN_PARALLEL = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """People, or simulated participants: never both.
+    """Summaries of people, or of simulated participants.
 
     Parameters
     ----------
@@ -40,28 +40,27 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class StudySummary:
-    """Everything that a report says.
+    """Content of a report.
 
     Parameters
     ----------
     folder : Path
     name : str
     plan : dict
-        As :meth:`ikns.experiments.study.Study.declared` tells it; empty where there is
-        no study file.
+        From :meth:`ikns.experiments.study.Study.declared`; empty without a study file.
     groups : tuple of Group
         People first.
-    left_out : tuple of LeftOut
-        Visits that could not be used, and why.
+    left_out : tuple of ExcludedVisit
+        Visits that could not be used, with the reasons.
     visits : int
-        That were used.
+        Number of visits that were used.
     """
 
     folder: Path
     name: str
     plan: dict[str, Any]
     groups: tuple[Group, ...]
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[ExcludedVisit, ...]
     visits: int
 
 
@@ -71,24 +70,24 @@ def summarize(
     workers: int | None = None,
     progress: Callable[[str, int, int], None] = lambda step, done, total: None,
 ) -> StudySummary:
-    """Compute everything again from the attempts on disk, visit by visit.
+    """Summarize a study, from the attempts on disk.
 
     Parameters
     ----------
     folder : str or Path
         A study, or a single visit.
     workers : int, optional
-        Processes that read visits, -1: one a core; by default one for few visits, else
-        one a core. The result does not depend on it.
+        Processes that read visits; -1 is one per core. Default: this process for few
+        visits, else one per core. The result does not depend on it.
     progress : callable
-        Told (step, done, total).
+        Called with (step, done, total).
 
     Raises
     ------
     FileError
         When there is no visit, or none that can be read.
     InvalidInput
-        When the study file is faulty, or was changed after the first result.
+        When the study file is invalid, or was changed after the first result.
     """
     top = Path(folder)
     single = (top / "visit.json").is_file()
@@ -99,21 +98,21 @@ def summarize(
             f"{top}: expected a study with visits, or a visit, found none; "
             "`ikns study run` simulates them, `ikns track` and `ikns pick` make them."
         )
-    groups: dict[tuple[bool, str], Gathered] = {}
-    left_out: list[LeftOut] = []
+    groups: dict[tuple[bool, str], VisitAccumulator] = {}
+    left_out: list[ExcludedVisit] = []
     used = 0
     for done, digest in enumerate(_digests(paths, workers), start=1):
         progress("reading visits", done, len(paths))
-        if isinstance(digest, LeftOut):
+        if isinstance(digest, ExcludedVisit):
             left_out.append(digest)
             continue
         simulated = bool(digest.about["simulated"])
         kind = (simulated, digest.experiment)
         if kind not in groups:
-            groups[kind] = Gathered(digest.experiment, simulated=simulated)
+            groups[kind] = VisitAccumulator(digest.experiment, simulated=simulated)
         fault = groups[kind].add(digest)
         if fault:
-            left_out.append(LeftOut(digest.folder, f"{digest.folder}: {fault}."))
+            left_out.append(ExcludedVisit(digest.folder, f"{digest.folder}: {fault}."))
         used += not fault
     if not used:
         more = f" (and {len(left_out) - 1} more)" if len(left_out) > 1 else ""
@@ -136,7 +135,9 @@ def summarize(
 
 
 def _summaries(
-    groups: dict[tuple[bool, str], Gathered], simulated: bool, plan: dict[str, Any]
+    groups: dict[tuple[bool, str], VisitAccumulator],
+    simulated: bool,
+    plan: dict[str, Any],
 ) -> tuple[TrackingSummary | None, PickingSummary | None]:
     tracking, picking = (groups.get((simulated, e)) for e in ("tracking", "picking"))
     return (
@@ -149,22 +150,24 @@ def _summaries(
     )
 
 
-def _digests(paths: list[Path], workers: int | None) -> Iterable[Digest | LeftOut]:
-    """In the order of the paths, a few at a time, whatever their number."""
-    if workers == 1 or (workers is None and len(paths) < _FEW):
+def _digests(
+    paths: list[Path], workers: int | None
+) -> Iterable[Digest | ExcludedVisit]:
+    """Yield digests in the order of the paths."""
+    if workers == 1 or (workers is None and len(paths) < _MIN_PARALLEL):
         return map(digest_visit, paths)
     from joblib import Parallel, delayed
 
-    done: Iterable[Digest | LeftOut] = Parallel(
+    done: Iterable[Digest | ExcludedVisit] = Parallel(
         n_jobs=workers or -1, return_as="generator"
     )(delayed(digest_visit)(path) for path in paths)
     return done
 
 
 def _plan(folder: Path) -> dict[str, Any]:
-    """Read what was declared, the same as when the first result was there."""
+    """Read the declaration, and check that it agrees with the results."""
     if not (folder / FILE).exists():
         return {}
     study = read_study(folder)
-    check_declared(folder, study)
+    check_declaration(folder, study)
     return study.declared()

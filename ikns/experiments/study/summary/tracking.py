@@ -1,4 +1,4 @@
-"""Experiment 1 from its visits: tables, error over time, statistics."""
+"""Summary of tracking: tables, error over time, statistics."""
 
 from __future__ import annotations
 
@@ -12,17 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import IknsError
-from ikns.experiments.study.summary.accumulate import Gathered
-from ikns.experiments.study.summary.cells import Cell, Columns, cells, ordered
+from ikns.experiments.study.summary.accumulate import VisitAccumulator
+from ikns.experiments.study.summary.means import ConditionMean, condition_means
 from ikns.experiments.study.summary.running_error import ErrorOverTime
-from ikns.experiments.study.summary.variations import Varied, variations
+from ikns.experiments.study.summary.trials import (
+    Columns,
+    paired_subjects,
+    rows_of,
+    select,
+    study_conditions,
+)
+from ikns.experiments.study.summary.variations import VariationMean, compare_variations
 from ikns.experiments.tracking import TrackingRecord
 from ikns.experiments.visits import read_visit, tracking_record
 from ikns.statistics import TrackingAnalysis, analyze_tracking
 
-__all__ = ["UNITS", "Comparison", "TrackingSummary", "summarize_tracking"]
+__all__ = ["UNITS", "TrackingComparison", "TrackingSummary", "summarize_tracking"]
 
-#: Of the metrics that tables tell.
+#: Units of the metrics in tables.
 UNITS = {
     "rmse": "of 100",
     "mae": "of 100",
@@ -34,8 +41,8 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Two conditions compared, or the reason why they could not be.
+class TrackingComparison:
+    """Comparison of two conditions, or the reason why there is none.
 
     Parameters
     ----------
@@ -45,9 +52,9 @@ class Comparison:
     why : str
         "Not tested: ..." where there is no analysis.
     subjects : int
-        With trials in both conditions.
+        Number of subjects with trials in both conditions.
     alone : int
-        Trajectories of a participant that were done in one condition only, and are in
+        Number of trajectories that a participant did in one condition only; they are in
         no paired test.
     """
 
@@ -60,43 +67,43 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class TrackingSummary:
-    """What experiment 1 came to, of people or of simulated participants.
+    """Results of experiment 1, of people or of simulated participants.
 
     Parameters
     ----------
     simulated : bool
     participants : list of str
-        Of the variation ``base``, with or without a trial.
+        Participants of the variation ``base``, with or without a trial.
     base : str
-        The variation that everything but ``varied`` is about.
+        The variation that all results but ``varied`` are of.
     conditions, trajectories : list of str
     table : dict of str to array
-        Trials and training of all variations; a row is a trial that was measured.
+        Measured trials of all variations, training included, one per row.
     attempts : Counter
         By (condition, kind, outcome), all variations.
-    rmse : list of Cell
-        By condition and trajectory; the level of the last of each condition is empty.
-    metrics : dict of str to list of Cell
-        The others of ``UNITS``, likewise.
+    rmse : list of ConditionMean
+        By condition and trajectory; the last level of each condition is all of them.
+    metrics : dict of str to list of ConditionMean
+        The other metrics of ``UNITS``, likewise.
     errors : dict of (condition, trajectory) to ErrorOverTime
     comparisons : tuple of Comparison
-        The first condition against each other one.
-    varied : list of Varied
+        The first condition with each other one.
+    varied : list of VariationMean
         Empty with one variation.
     margin : float or None
-        Declared in the study file, of 100.
-    said : list of dict
+        Margin of equivalence in the study file, of 100.
+    settings : list of dict
         Designs, versions and inputs of the visits.
     unmeasured : list of str
-        Trials without a second of control signal.
+        Trials with less than a second of control signal.
     redrawn : int
-        Simulated persons replaced because they could not do the protocol.
+        Number of simulated persons replaced because they could not do the protocol.
     faults : list of str
         Why simulated persons could not take part.
     sessions : dict
-        Recorded with the visits, relative to them, by (variation, participant).
+        Recordings of the visits, relative to them, by (variation, participant).
     folders : dict
-        Of the visits, likewise.
+        Folders of the visits, likewise.
     """
 
     simulated: bool
@@ -106,13 +113,13 @@ class TrackingSummary:
     trajectories: list[str]
     table: dict[str, NDArray[Any]]
     attempts: Counter[tuple[str, str, str]]
-    rmse: list[Cell]
-    metrics: dict[str, list[Cell]]
+    rmse: list[ConditionMean]
+    metrics: dict[str, list[ConditionMean]]
     errors: dict[tuple[str, str], ErrorOverTime]
-    comparisons: tuple[Comparison, ...]
-    varied: list[Varied]
+    comparisons: tuple[TrackingComparison, ...]
+    varied: list[VariationMean]
     margin: float | None
-    said: list[dict[str, Any]]
+    settings: list[dict[str, Any]]
     unmeasured: list[str]
     redrawn: int
     faults: list[str]
@@ -120,20 +127,17 @@ class TrackingSummary:
     folders: dict[tuple[str, str], Path] = field(repr=False)
 
     def trials(self, kind: str = "trial") -> dict[str, NDArray[Any]]:
-        """Rows of the base variation and of one kind."""
-        return _rows(
-            self.table,
-            (self.table["kind"] == kind) & (self.table["variation"] == self.base),
-        )
+        """Return the rows of the base variation and of one kind."""
+        return rows_of(self.table, kind=kind, variation=self.base)
 
     def median_trial(
         self, condition: str, trajectory: str
     ) -> tuple[TrackingRecord, str, float] | None:
-        """Trial whose RMSE is nearest the median of its cell, read from disk again.
+        """Return the trial whose RMSE is nearest the median, read from disk.
 
         Returns
         -------
-        (record, participant, rmse), or None where there is none.
+        (record, participant, rmse), or None without a trial
         """
         trials = self.trials()
         rows = np.flatnonzero(
@@ -142,7 +146,7 @@ class TrackingSummary:
         if not len(rows):
             return None
         rmse = trials["rmse"][rows]
-        # The lower of two middle ones, so that it is a trial that was made.
+        # With an even count the lower of the middle two, so that it is a real trial.
         row = rows[np.argsort(rmse, kind="stable")[(len(rows) - 1) // 2]]
         who = str(trials["subject"][row])
         visit = read_visit(self.folders[self.base, who])
@@ -150,91 +154,79 @@ class TrackingSummary:
         return tracking_record(attempt), who, float(trials["rmse"][row])
 
 
-def summarize_tracking(gathered: Gathered, plan: Mapping[str, Any]) -> TrackingSummary:
-    """Tables and statistics of visits that were gathered.
+def summarize_tracking(
+    visits: VisitAccumulator, plan: Mapping[str, Any]
+) -> TrackingSummary:
+    """Compute tables and statistics.
 
     Parameters
     ----------
-    gathered : Gathered
+    visits : VisitAccumulator
         Of experiment tracking.
     plan : mapping
         Table ``tracking`` of the study file; empty without one.
     """
-    table = gathered.table()
-    base = gathered.base
-    tested = _rows(table, (table["kind"] == "trial") & (table["variation"] == base))
-    planned = [str(name) for name in plan.get("conditions", ())]
-    found = table["condition"].tolist() + [c for c, _, _ in gathered.attempts]
-    conditions = ordered([*planned, *found], ["ikns", *planned])
+    table, margin = visits.table(), plan.get("margin")
+    tested = rows_of(table, kind="trial", variation=visits.base)
+    conditions = study_conditions(table, [c for c, _, _ in visits.attempts], plan)
     trajectories = sorted(set(table["trajectory"].tolist()))
-    margin = plan.get("margin")
     order = {"conditions": conditions, "levels": trajectories}
-    summary_table = {**tested, "unseen": 100 * tested["unseen"].astype(float)}
+    in_percent = {**tested, "unseen": 100 * tested["unseen"].astype(float)}
     return TrackingSummary(
-        simulated=gathered.simulated,
-        participants=gathered.participants(base),
-        base=base,
+        **visits.summary_fields(),
         conditions=conditions,
         trajectories=trajectories,
         table=table,
-        attempts=gathered.attempts,
-        rmse=cells(tested, "rmse", level="trajectory", **order),
+        rmse=condition_means(tested, "rmse", level="trajectory", **order),
         metrics={
-            name: cells(summary_table, name, level="trajectory", **order)
+            name: condition_means(in_percent, name, level="trajectory", **order)
             for name in UNITS
             if name != "rmse"
         },
-        errors=gathered.error_over_time(),
+        errors=visits.error_over_time(),
         comparisons=tuple(
-            compared(tested, (conditions[0], other), margin) for other in conditions[1:]
+            _compare(tested, (conditions[0], other), margin) for other in conditions[1:]
         ),
-        varied=variations(
-            _rows(table, table["kind"] == "trial"),
+        varied=compare_variations(
+            select(table, table["kind"] == "trial"),
             "rmse",
-            planned=gathered.planned,
+            planned=visits.variations,
             conditions=conditions,
         ),
         margin=None if margin is None else float(margin),
-        said=gathered.abouts,
-        unmeasured=gathered.unmeasured,
-        redrawn=gathered.redrawn,
-        faults=gathered.faults,
-        sessions=gathered.sessions,
-        folders=gathered.folders,
+        unmeasured=visits.unmeasured,
     )
 
 
-def compared(
+def _compare(
     trials: Columns, names: tuple[str, str], margin: float | None
-) -> Comparison:
-    """All tests of two conditions, or why there are none."""
-    both = [set(trials["subject"][trials["condition"] == c].tolist()) for c in names]
-    subjects = len(both[0] & both[1])
-    why = not_tested(names, [len(side) for side in both], subjects)
+) -> TrackingComparison:
+    """Test two conditions, or say why not."""
+    subjects, why = paired_subjects(trials, names)
     analysis = None
     if not why:
-        rows = _rows(trials, np.isin(trials["condition"], names))
-        analysis, why = _analyzed(rows, names, margin)
-    places = [
+        rows = select(trials, np.isin(trials["condition"], names))
+        analysis, why = _analyze(rows, names, margin)
+    pairs = [
         set(zip(trials["subject"][own], trials["trajectory"][own], strict=True))
         for own in (trials["condition"] == name for name in names)
     ]
-    return Comparison(names, analysis, why, subjects, len(places[0] ^ places[1]))
+    return TrackingComparison(names, analysis, why, subjects, len(pairs[0] ^ pairs[1]))
 
 
-def _analyzed(
+def _analyze(
     rows: Columns, names: tuple[str, str], margin: float | None
 ) -> tuple[TrackingAnalysis | None, str]:
-    """All tests; without the trial's number where trajectories cannot be told from it.
+    """Run all tests, without the effect of trial number where it is not identifiable.
 
-    So it is with one repeat in the same order for everybody, and learning then cannot
-    be told either.
+    With one repeat in the same order for all subjects, trial number and trajectory are
+    confounded, and learning cannot be estimated.
     """
     why = ""
     for trial in ("trial", None):
         try:
             return analyze_tracking(
-                {**rows, "RMSE": rows["rmse"]},  # as sentences call it
+                {**rows, "RMSE": rows["rmse"]},  # the name in sentences
                 margin=margin,
                 value="RMSE",
                 unit=UNITS["rmse"],
@@ -245,21 +237,3 @@ def _analyzed(
         except IknsError as error:
             why = f"Not tested: {error}"
     return None, why
-
-
-def not_tested(names: tuple[str, str], people: list[int], both: int) -> str:
-    """Why two conditions cannot be compared; nothing if they can."""
-    if not any(people):
-        return "Not tested: no trial was finished."
-    for name, count in zip(names, people, strict=True):
-        if not count:
-            return f"Not tested: no trial of condition {name} was finished."
-    if both == 1:
-        return "Not tested: one participant only."
-    if not both:
-        return f"Not tested: no participant did both {names[0]} and {names[1]}."
-    return ""
-
-
-def _rows(table: Columns, rows: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
-    return {name: values[rows] for name, values in table.items()}

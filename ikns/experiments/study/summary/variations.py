@@ -8,21 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from ikns.experiments.study.summary.cells import Columns, Mean, mean_of, subject_means
+from ikns.experiments.study.summary.means import Mean, mean_of, subject_means
+from ikns.experiments.study.summary.trials import Columns
 
-__all__ = ["Varied", "variations"]
+__all__ = ["VariationMean", "compare_variations"]
 
 
 @dataclass(frozen=True)
-class Varied:
-    """A variation in one condition.
+class VariationMean:
+    """Mean of a variation in one condition, and its difference from the first one.
 
     Parameters
     ----------
     name : str
         Empty for the study as planned.
     settings : dict
-        What it changes.
+        Parameters that it changes.
     condition : str
     over : Mean
         Of the subjects' means.
@@ -37,14 +38,14 @@ class Varied:
     against: Mean | None
 
 
-def variations(
+def compare_variations(
     table: Columns,
     value: str,
     *,
     planned: Mapping[str, Mapping[str, Any]],
     conditions: Sequence[str],
-) -> list[Varied]:
-    """Compare every variation with the first, condition by condition.
+) -> list[VariationMean]:
+    """Compare each variation with the first one, in each condition.
 
     Parameters
     ----------
@@ -53,12 +54,12 @@ def variations(
     value : str
         Column.
     planned : mapping of str to mapping
-        Settings by variation, the one to compare with first.
+        Settings by variation, the first one being the reference.
     conditions : sequence of str
 
     Returns
     -------
-    list of Varied
+    list of VariationMean
         Empty with one variation only.
     """
     if len(planned) < 2:
@@ -76,7 +77,7 @@ def variations(
             shared = [who for who in here if who in base]
             against = np.array([here[who] - base[who] for who in shared])
             found.append(
-                Varied(
+                VariationMean(
                     name,
                     dict(settings),
                     condition,

@@ -1,21 +1,20 @@
-"""Means over subjects, cell by cell: each person counts once, however many trials."""
+"""Means over subjects in each condition; trials are averaged per subject first."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-__all__ = ["Cell", "Columns", "Mean", "cells", "mean_of", "ordered", "subject_means"]
+from ikns.experiments.study.summary.trials import Columns
+
+__all__ = ["ConditionMean", "Mean", "condition_means", "mean_of", "subject_means"]
 
 Array = NDArray[np.float64]
-#: A table of trials: arrays of one length by name.
-Columns = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,8 @@ class Mean:
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One condition at one level, such as a trajectory; over all levels: empty text."""
+class ConditionMean:
+    """Mean in a condition at a level, such as a trajectory; empty text: all levels."""
 
     condition: str
     level: str
@@ -49,7 +48,7 @@ class Cell:
 
 
 def mean_of(values: Array) -> Mean:
-    """Mean over subjects of one value each; those without one are left out.
+    """Return the mean over subjects of one value each, NaN excluded.
 
     >>> found = mean_of(np.array([1.0, 3.0, np.nan]))
     >>> found.mean, found.subjects
@@ -68,24 +67,24 @@ def mean_of(values: Array) -> Mean:
 def subject_means(
     table: Columns, value: str, rows: NDArray[np.bool_]
 ) -> dict[str, float]:
-    """Each subject's mean over its trials among these rows, NaN left out."""
+    """Return each subject's mean over its trials in some rows, NaN excluded."""
     who, y = table["subject"][rows], np.asarray(table[value][rows], dtype=np.float64)
     known = np.isfinite(y)
-    people, place = np.unique(who[known], return_inverse=True)
-    sums = np.bincount(place, y[known], minlength=len(people))
-    counts = np.bincount(place, minlength=len(people))
-    return dict(zip(people.tolist(), (sums / counts).tolist(), strict=True))
+    subjects, place = np.unique(who[known], return_inverse=True)
+    sums = np.bincount(place, y[known], minlength=len(subjects))
+    counts = np.bincount(place, minlength=len(subjects))
+    return dict(zip(subjects.tolist(), (sums / counts).tolist(), strict=True))
 
 
-def cells(
+def condition_means(
     table: Columns,
     value: str,
     *,
     level: str,
     conditions: Sequence[str],
     levels: Sequence[str],
-) -> list[Cell]:
-    """Mean of every condition at every level, and over all of a subject's trials.
+) -> list[ConditionMean]:
+    """Return the mean of each condition at each level, and at all levels.
 
     Parameters
     ----------
@@ -94,7 +93,7 @@ def cells(
     value, level : str
         Columns.
     conditions, levels : sequence of str
-        In which order.
+        In the order of the result.
     """
     found = []
     for condition in conditions:
@@ -103,16 +102,5 @@ def cells(
             rows = own & (table[level] == name) if name else own
             means = subject_means(table, value, rows)
             over = mean_of(np.array(list(means.values())))
-            found.append(Cell(condition, name, over, int(rows.sum())))
+            found.append(ConditionMean(condition, name, over, int(rows.sum())))
     return found
-
-
-def ordered(found: Sequence[str], first: Sequence[str]) -> list[str]:
-    """Each word once: those known beforehand in their order, then the others.
-
-    >>> ordered(["gamepad", "ikns", "mouse", "ikns"], ["ikns", "ring", "ikns"])
-    ['ikns', 'gamepad', 'mouse']
-    """
-    once = list(dict.fromkeys(found))
-    known = [word for word in dict.fromkeys(first) if word in once]
-    return known + [word for word in once if word not in known]
