@@ -17,7 +17,7 @@ from ikns.cli import main
 from ikns.experiments.study.summary import summarize
 from ikns.experiments.visits import read_visit, tracking_record
 from ikns.live.session import read_run
-from ikns.view.study_report.map_section import map_drawn
+from ikns.view.study_report.map_section import map_figure
 
 SHORT = ["--profiles", "T1", "--repeats", "1", "--training", "0", "--seconds", "12"]
 
@@ -133,7 +133,7 @@ def test_the_arm_drives_the_pointer_and_the_finger(
     assert json.loads(capfd.readouterr().out)["same"]
     # A report draws where the hand went, and from which samples the map was learned.
     (group,) = summarize(folder).groups
-    drawn = map_drawn(group)
+    drawn = map_figure(group)
     assert drawn is not None
     left, right, *_ = drawn.figure.axes
     hand = np.array([recorded.model[f"hand_{axis}"] for axis in "zxy"])

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ikns.experiments.cockpit import Cockpit, link
+from ikns.experiments.cockpit import Cockpit, page_socket
 from ikns.experiments.conduct import (
     Conductor,
     HeldInput,
@@ -216,7 +216,7 @@ def at_work(
         pytest.MonkeyPatch.context() as patch,
         Cockpit(conductor, held, on_press=lambda: presses.put(None)) as cockpit,
     ):
-        for module in (visit_loop, link):
+        for module in (visit_loop, page_socket):
             patch.setattr(module, "time", clock)
         thread = Thread(
             target=run_visit, args=(conductor, drivers), kwargs={"stop": stop}

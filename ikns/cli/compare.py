@@ -22,7 +22,6 @@ from ikns.cli.comparison_tables import (
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.cli.simulated import is_simulated
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
@@ -74,6 +73,7 @@ def compare(
     """
     from ikns.analysis.compare import motion_crosstalk
     from ikns.calibration import track_chain
+    from ikns.calibration.simulated import is_simulated
 
     refuse_picture(figure, force=force)
     calibrated = ikns.Subject.load(subject)

@@ -1,25 +1,25 @@
-"""What ``ikns study plan`` plans, and how much it takes differences to spread."""
+"""Inputs of ``ikns study plan``: options over a study's declaration, and the spread."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from ikns.errors import InvalidInput, NotEnoughData, naming
+from ikns.errors import InvalidInput, naming
 
 if TYPE_CHECKING:
-    from ikns.experiments.study import Study
-    from ikns.statistics.assumed_spread import AssumedSpread
+    from ikns.experiments.study.pilot import DeclaredDesign, PilotSpread
 
-__all__ = ["Assumed", "Planned", "assume", "planned"]
+__all__ = ["PlannedDesign", "resolve_plan", "resolve_spread"]
 
 Experiment = Literal["tracking", "picking"]
 _PAPER_LEVELS = {"tracking": 3, "picking": 11}
 _PAPER_REPEATS = {"tracking": 3, "picking": 1}
 
 
-class Planned(NamedTuple):
-    """What is planned, and which of it overrides a declaration."""
+class PlannedDesign(NamedTuple):
+    """The design to plan for, and which options override a declaration."""
 
     experiment: Experiment
     margin: float | None
@@ -32,15 +32,7 @@ class Planned(NamedTuple):
     warnings: list[str]
 
 
-class Assumed(NamedTuple):
-    """Where the spread is from."""
-
-    found: AssumedSpread
-    simulated: bool
-    warnings: list[str]
-
-
-def planned(
+def resolve_plan(
     study: Path | None,
     experiment: Experiment | None,
     *,
@@ -49,11 +41,11 @@ def planned(
     levels: int | None,
     repeats: int | None,
     seed: int | None,
-) -> Planned:
-    """Take what the study declares, and what the options say instead."""
+) -> PlannedDesign:
+    """Combine what a study declares with the options, which override it."""
     if study is None:
         name: Experiment = experiment or "tracking"
-        return Planned(
+        return PlannedDesign(
             name,
             margin,
             participants,
@@ -65,32 +57,32 @@ def planned(
             [],
         )
     from ikns.experiments.study import read_study
+    from ikns.experiments.study.pilot import declared_design
 
     found = read_study(study)
     name = experiment or ("tracking" if found.tracking is not None else "picking")
-    said = _declared(found, name, study)
-    warned = [
-        f"{option} {given:g} instead of the {declared:g} that {study} declares."
-        for option, given, declared in (
-            ("--margin", margin, said["margin"]),
-            ("--participants", participants, said["participants"]),
-            ("--levels", levels, said["levels"]),
-            ("--repeats", repeats, said["repeats"]),
-        )
-        if given is not None and declared is not None and given != declared
-    ]
-    first, *others = said["conditions"]
+    with naming(str(study)):
+        declared = declared_design(found, name)
+    warned = _overrides(
+        study,
+        declared,
+        margin=margin,
+        participants=participants,
+        levels=levels,
+        repeats=repeats,
+    )
+    first, *others = declared.conditions
     if len(others) > 1:
         warned.append(
             f"planned for {first} against {others[0]}; the other comparisons of "
             f"{study} need a plan of their own."
         )
-    return Planned(
+    return PlannedDesign(
         name,
-        said["margin"] if margin is None else margin,
-        participants or said["participants"],
-        levels or said["levels"],
-        repeats or said["repeats"],
+        declared.margin if margin is None else margin,
+        participants or declared.participants,
+        levels or declared.levels,
+        repeats or declared.repeats,
         found.seed if seed is None else seed,
         (first, others[0]),
         [f"Plan {x} with --experiment {x}." for x in found.designs if x != name]
@@ -100,41 +92,28 @@ def planned(
     )
 
 
-def _declared(found: Study, experiment: Experiment, study: Path) -> dict[str, Any]:
-    """Read one experiment of a study in the words of both."""
-    people = found.participants if found.participants > 1 else None
-    if experiment == "tracking" and found.tracking is not None:
-        tracking = found.tracking
-        return {
-            "margin": tracking.margin,
-            "participants": people,
-            "levels": len(tracking.profiles),
-            "repeats": tracking.repeats,
-            "conditions": tracking.conditions,
-        }
-    if experiment == "picking" and found.picking is not None:
-        picking = found.picking
-        return {
-            "margin": picking.margin_s,
-            "participants": people,
-            "levels": len(picking.objects),
-            "repeats": picking.repeats,
-            "conditions": picking.conditions,
-        }
-    raise InvalidInput(
-        f"{study}: expected a study with [{experiment}], found only "
-        f"[{', '.join(found.designs)}]."
-    )
+def _overrides(
+    study: Path, declared: DeclaredDesign, **options: float | None
+) -> list[str]:
+    """Name every option that differs from what the study declares."""
+    return [
+        f"--{option} {given:g} instead of the {before:g} that {study} declares."
+        for option, given in options.items()
+        if given is not None
+        and (before := getattr(declared, option)) is not None
+        and given != before
+    ]
 
 
-def assume(
-    design: Planned,
+def resolve_spread(
+    design: PlannedDesign,
     *,
     given: tuple[float | None, float | None, float | None],
     pilot: Path | None,
-    report: Any,
-) -> Assumed:
-    """Find the spread: given, of a pilot, or of the paper."""
+    progress: Callable[[str, int, int], None],
+) -> PilotSpread:
+    """Return the spread: as given, of a pilot, or of the paper."""
+    from ikns.experiments.study.pilot import PilotSpread, spread_of_pilot
     from ikns.statistics.assumed_spread import AssumedSpread, paper_spread
     from ikns.statistics.power import Design, Spread
 
@@ -143,55 +122,9 @@ def assume(
             raise InvalidInput("expected --spread or --pilot, found both.")
         parts = Spread(*(part or 0.0 for part in given))
         mean = parts.of_subject_mean(Design(2, design.levels, design.repeats))
-        return Assumed(AssumedSpread(parts, "as given", mean), False, [])
+        return PilotSpread(AssumedSpread(parts, "as given", mean), False, [])
     if pilot is None:
-        return Assumed(paper_spread(design.experiment), False, [])
-    return _of_pilot(pilot, design, report)
-
-
-def _of_pilot(pilot: Path, design: Planned, report: Any) -> Assumed:
-    """Measure the trials of a pilot again, from its visits."""
-    import numpy as np
-
-    from ikns.experiments.study.summary import summarize
-    from ikns.statistics.assumed_spread import pilot_spread
-
-    summary = summarize(pilot, progress=report)
-    groups = [g for g in summary.groups if getattr(g, design.experiment) is not None]
-    if not groups:
-        raise NotEnoughData(
-            f"{pilot}: expected visits of {design.experiment}, found none."
-        )
-    part = getattr(groups[0], design.experiment)
-    trials = part.trials()
-    if design.experiment == "tracking":
-        value, level = "rmse", "trajectory"
-    else:  # failures at the limit, as they will be tested
-        value, level = "time", "object"
-        late = np.where(trials["success"], trials["time"], trials["limit"])
-        trials = {**trials, "time": late}
-    with naming(str(pilot)):
-        found = pilot_spread(
-            trials,
-            value,
-            level=level,
-            conditions=design.conditions or _two(part),
-            simulated=part.simulated,
-        )
-    warned = [left.reason for left in summary.left_out]
-    if groups[0].simulated:
-        warned.append(
-            f"the pilot {pilot} is simulated: virtual participants spread as their "
-            "parameters say, people as they do."
-        )
-    if len(groups) > 1:
-        warned.append(f"the simulated participants of {pilot} are left out.")
-    return Assumed(found, groups[0].simulated, warned)
-
-
-def _two(part: Any) -> tuple[str, str]:
-    if len(part.conditions) < 2:
-        raise NotEnoughData(
-            f"expected two conditions to compare, found {', '.join(part.conditions)}."
-        )
-    return part.conditions[0], part.conditions[1]
+        return PilotSpread(paper_spread(design.experiment), False, [])
+    return spread_of_pilot(
+        pilot, design.experiment, conditions=design.conditions, progress=progress
+    )

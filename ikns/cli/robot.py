@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
@@ -20,16 +19,9 @@ from ikns.cli.comparison_tables import (
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, show
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.errors import FileError, NotEnoughData, naming
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from ikns.errors import naming
 
 __all__ = ["robot"]
-
-#: Endings of a column's name, and the joint's unit in them.
-_UNITS = {"_rad": 1.0, "_m": 1.0, "_deg": 0.017453292519943295}
 
 
 def robot(
@@ -64,25 +56,17 @@ def robot(
     The robot holds its frame at some places and moves the rest, as a person does in the
     calibration.
     """
-    import numpy as np
-
     from ikns.analysis.compare import compare_robot
-    from ikns.nullspace.map.checks import MapWarning
+    from ikns.nullspace.map import MapWarning, robot_null_space_samples
+    from ikns.recording.files.joint_angles import read_joint_angles
 
     refuse_picture(figure, force=force)
     arm = ikns.Robot.load(urdf, frame)
-    time, q = _read(angles, arm.joint_names)
+    time, q = read_joint_angles(angles, arm.joint_names)
     with naming(str(angles)), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
-        place, _ = arm.pose(q)
-        held = np.linalg.norm(np.gradient(place, time, axis=0), axis=1) < speed
-        if not held.any():
-            raise NotEnoughData(
-                f"expected samples with '{frame}' slower than {speed:g} m/s, found "
-                "none."
-            )
-        learned = ikns.NullSpaceMap(n_points=points, radius=radius)
-        learned.fit(place[held], q[held])
+        held = robot_null_space_samples(arm, time, q, max_hand_speed=speed)
+        learned = ikns.NullSpaceMap(n_points=points, radius=radius).fit(*held)
         tasks: tuple[Literal["pose", "position"], ...] = (
             ("pose", "position") if task == "both" else (task,)
         )
@@ -109,7 +93,7 @@ def robot(
             "joints": arm.joint_names,
             "simulated": simulated,
             "samples": len(time),
-            "held": int(held.sum()),
+            "held": len(held[0]),
             "comparisons": [
                 findings_json(each, task=one)
                 for one, each in zip(tasks, found, strict=True)
@@ -133,43 +117,3 @@ def robot(
         *notes(warned),
         as_json=as_json,
     )
-
-
-def _read(
-    path: Path, joints: tuple[str, ...]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Time (T,) s and joint positions (T, n); rows that miss one are left out."""
-    import numpy as np
-
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-        uneven = [i for i, row in enumerate(rows, 2) if len(row) != len(header)]
-        if uneven:
-            raise ValueError(f"line {uneven[0]} has not {len(header)} cells")
-        table = np.array([[float(cell or "nan") for cell in row] for row in rows])
-    except (OSError, ValueError) as error:
-        raise FileError(
-            f"{path}: cannot be read as a table of numbers: {error}."
-        ) from None
-    if len(rows) < 2:
-        raise FileError(
-            f"{path}: expected a header and two rows or more, found {len(rows)} rows."
-        )
-    columns = {"time_s": (header.index("time_s"), 1.0)} if "time_s" in header else {}
-    for place, name in enumerate(header):
-        for ending, unit in _UNITS.items():
-            if name.endswith(ending):
-                columns.setdefault(name.removesuffix(ending), (place, unit))
-    missing = [name for name in ("time_s", *joints) if name not in columns]
-    if missing:
-        raise FileError(
-            f"{path}: expected the columns time_s and JOINT_rad, found none for "
-            f"{', '.join(missing)}."
-        )
-    wanted = [columns[name] for name in ("time_s", *joints)]
-    values = np.stack([unit * table[:, place] for place, unit in wanted], axis=1)
-    values = values[np.isfinite(values).all(axis=1)]
-    if len(values) < 2 or not (np.diff(values[:, 0]) > 0).all():
-        raise FileError(f"{path}: expected a time_s that increases from row to row.")
-    return values[:, 0], values[:, 1:]

@@ -17,7 +17,6 @@ import ikns
 from ikns.cli.live_session import live_session, software, stopped_by_signals
 from ikns.cli.options import AsJson, SubjectFolder
 from ikns.cli.output import show, table
-from ikns.cli.simulated import is_simulated
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -78,6 +77,7 @@ def run(
 
     Research software, not a medical device.
     """
+    from ikns.calibration.simulated import is_simulated
     from ikns.finger import Safety, open_finger
     from ikns.live.control.settings import ControlSettings
     from ikns.live.runtime import check_realtime

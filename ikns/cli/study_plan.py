@@ -13,10 +13,11 @@ import typer
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.cli.plan_inputs import Assumed, Planned, assume, planned
+from ikns.cli.plan_inputs import PlannedDesign, resolve_plan, resolve_spread
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from ikns.experiments.study.pilot import PilotSpread
     from ikns.statistics.assumed_spread import AssumedSpread
     from ikns.statistics.plan import SamplingPlan
     from ikns.statistics.power import Power
@@ -103,7 +104,7 @@ def plan(
     from ikns.statistics.plan import plan_participants
 
     refuse_picture(figure, force=force)
-    design = planned(
+    design = resolve_plan(
         study,
         experiment,
         margin=margin,
@@ -119,11 +120,11 @@ def plan(
             "file or by --margin, or a --difference to be shown, found neither."
         )
     with progress() as report:
-        assumed = assume(
+        assumed = resolve_spread(
             design,
             given=(spread, level_spread, trial_spread),
             pilot=pilot,
-            report=report,
+            progress=report,
         )
     made = plan_participants(
         assumed.found.spread,
@@ -165,7 +166,7 @@ def plan(
     )
 
 
-def _assumption(found: AssumedSpread, design: Planned) -> str:
+def _assumption(found: AssumedSpread, design: PlannedDesign) -> str:
     """Say how much the differences are taken to spread, and who says so."""
     quantity, unit, over = _VALUE[design.experiment]
     parts = found.spread
@@ -212,8 +213,8 @@ def _curve_table(made: SamplingPlan, title: str) -> Any:
 def _result(
     study: Path | None,
     pilot: Path | None,
-    design: Planned,
-    assumed: Assumed,
+    design: PlannedDesign,
+    assumed: PilotSpread,
     made: SamplingPlan,
 ) -> dict[str, Any]:
     quantity, unit, _ = _VALUE[design.experiment]
@@ -260,7 +261,7 @@ def _result(
 def _draw(
     path: Path,
     made: SamplingPlan,
-    assumed: Assumed,
+    assumed: PilotSpread,
     *,
     aim: str,
     target: float,

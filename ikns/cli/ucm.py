@@ -11,7 +11,6 @@ import ikns
 from ikns.cli.options import AsJson, Force, SubjectFolder
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.cli.simulated import is_simulated
 from ikns.cli.ucm_designs import over_points, over_time
 from ikns.errors import InvalidInput
 
@@ -55,6 +54,7 @@ def ucm(
     over the still samples at each PCA point.
     """
     from ikns.calibration import track_chain
+    from ikns.calibration.simulated import is_simulated
 
     refuse_picture(figure, force=force)
     if len({path.resolve() for path in recordings}) < len(recordings):

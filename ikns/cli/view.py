@@ -12,7 +12,6 @@ import typer
 import ikns
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import progress, show, table
-from ikns.cli.simulated import is_simulated
 from ikns.errors import InvalidInput
 from ikns.output_file import refuse_overwriting, write_bytes, write_text
 
@@ -45,6 +44,7 @@ def view(
     With a recording the page plays it, beside what the map says.
     """
     from ikns.calibration import track_chain
+    from ikns.calibration.simulated import is_simulated
 
     refuse_overwriting(out, force=force)
     if png is not None:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Literal
 
 import ikns
 from ikns.cli.live_session import live_session, software
-from ikns.cli.simulated import is_simulated
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -115,6 +114,8 @@ def arm_subject(arm: ArmOptions) -> ikns.Subject:
 
 def arm_is_simulated(subject: ikns.Subject, arm: ArmOptions) -> bool:
     """Whether the subject, or the recording that is played, is simulated."""
+    from ikns.calibration.simulated import is_simulated
+
     assert arm.subject is not None
     assert arm.source is not None
     scheme, _, rest = arm.source.partition(":")

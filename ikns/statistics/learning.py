@@ -60,6 +60,14 @@ class LearningCurve:
     deviation: float
     aicc: float
 
+    def at(self, trial: Array) -> Array:
+        """Value at trials 1, 2, ... (K,), in the value's unit."""
+        if self.model == "exponential":
+            return np.asarray(self.final + self.gain * np.exp(-(trial - 1) / self.rate))
+        if self.model == "power law":
+            return np.asarray(self.final + self.gain * trial**-self.rate)
+        return np.full(len(trial), self.final)
+
 
 @dataclass(frozen=True)
 class LearningCurves:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from importlib.resources import files
 from pathlib import Path
 
 from ikns.errors import FileError
+from ikns.output_file import write_bytes
+from ikns.view.document import html_document
 from ikns.view.parts import (
     Cell,
     KeyNumber,
@@ -82,13 +83,10 @@ def write_report(
         next_steps=next_steps,
     )
     target = Path(path)
-    draft = target.with_name(target.name + ".part")
     try:
         # A file name may hold bytes that are no text; they become question marks.
-        draft.write_text(page, encoding="utf-8", errors="replace", newline="\n")
-        draft.replace(target)
+        write_bytes(target, page.encode("utf-8", errors="replace"))
     except OSError as error:
-        draft.unlink(missing_ok=True)
         raise FileError(f"{target}: cannot be written: {error.strerror}.") from None
 
 
@@ -106,16 +104,7 @@ def report_html(
     page = ReportPage(simulated)
     style = files("ikns.view").joinpath("report.css").read_text(encoding="utf-8")
     badge = '<p class="badge">Simulated subject</p>' if simulated else ""
-    parts = [
-        "<!DOCTYPE html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        # The browser itself refuses whatever the page would load.
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-        "img-src data:; style-src 'unsafe-inline'\">",
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        '<meta name="color-scheme" content="light dark">',
-        f"<title>{escape(title)}</title>",
-        f"<style>\n{style}</style></head><body>",
+    body = [
         f"<header>{badge}<h1>{inline(title)}</h1>",
         f'<p class="lead">{inline(lead)}</p>' if lead else "",
         facts_html(facts or {}),
@@ -123,6 +112,6 @@ def report_html(
         page.key_numbers(key_numbers),
         *(page.section(section) for section in sections),
         steps_html(next_steps),
-        "</main></body></html>",
+        "</main>",
     ]
-    return "\n".join(part for part in parts if part) + "\n"
+    return html_document(title, style, body)

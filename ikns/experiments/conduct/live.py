@@ -15,7 +15,7 @@ from ikns.experiments.conduct.inputs import Sample, SampleQueue
 from ikns.finger import Finger
 from ikns.live.control.controller import Decision
 from ikns.live.control.settings import ControlSettings
-from ikns.live.runtime import Report, LoopStatus, run
+from ikns.live.runtime import LoopStatus, Report, run
 from ikns.live.session import RunWriter
 from ikns.live.stream import Source
 
@@ -137,7 +137,7 @@ class LiveDriver:
             "misses": status.misses,
             "residual": status.residual,
             "worst_residual": status.worst_residual,
-            "refused": status.refused,
+            "rejection": status.refused,
             "inside": status.inside,
         }
 

@@ -7,6 +7,7 @@ The method is in `estimator`, read top to bottom; the signs that it needs in
 from ikns.nullspace.map.analytic import analytic_map
 from ikns.nullspace.map.checks import MapWarning
 from ikns.nullspace.map.estimator import NullSpaceMap
+from ikns.nullspace.map.robot_samples import robot_null_space_samples
 from ikns.nullspace.map.samples import null_space_samples, still_mask
 
 __all__ = [
@@ -14,5 +15,6 @@ __all__ = [
     "NullSpaceMap",
     "analytic_map",
     "null_space_samples",
+    "robot_null_space_samples",
     "still_mask",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from importlib.resources import files
 from typing import NamedTuple
 
@@ -13,6 +12,7 @@ from ikns.experiments.study.summary.answers import (
     picking_answer,
     tracking_answer,
 )
+from ikns.view.document import html_document
 from ikns.view.parts import (
     Cell,
     NextStep,
@@ -55,6 +55,7 @@ def study_html(
     page = _StudyPage()
     title = f"Study {summary.name}"
     body = [
+        "<header>",
         f'<p class="banner">{BANNER}</p>' if simulated else "",
         f"<h1>{inline(title)}</h1>",
         f'<p class="lead">{inline(_lead(summary, parts))}</p>',
@@ -78,20 +79,8 @@ def study_html(
     body.append(page.section(about_paper))
     if left_out is not None:
         body.append(page.section(left_out))
-    head = [
-        "<!DOCTYPE html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        # The browser itself refuses whatever the page would load.
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-        "img-src data:; style-src 'unsafe-inline'\">",
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        '<meta name="color-scheme" content="light dark">',
-        f"<title>{escape(title)}{' (simulated)' if simulated else ''}</title>",
-        f"<style>\n{css}</style></head><body>",
-        "<header>",
-    ]
-    tail = [steps_html(next_steps), "</main></body></html>"]
-    return "\n".join(part for part in [*head, *body, *tail] if part) + "\n"
+    body += [steps_html(next_steps), "</main>"]
+    return html_document(f"{title} (simulated)" if simulated else title, css, body)
 
 
 class _StudyPage(ReportPage):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from ikns.experiments.picking import load_objects
 from ikns.experiments.study.summary import (
@@ -13,65 +13,61 @@ from ikns.experiments.study.summary import (
 )
 from ikns.experiments.study.summary.answers import people, worded
 from ikns.view.parts import Cell, Picture, Section, Table
-from ikns.view.study_report.effect_figure import effect_figure
 from ikns.view.study_report.picking_figures import picking_figure
+from ikns.view.study_report.report_figure import (
+    ReportFigure,
+    difference_figures,
+    difference_name,
+)
 from ikns.view.study_report.tests_table import effects_table, tests_table
-from ikns.view.study_report.tracking_sections import Drawn
+from ikns.view.study_report.texts import NO_MARGIN, NO_TRIAL
 
-__all__ = ["picking_drawn", "picking_sections"]
+__all__ = ["picking_figures", "picking_sections"]
 
 
-def picking_drawn(found: PickingSummary) -> list[Drawn]:
+def picking_figures(found: PickingSummary) -> list[ReportFigure]:
     """All figures of experiment 2; none without a trial."""
     if not len(found.trials()["success"]):
         return []
-    drawn = [
-        Drawn(
+    return [
+        ReportFigure(
             "picking_objects",
             picking_figure(found),
             "Above: share of trials that succeeded, with 95 % intervals (Clopper and "
             "Pearson). Below: time of every trial; crosses failed and stand at the "
             "limit; black bars: mean time with failures counted at the limit.",
             "Success and time by object and condition",
-        )
+        ),
+        *difference_figures(
+            "picking",
+            found.comparisons,
+            equivalence=lambda compared: compared.equivalence,
+            quantity="time to success",
+            caption=", failures counted at the limit, over participants.",
+            simulated=found.simulated,
+        ),
     ]
-    for k, compared in enumerate(found.comparisons):
-        if compared.analysis is None or not compared.analysis.effects:
-            continue
-        drawn.append(
-            Drawn(
-                "picking_difference" + (f"_{k + 1}" if k else ""),
-                effect_figure(
-                    compared.equivalence,
-                    compared.analysis.effects,
-                    quantity="time to success",
-                    simulated=found.simulated,
-                ),
-                f"{compared.names[0]} minus {compared.names[1]}, failures counted at "
-                "the limit, over participants.",
-                "Intervals of the difference and of standardized effects",
-            )
-        )
-    return drawn
 
 
-def picking_sections(found: PickingSummary, drawn: list[Drawn]) -> Iterator[Section]:
+def picking_sections(
+    found: PickingSummary, figures: list[ReportFigure]
+) -> Iterator[Section]:
     """Pictures, tables and tests; what is not tested says why."""
-    pictures = {each.name: each.picture for each in drawn}
+    pictures = {each.name: each.picture for each in figures}
     text = [
         f"Trials of {people(len(found.participants), simulated=found.simulated)}. "
         "A trial succeeds, or the object is dropped, or time runs out."
     ]
-    if not drawn:
-        text.append("No trial was finished, so there is nothing to draw or to test.")
+    if not figures:
+        text.append(NO_TRIAL)
     yield Section(
         "Pick and place",
         text,
-        [pictures["picking_objects"]] if drawn else [],
-        [_success_table(found), _time_table(found)] if drawn else [],
+        [pictures["picking_objects"]] if figures else [],
+        [_success_table(found), _time_table(found)] if figures else [],
     )
     for k, compared in enumerate(found.comparisons):
-        name = "picking_difference" + (f"_{k + 1}" if k else "")
+        name = difference_name("picking", k)
         yield _comparison(compared, [pictures[name]] if name in pictures else [])
 
 
@@ -95,7 +91,7 @@ def _comparison(compared: PickComparison, pictures: list[Picture]) -> Section:
     if found.paper is None:
         text.append("Fewer than two pairs without a failure: no sign test.")
     if compared.equivalence is None:
-        text.append("No margin was declared beforehand, so equivalence was not tested.")
+        text.append(NO_MARGIN)
     beside = [
         ("success", found.success),
         ("time", found.time),
@@ -114,64 +110,61 @@ def _comparison(compared: PickComparison, pictures: list[Picture]) -> Section:
 
 
 def _success_table(found: PickingSummary) -> Table:
-    columns = ["object"]
-    for condition in found.conditions:
-        columns += [
-            f"{condition}: succeeded",
-            "dropped",
-            "out of time",
-            "success (%), 95 %",
+    def cells(cell: ObjectResult) -> list[Cell]:
+        if not cell.trials:
+            return ["–", None, None, "–"]
+        share = 100 * cell.succeeded / cell.trials
+        return [
+            _whole(f"{cell.succeeded} of {cell.trials}"),
+            cell.dropped,
+            cell.late,
+            _whole(f"{share:.0f} ({100 * cell.low:.0f} to {100 * cell.high:.0f})"),
         ]
-    rows: list[list[Cell]] = []
-    for name, cells in _by_object(found):
-        row: list[Cell] = [name]
-        for cell in cells:
-            if not cell.trials:
-                row += ["–", None, None, "–"]
-                continue
-            share = 100 * cell.succeeded / cell.trials
-            row += [
-                _whole(f"{cell.succeeded} of {cell.trials}"),
-                cell.dropped,
-                cell.late,
-                _whole(f"{share:.0f} ({100 * cell.low:.0f} to {100 * cell.high:.0f})"),
-            ]
-        rows.append(row)
-    return Table(
-        columns,
-        rows,
+
+    return _object_table(
+        found,
+        ["succeeded", "dropped", "out of time", "success (%), 95 %"],
+        cells,
         "Success by object: trials, how the others ended, and the share with its 95 % "
         "interval, which counts trials as independent.",
     )
 
 
 def _time_table(found: PickingSummary) -> Table:
-    columns = ["object"]
-    for condition in found.conditions:
-        columns += [
-            f"{condition}: n succeeded",
-            "median (s)",
-            "mean ± SD (s)",
-            "with failures (s)",
+    def cells(cell: ObjectResult) -> list[Cell]:
+        spread = "" if math.isnan(cell.deviation) else f" ± {cell.deviation:.2f}"
+        return [
+            cell.succeeded,
+            cell.median,
+            "–" if math.isnan(cell.mean) else _whole(f"{cell.mean:.2f}{spread}"),
+            cell.restricted,
         ]
-    rows: list[list[Cell]] = []
-    for name, cells in _by_object(found):
-        row: list[Cell] = [name]
-        for cell in cells:
-            spread = "" if math.isnan(cell.deviation) else f" ± {cell.deviation:.2f}"
-            row += [
-                cell.succeeded,
-                cell.median,
-                "–" if math.isnan(cell.mean) else _whole(f"{cell.mean:.2f}{spread}"),
-                cell.restricted,
-            ]
-        rows.append(row)
-    return Table(
-        columns,
-        rows,
+
+    return _object_table(
+        found,
+        ["n succeeded", "median (s)", "mean ± SD (s)", "with failures (s)"],
+        cells,
         "Time by object. Median, mean and SD are of successful trials alone, as in "
         "the paper; the last column of a condition counts failures at the limit.",
     )
+
+
+def _object_table(
+    found: PickingSummary,
+    columns: Sequence[str],
+    cells: Callable[[ObjectResult], list[Cell]],
+    caption: str,
+) -> Table:
+    """One row for each object, with the columns of every condition side by side."""
+    first, *others = columns
+    header = ["object"]
+    for condition in found.conditions:
+        header += [f"{condition}: {first}", *others]
+    rows: list[list[Cell]] = [
+        [name, *(value for cell in by_condition for value in cells(cell))]
+        for name, by_condition in _by_object(found)
+    ]
+    return Table(header, rows, caption)
 
 
 def _by_object(found: PickingSummary) -> Iterator[tuple[str, list[ObjectResult]]]:

@@ -1,8 +1,8 @@
-"""What a report says of simulation, once, and of what it leaves out."""
+"""Sentences of a study's report: on simulation, and on what is left out."""
 
 from __future__ import annotations
 
-__all__ = ["BANNER", "CANNOT", "NO_MAP"]
+__all__ = ["BANNER", "CANNOT", "NO_MAP", "NO_MARGIN", "NO_TRIAL"]
 
 BANNER = "Simulated: no person took part"
 
@@ -24,3 +24,6 @@ NO_MAP = (
     "Left out: no visit has a recorded session, or a folder `subject` (as `ikns "
     "calibrate` writes it) inside of it or beside it, to take a map from."
 )
+
+NO_MARGIN = "No margin was declared beforehand, so equivalence was not tested."
+NO_TRIAL = "No trial was finished, so there is nothing to draw or to test."

@@ -26,79 +26,89 @@ _MANY = 40
 def trace_figure(found: TrackingSummary) -> Figure:
     """Target and trace of the median trial, conditions by trajectories."""
     style = looks(found.conditions)
-    conditions, trajectories = found.conditions, found.trajectories
     with house_style():
-        figure = study_figure(
-            "Target and trace of the median trial",
-            simulated=found.simulated,
-            height=0.7 + 1.9 * len(conditions),
-        )
-        grid = figure.subplots(
-            len(conditions), len(trajectories), sharex=True, sharey=True, squeeze=False
-        )
-        for row, condition in zip(grid, conditions, strict=True):
-            for axes, trajectory in zip(row, trajectories, strict=True):
-                median = found.median_trial(condition, trajectory)
-                if median is None:
-                    axes.set_title(f"{trajectory}, {condition}: no trial")
-                    continue
-                record, _, rmse = median
-                inside = record.time >= 0
-                time = record.time[inside]
-                axes.plot(time, record.target[inside], color=GREY, lw=2.6, alpha=0.55)
-                axes.plot(time, record.y[inside], color=style[condition].color, lw=1.1)
-                axes.set_title(f"{trajectory}, {condition}: RMSE {rmse:.2f}")
-                axes.set_ylim(0, 100)
-                axes.set_xlim(0, record.profile.seconds)
-        figure.supxlabel("time (s)", fontsize=8.5)
+        figure, panels = _grid(found, "Target and trace of the median trial", 1.9)
+        for condition, trajectory, axes in panels:
+            median = found.median_trial(condition, trajectory)
+            if median is None:
+                axes.set_title(f"{trajectory}, {condition}: no trial")
+                continue
+            record, _, rmse = median
+            inside = record.time >= 0
+            time = record.time[inside]
+            axes.plot(time, record.target[inside], color=GREY, lw=2.6, alpha=0.55)
+            axes.plot(time, record.y[inside], color=style[condition].color, lw=1.1)
+            axes.set_title(f"{trajectory}, {condition}: RMSE {rmse:.2f}")
+            axes.set_ylim(0, 100)
+            axes.set_xlim(0, record.profile.seconds)
         figure.supylabel("height of the pointer, 100 c", fontsize=8.5)
-        grid[0][0].plot([], [], color=GREY, lw=2.6, alpha=0.55, label="target")
-        for condition in conditions:
-            grid[0][0].plot([], [], color=style[condition].color, label=condition)
-        outside_legend(figure, grid[0][0])
+        first = panels[0][2]
+        first.plot([], [], color=GREY, lw=2.6, alpha=0.55, label="target")
+        for condition in found.conditions:
+            first.plot([], [], color=style[condition].color, label=condition)
+        outside_legend(figure, first)
     return figure
 
 
 def error_figure(found: TrackingSummary) -> Figure:
     """Error over time across participants: mean, and the band of 80 % of them."""
     style = looks(found.conditions)
-    conditions, trajectories = found.conditions, found.trajectories
     with house_style():
-        figure = study_figure(
-            "Error over time across participants",
-            simulated=found.simulated,
-            height=0.7 + 1.8 * len(conditions),
-        )
-        grid = figure.subplots(
-            len(conditions), len(trajectories), sharex=True, sharey=True, squeeze=False
-        )
-        for row, condition in zip(grid, conditions, strict=True):
-            for axes, trajectory in zip(row, trajectories, strict=True):
-                axes.axhline(0, color=GREY, lw=0.7)
-                error = found.errors.get((condition, trajectory))
-                if error is None:
-                    axes.set_title(f"{trajectory}, {condition}: no trial")
-                    continue
-                color = style[condition].color
-                axes.fill_between(
-                    error.time,
-                    error.low,
-                    error.high,
-                    color=color,
-                    alpha=0.18,
-                    lw=0,
-                    label=f"{condition}: 10th to 90th percentile",
-                )
-                axes.plot(
-                    error.time, error.mean, color=color, label=f"{condition}: mean"
-                )
-                axes.set_title(
-                    f"{trajectory}, {condition}: n = {int(error.count.max())}"
-                )
-                axes.set_xlim(error.time[0], error.time[-1])
-        figure.supxlabel("time (s)", fontsize=8.5)
+        figure, panels = _grid(found, "Error over time across participants", 1.8)
+        for condition, trajectory, axes in panels:
+            axes.axhline(0, color=GREY, lw=0.7)
+            error = found.errors.get((condition, trajectory))
+            if error is None:
+                axes.set_title(f"{trajectory}, {condition}: no trial")
+                continue
+            color = style[condition].color
+            axes.fill_between(
+                error.time,
+                error.low,
+                error.high,
+                color=color,
+                alpha=0.18,
+                lw=0,
+                label=f"{condition}: 10th to 90th percentile",
+            )
+            axes.plot(error.time, error.mean, color=color, label=f"{condition}: mean")
+            axes.set_title(f"{trajectory}, {condition}: n = {int(error.count.max())}")
+            axes.set_xlim(error.time[0], error.time[-1])
         figure.supylabel("pointer less target (of 100)", fontsize=8.5)
     return figure
+
+
+def _grid(
+    found: TrackingSummary, title: str, height: float
+) -> tuple[Figure, list[tuple[str, str, Any]]]:
+    """Figure over time with one panel a condition (rows) and trajectory (columns).
+
+    Parameters
+    ----------
+    found : TrackingSummary
+    title : str
+    height : float
+        Of a row, inches.
+
+    Returns
+    -------
+    figure : Figure
+    panels : list of (condition, trajectory, axes)
+    """
+    conditions, trajectories = found.conditions, found.trajectories
+    figure = study_figure(
+        title, simulated=found.simulated, height=0.7 + height * len(conditions)
+    )
+    grid = figure.subplots(
+        len(conditions), len(trajectories), sharex=True, sharey=True, squeeze=False
+    )
+    figure.supxlabel("time (s)", fontsize=8.5)
+    panels = [
+        (condition, trajectory, axes)
+        for condition, row in zip(conditions, grid, strict=True)
+        for trajectory, axes in zip(trajectories, row, strict=True)
+    ]
+    return figure, panels
 
 
 def rmse_figure(found: TrackingSummary) -> Figure:

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
-
-from matplotlib.figure import Figure
 
 from ikns.experiments.study.summary import TrackingComparison, TrackingSummary
 from ikns.experiments.study.summary.answers import people, worded
@@ -14,16 +11,21 @@ from ikns.experiments.study.summary.tracking import UNITS
 from ikns.statistics.printed import PAPER
 from ikns.statistics.wording import p_text
 from ikns.view.parts import Cell, Picture, Section, Table
-from ikns.view.study_report.effect_figure import effect_figure
 from ikns.view.study_report.learning_figure import learning_figure
+from ikns.view.study_report.report_figure import (
+    ReportFigure,
+    difference_figures,
+    difference_name,
+)
 from ikns.view.study_report.tests_table import effects_table, tests_table
+from ikns.view.study_report.texts import NO_MARGIN, NO_TRIAL
 from ikns.view.study_report.tracking_figures import (
     error_figure,
     rmse_figure,
     trace_figure,
 )
 
-__all__ = ["Drawn", "tracking_figures", "tracking_sections"]
+__all__ = ["tracking_figures", "tracking_sections"]
 
 _NAMES = {
     "mae": "mean absolute error",
@@ -36,26 +38,12 @@ _NAMES = {
 _DECIMALS = {"mae": 2, "lag": 3, "overshoot": 2, "smoothness": 2, "unseen": 1}
 
 
-class Drawn(NamedTuple):
-    """A figure with the name of its file, what it says, and what it shows."""
-
-    name: str
-    figure: Figure
-    caption: str
-    alt: str
-
-    @property
-    def picture(self) -> Picture:
-        """As a part of the page."""
-        return Picture(self.figure, self.caption, self.alt)
-
-
-def tracking_figures(found: TrackingSummary) -> list[Drawn]:
+def tracking_figures(found: TrackingSummary) -> list[ReportFigure]:
     """All figures of experiment 1; none without a trial."""
     if not len(found.trials()["rmse"]):
         return []
-    drawn = [
-        Drawn(
+    return [
+        ReportFigure(
             "tracking_traces",
             trace_figure(found),
             "Target (grey) and pointer of the trial whose RMSE is the median of its "
@@ -63,21 +51,21 @@ def tracking_figures(found: TrackingSummary) -> list[Drawn]:
             "without saying how they were chosen.",
             "Grid of time series: target and pointer by condition and trajectory",
         ),
-        Drawn(
+        ReportFigure(
             "tracking_error",
             error_figure(found),
             "Error over time: pointer less target, a participant's repeats averaged "
             "first. Line: mean over participants; band: 10th to 90th percentile.",
             "Grid of time series of the error by condition and trajectory",
         ),
-        Drawn(
+        ReportFigure(
             "tracking_rmse",
             rmse_figure(found),
             "RMSE: a dot is a participant's mean over repeats, a line joins the same "
             "participant; black: mean over participants with its 95 % interval.",
             "Dots by condition, one panel per trajectory and one for all",
         ),
-        Drawn(
+        ReportFigure(
             "tracking_learning",
             learning_figure(found),
             "RMSE over trials, mean and standard deviation over participants, with "
@@ -85,38 +73,31 @@ def tracking_figures(found: TrackingSummary) -> list[Drawn]:
             "is on other curves and as it was measured. Lines: the fitted models.",
             "RMSE against the number of the trial, one panel per condition",
         ),
+        *difference_figures(
+            "tracking",
+            found.comparisons,
+            equivalence=lambda compared: compared.analysis.equivalence,
+            quantity="RMSE",
+            caption=". Equivalence is shown where the interval lies inside of the "
+            "margin altogether; where it does not, it is not shown, whatever the test "
+            "of a difference says.",
+            simulated=found.simulated,
+        ),
     ]
-    for k, compared in enumerate(found.comparisons):
-        if compared.analysis is None or not compared.analysis.effects:
-            continue
-        drawn.append(
-            Drawn(
-                "tracking_difference" + (f"_{k + 1}" if k else ""),
-                effect_figure(
-                    compared.analysis.equivalence,
-                    compared.analysis.effects,
-                    quantity="RMSE",
-                    simulated=found.simulated,
-                ),
-                f"{compared.names[0]} minus {compared.names[1]}. Equivalence is shown "
-                "where the interval lies inside of the margin altogether; where it "
-                "does not, it is not shown, whatever the test of a difference says.",
-                "Intervals of the difference and of standardized effects",
-            )
-        )
-    return drawn
 
 
-def tracking_sections(found: TrackingSummary, drawn: list[Drawn]) -> Iterator[Section]:
+def tracking_sections(
+    found: TrackingSummary, figures: list[ReportFigure]
+) -> Iterator[Section]:
     """Pictures, tables and tests; what is not tested says why."""
-    pictures = {each.name: each.picture for each in drawn}
+    pictures = {each.name: each.picture for each in figures}
     text = [
         f"Trials of {people(len(found.participants), simulated=found.simulated)}, "
         "everything computed from the recorded control signal. RMSE and error are of "
         "100, the height of the screen."
     ]
-    if not drawn:
-        text.append("No trial was finished, so there is nothing to draw or to test.")
+    if not figures:
+        text.append(NO_TRIAL)
     if found.unmeasured:
         text.append(
             f"{len(found.unmeasured)} finished trials hold less than a second of "
@@ -127,14 +108,14 @@ def tracking_sections(found: TrackingSummary, drawn: list[Drawn]) -> Iterator[Se
         "Tracking",
         text,
         [pictures[k] for k in shown if k in pictures],
-        [_rmse_table(found), _metric_table(found)] if drawn else [],
+        [_rmse_table(found), _metric_table(found)] if figures else [],
     )
     if "tracking_learning" in pictures:
         yield Section(
             "Tracking: learning", _learning(found), [pictures["tracking_learning"]]
         )
     for k, compared in enumerate(found.comparisons):
-        name = "tracking_difference" + (f"_{k + 1}" if k else "")
+        name = difference_name("tracking", k)
         yield _comparison(
             compared,
             [pictures[name]] if name in pictures else [],
@@ -165,7 +146,7 @@ def _comparison(
     if many:
         text.append("No correction was made for comparing several conditions.")
     if found.equivalence is None:
-        text.append("No margin was declared beforehand, so equivalence was not tested.")
+        text.append(NO_MARGIN)
     if found.anova is None:
         text.append(
             "The analysis of variance was left out: it needs two trajectories, all of "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from ikns.experiments.study.summary import Group, StudySummary
 from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_csv
 from ikns.view.parts import NextStep, Section
 from ikns.view.render import pdf, svg
-from ikns.view.study_report.map_section import map_drawn, map_section
+from ikns.view.study_report.map_section import map_figure, map_section
 from ikns.view.study_report.other_sections import (
     done_section,
     left_out_section,
@@ -21,9 +21,9 @@ from ikns.view.study_report.other_sections import (
     variation_section,
 )
 from ikns.view.study_report.page import Part, study_html
-from ikns.view.study_report.picking_sections import picking_drawn, picking_sections
+from ikns.view.study_report.picking_sections import picking_figures, picking_sections
+from ikns.view.study_report.report_figure import ReportFigure
 from ikns.view.study_report.tracking_sections import (
-    Drawn,
     tracking_figures,
     tracking_sections,
 )
@@ -47,15 +47,15 @@ _FIGURES = (
     "workspace",
 )
 _KINDS: dict[str, Callable[[Any], bytes]] = {"pdf": pdf, "svg": svg}
-#: Conditions that a study may have beside the first.
+#: Conditions that a study may have besides the first.
 _MOST = 20
 
 
 def report_files() -> list[str]:
     """Every file that a report may hold, relative to its folder."""
     names = [
-        f"{whose}{name}{again}.{kind}"
-        for whose in ("", "simulated_")
+        f"{prefix}{name}{again}.{kind}"
+        for prefix in ("", "simulated_")
         for name in _FIGURES
         for again in ("", *(f"_{k}" for k in range(2, _MOST + 1)))
         for kind in _KINDS
@@ -63,10 +63,14 @@ def report_files() -> list[str]:
     return [_PAGE, _NUMBERS, *_TABLES, *(f"figures/{name}" for name in names)]
 
 
-def study_page(summary: StudySummary) -> tuple[str, list[tuple[str, Drawn]]]:
+def study_page(summary: StudySummary) -> tuple[str, list[tuple[str, ReportFigure]]]:
     """Return the page, and its figures with the names of their files."""
-    drawn: list[tuple[str, Drawn]] = []
-    parts = [Part(group, list(_sections(group, drawn))) for group in summary.groups]
+    parts, drawn = [], []
+    for group in summary.groups:
+        figures, sections = _group_contents(group)
+        prefix = "simulated_" if group.simulated else ""
+        drawn += [(f"{prefix}{each.name}", each) for each in figures]
+        parts.append(Part(group, sections))
     page = study_html(
         summary,
         parts,
@@ -93,7 +97,7 @@ def write_study_report(
     folder : Path
     summary : StudySummary
     progress : callable
-        Told (step, done, total).
+        Called with (step, done, total).
     """
     progress("drawing", 0, 1)
     page, drawn = study_page(summary)
@@ -113,29 +117,25 @@ def write_study_report(
             (folder / name).write_text(table, encoding="utf-8", newline="")
 
 
-def _sections(group: Group, drawn: list[tuple[str, Drawn]]) -> Iterator[Section]:
-    """All sections of a group; its figures are put to those drawn before."""
-    whose = "simulated_" if group.simulated else ""
-
-    def keep(figures: Iterable[Drawn]) -> list[Drawn]:
-        own = list(figures)
-        drawn.extend((f"{whose}{each.name}", each) for each in own)
-        return own
-
-    yield done_section(group)
+def _group_contents(group: Group) -> tuple[list[ReportFigure], list[Section]]:
+    """All figures and sections of a group."""
+    figures: list[ReportFigure] = []
+    sections = [done_section(group)]
     if group.tracking is not None:
-        yield from tracking_sections(
-            group.tracking, keep(tracking_figures(group.tracking))
-        )
+        drawn = tracking_figures(group.tracking)
+        figures += drawn
+        sections += tracking_sections(group.tracking, drawn)
     if group.picking is not None:
-        yield from picking_sections(group.picking, keep(picking_drawn(group.picking)))
+        drawn = picking_figures(group.picking)
+        figures += drawn
+        sections += picking_sections(group.picking, drawn)
     varied = variation_section(group)
     if varied is not None:
-        yield varied
-    volume = map_drawn(group)
-    keep([] if volume is None else [volume])
-    yield map_section(volume)
-    yield methods_section(group)
+        sections.append(varied)
+    volume = map_figure(group)
+    if volume is not None:
+        figures.append(volume)
+    return figures, [*sections, map_section(volume), methods_section(group)]
 
 
 def _next_steps(summary: StudySummary) -> list[NextStep]:
