@@ -97,7 +97,7 @@ def test_torque_that_is_left_on_is_never_in_time() -> None:
     ((_, seconds, _),) = result.measured
     assert math.isnan(seconds)
     assert not result.in_time(0)
-    assert result.exit == 3
+    assert (result.exit, result.violations) == (3, {"torque left on": 1})
     (row,) = endings.rows([result])
     assert (row["in_time"], row["n"], row["exit"]) == (0, 1, ["3"])
     assert "| never |" in endings.shown(row)
@@ -108,9 +108,12 @@ def test_torque_that_is_left_on_is_never_in_time() -> None:
     [
         ("write(36, 100, 2); write(64, 0, 1); sys.exit(0)", "EEPROM under torque"),
         ("write(116, 5000, 4); write(64, 0, 1); sys.exit(0)", "goal beyond limits"),
-        ("write(64, 0, 1); write(64, 1, 1); sys.exit(0)", "torque on again"),
+        ("for on in (0, 1, 0): write(64, on, 1)\n    sys.exit(0)", "torque on again"),
         ("write(64, 0, 1); raise ValueError", "traceback"),
-        ("subprocess.Popen(['sleep', '60']); sys.exit(0)", "lost process"),
+        (
+            "write(64, 0, 1); subprocess.Popen(['sleep', '9']); sys.exit(0)",
+            "lost process",
+        ),
     ],
 )
 def test_what_must_not_be_is_counted(leave: str, kind: str) -> None:

@@ -273,7 +273,8 @@ def _judge(
 ) -> None:
     """Count what must not be, and end what is left."""
     events, wrong = servo.events(), result.violations
-    lives_on = ENDINGS[result.ending][0] in _LIVES_ON
+    number = ENDINGS[result.ending][0]
+    stopped = servo["bus_watchdog"] == -1
     goals = [e for e in events if e["event"] == "goal"]
     low_high = [(e["goal"], *e["limits"]) for e in goals]
     wrong["goal beyond limits"] = sum(not lo <= g <= hi for g, lo, hi in low_high)
@@ -281,11 +282,16 @@ def _judge(
     wrong["EEPROM under torque"] = sum(e["torque"] for e in eeprom)
     result.said = program.said().strip().rpartition("\n")[2]
     wrong["traceback"] = program.said().count("Traceback (most recent")
+    if number != signal.SIGKILL and result.exit is not None:
+        wrong["torque left on"] = servo["torque_enable"]
+        wrong["not at rest"] = int(bool(servo["torque_enable"]) and not stopped)
     wrong["does not end"] = int(result.exit is None)
     if result.exit is not None:
         _wait(lambda: not program.left_over(), 1.0)
         wrong["lost process"] = len(program.left_over())
-    if safe_state == "limp" or not lives_on:  # else it is taken up again, to hold
+    if (
+        safe_state == "limp" or number not in _LIVES_ON
+    ):  # else it is taken up again, to hold
         on = [e for e in events if e["event"] == "torque" and e["on"]]
         wrong["torque on again"] = sum(e["t"] > began for e in on)
     result.violations = {name: count for name, count in wrong.items() if count}
