@@ -107,10 +107,13 @@ def test_the_crc_finds_every_single_wrong_bit(data: bytes, bit: int) -> None:
 class Desk:
     """A servo with a clock, and somebody who speaks to it."""
 
-    def __init__(self, model: str) -> None:
+    def __init__(self, model: str, **options: bool) -> None:
         self.now, self.events = 0.0, list[dict[str, Any]]()
         self.servo = Servo(
-            model, clock=lambda: self.now, log=lambda **e: self.events.append(e)
+            model,
+            clock=lambda: self.now,
+            log=lambda **e: self.events.append(e),
+            **options,
         )
         self.model, self.protocol = MODELS[model], MODELS[model].protocol
 
@@ -163,8 +166,11 @@ def test_it_holds_under_torque_coasts_without_and_keeps_its_profile(model: str) 
     assert desk.servo["moving"] == 0
 
 
-def test_its_watchdog_stops_it_and_locks_goals_until_it_is_cleared() -> None:
-    desk = Desk("xl430")
+@pytest.mark.parametrize("clears", [False, True])
+def test_its_watchdog_stops_it_and_locks_goals_until_it_is_cleared(
+    clears: bool,
+) -> None:
+    desk = Desk("xl430", clears_profile=clears)
     for name, value in {
         "profile_velocity": 50,
         "torque_enable": 1,
@@ -182,7 +188,7 @@ def test_its_watchdog_stops_it_and_locks_goals_until_it_is_cleared() -> None:
     desk.wait(1.0, talking=False)
     assert desk.servo.motor.position - stood < 1  # ticks; the rest of the lag
     assert desk.servo["torque_enable"] == 1  # it stands still under torque
-    assert desk.servo["profile_velocity"] == 0
+    assert desk.servo["profile_velocity"] == (0 if clears else 50)
     assert desk.write("goal_position", 2000) == 4
     assert desk.write("led", 1) == 0
     assert desk.write("bus_watchdog", 0) == 0

@@ -48,7 +48,11 @@ class Bus:
     def __init__(self, options: argparse.Namespace, log: TextIO) -> None:
         self._log, self._options = log, options
         self.servo = Servo(
-            options.model, id=options.id, baud=options.baud, log=self.note
+            options.model,
+            id=options.id,
+            baud=options.baud,
+            clears_profile=options.clears_profile,
+            log=self.note,
         )
         self.link = Path(options.link)
         self.faults = dict.fromkeys(FAULTS, False)
@@ -193,6 +197,7 @@ class ServoProcess:
         baud: int = 57600,
         answer_delay: float = 0.0,
         byte_time: bool = False,
+        clears_profile: bool = False,
     ) -> None:
         self.model = MODELS[model]
         self.port, self._log = folder / "servo", folder / "servo.jsonl"
@@ -209,8 +214,9 @@ class ServoProcess:
         words = [str(word) for pair in options.items() for word in pair]
         # Without site-packages: whatever it needs of others it would not find.
         argv = [sys.executable, "-S", "-E", "-m", "independent_servo.process", *words]
+        argv += ["--byte-time"] * byte_time + ["--clears-profile"] * clears_profile
         self._process = subprocess.Popen(
-            [*argv, *(["--byte-time"] if byte_time else [])],
+            argv,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             cwd=Path(__file__).parents[1],
@@ -265,6 +271,7 @@ def main() -> None:
     parser.add_argument("--baud", type=int, default=57600)
     parser.add_argument("--answer-delay", type=float, default=0.0, metavar="SECONDS")
     parser.add_argument("--byte-time", action="store_true")
+    parser.add_argument("--clears-profile", action="store_true")
     for name in ("--link", "--log", "--control"):
         parser.add_argument(name, required=True, metavar="PATH")
     serve(parser.parse_args())

@@ -35,7 +35,9 @@ BOOT, GIVE_UP = 0.2, 0.1
 class Servo:
     """A servo; `log` is called with every event, as keywords.
 
-    A caller gives it what arrives on the wire and lets time pass every few ms.
+    A caller gives it what arrives on the wire and lets time pass every few ms. When the
+    watchdog stops it, velocity and acceleration of the profile "are set to 0" in recent
+    manuals and "applied as 0" in older ones: `clears_profile` makes it the former.
     """
 
     def __init__(
@@ -45,10 +47,12 @@ class Servo:
         id: int = 1,
         baud: int = 57600,
         position: float | None = None,
+        clears_profile: bool = False,
         clock: Callable[[], float] = time.monotonic,
         log: Callable[..., None] = lambda **event: None,
     ) -> None:
         self.model, self._clock, self._log = MODELS[model], clock, log
+        self._clears_profile = clears_profile
         self.now = self._heard = self._byte_at = clock()
         top = 4095 if self.model.protocol == 2 else 1023
         self.motor = Motor((top + 1) / 2 if position is None else position)
@@ -57,10 +61,7 @@ class Servo:
         near = {abs(b / baud - 1): code for code, b in self.model.bauds.items()}
         self.values["baud_rate"] = near[min(near)]
         self._seen, self._waiting = bytearray(), b""
-        self._deaf_until = -math.inf
-        self.alert = 0
-        self.start()
-        self._deaf_until = -math.inf
+        self.start(boot=0.0)
 
     def __getitem__(self, name: str) -> int:
         return self.values[name]
@@ -74,7 +75,7 @@ class Servo:
         """Whether the bus watchdog has stopped it."""
         return self.values.get("bus_watchdog") == -1
 
-    def start(self) -> None:
+    def start(self, *, boot: float = BOOT) -> None:
         """Begin as after switching the power on: RAM has its initial values."""
         values, was = self.values, self.values["torque_enable"]
         for r in self.model.registers.values():
@@ -87,7 +88,7 @@ class Servo:
         self.alert, self._waiting = 0, b""
         self._seen.clear()
         self.motor.stop()
-        self._deaf_until = self.now + BOOT
+        self._deaf_until = self.now + boot
         if was:
             self._log(event="torque", on=0, why="start")
         self._show()
@@ -133,11 +134,9 @@ class Servo:
         self._move(self.now - before)
         limit = 0.02 * self.values.get("bus_watchdog", 0)
         if self["torque_enable"] and limit > 0 and self.now - self._heard > limit:
-            self.values |= {
-                "bus_watchdog": -1,
-                "profile_velocity": 0,
-                "profile_acceleration": 0,
-            }
+            self.values["bus_watchdog"] = -1
+            if self._clears_profile:
+                self.values |= {"profile_velocity": 0, "profile_acceleration": 0}
             self.motor.stop()
             self._log(event="watchdog", tripped=1, silent=self.now - self._heard)
         self._show()

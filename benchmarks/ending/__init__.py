@@ -1,0 +1,1 @@
+"""Parts of ``benchmarks/endings.py``: how programs are started, ended and judged."""
