@@ -137,7 +137,7 @@ class LiveDriver:
             "misses": status.misses,
             "residual": status.residual,
             "worst_residual": status.worst_residual,
-            "rejection": status.refused,
+            "refused": status.rejection,
             "inside": status.inside,
         }
 
