@@ -29,7 +29,7 @@ sys.path.append(str(ROOT / "tests"))
 from ending.programs import COMMANDS, ForkServer, Shell  # noqa: E402
 from ending.trial import ENDINGS, LINES, Canary, Result, trial  # noqa: E402
 
-QUICK = ("INT", "HUP", "STOP 0.5 s")
+QUICK = ("HUP", "STOP 0.5 s")
 
 
 def person(folder: Path) -> None:
@@ -131,8 +131,11 @@ def main() -> None:
     # A shell starts what it puts into the background deaf to Ctrl-C, and so would be
     # every program that is interrupted here.
     for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGHUP):
+        usual = (
+            signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+        )
         if signal.getsignal(number) == signal.SIG_IGN:
-            signal.signal(number, signal.SIG_DFL)
+            signal.signal(number, usual)
     lines = [line for line in LINES if line.name in given.line]
     wanted = [
         (ending, command, line, k)
@@ -169,15 +172,16 @@ def main() -> None:
                 f"{given.safe_state}, {given.n} each\n{HEADER}",
                 flush=True,
             )
+        pool = ThreadPoolExecutor(given.jobs)
         try:
-            with ThreadPoolExecutor(given.jobs) as pool:
-                results = pool.map(one, wanted)
-                for _ in range(len(wanted) // given.n):
-                    for row in rows(list(itertools.islice(results, given.n))):
-                        table.append(row)
-                        if not given.json:
-                            print(shown(row), flush=True)
+            results = pool.map(one, wanted)
+            for _ in range(len(wanted) // given.n):
+                for row in rows(list(itertools.islice(results, given.n))):
+                    table.append(row)
+                    if not given.json:
+                        print(shown(row), flush=True)
         finally:
+            pool.shutdown(cancel_futures=True)
             starter.close()
         if given.json:
             print(json.dumps(table))

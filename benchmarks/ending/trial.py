@@ -47,8 +47,9 @@ LINES = (
 #: finger may be in the middle of a few.
 _LOOK, _PACKETS, _FEW = 0.02, 0.08, 8
 _WATCHDOG, _HANG = 0.32, 0.5
-#: How long a program may take to begin, to end, and the servo to come to rest, s.
-_BEGIN, _END, _REST = 120.0, 10.0, 2.0
+#: How long a program may take to begin, to end (it writes its files once the finger is
+#: relaxed), and the servo to come to rest, s.
+_BEGIN, _END, _REST = 120.0, 30.0, 2.0
 _TERMINAL = {signal.SIGINT, signal.SIGHUP, signal.SIGQUIT}  # go to the whole group
 _LIVES_ON = {0, signal.SIGSTOP}  # a program that must be ended after that
 ENDINGS = {

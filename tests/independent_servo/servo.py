@@ -223,7 +223,7 @@ class Servo:
         locked = r.address < self.model.ram and (
             self["torque_enable"] if self.model.protocol == 2 else self["lock"]
         )
-        if r.access == "r" or locked:
+        if r.access == "r" or locked or (r.name == "lock" and self[r.name]):
             return ACCESS
         if not r.low <= value <= r.high or (self.tripped and r.name in GOALS):
             return RANGE
