@@ -114,7 +114,7 @@ class LiveDriver:
             self._thread.join()
 
     def halt(self) -> None:
-        """Stop the loop within its next beat, 20 ms."""
+        """Stop the loop within 20 ms."""
         self._stop.set()
 
     def take(self, now: float) -> list[Sample]:
