@@ -246,7 +246,7 @@ def test_a_source_that_ends_too_early_loses_nothing(tmp_path, capfd):
         ("", "stopped with 0 of 5 points accepted"),
     ],
 )
-def test_too_few_points_are_told_and_recordings_stay(
+def test_too_few_points_are_reported_and_recordings_stay(
     tmp_path, monkeypatch, capfd, keys, says
 ):
     (tmp_path / "keys").write_text(keys)
@@ -278,7 +278,7 @@ def test_too_few_points_are_told_and_recordings_stay(
         (["--side", "both", "--clavicle"], "--clavicle"),
     ],
 )
-def test_bad_options_are_told_before_anything_is_written(
+def test_bad_options_are_reported_before_anything_is_written(
     calibrated, tmp_path, monkeypatch, capfd, more, says
 ):
     monkeypatch.chdir(tmp_path)
@@ -288,7 +288,7 @@ def test_bad_options_are_told_before_anything_is_written(
     assert not (tmp_path / "person-recordings").exists()
 
 
-def test_without_a_source_or_without_live_is_told(calibrated, tmp_path, capfd):
+def test_without_a_source_or_without_live_is_reported(calibrated, tmp_path, capfd):
     out = ["--out", str(tmp_path / "person")]
     for argv, says in (
         (["--live", *out], "--source"),
@@ -305,7 +305,7 @@ def test_without_a_source_or_without_live_is_told(calibrated, tmp_path, capfd):
     assert "--force" in check_refused(argv, calibrated, capfd)
 
 
-def test_labels_that_are_missing_are_told(tmp_path, capfd):
+def test_labels_that_are_missing_are_reported(tmp_path, capfd):
     whole = film(tmp_path / "film.c3d", ["static"])
     recording = read(whole)
     worn = [label for label in recording.labels if label not in ("RFIN", "LFIN")]

@@ -157,7 +157,7 @@ def test_bad_input_is_one_sentence(files, tmp_path, capfd, more, says):
 
 
 @pytest.mark.parametrize("command", ["run", "track"])
-def test_real_time_that_is_not_allowed_is_told(
+def test_real_time_that_is_not_allowed_is_reported(
     files, tmp_path, capfd, monkeypatch, command
 ):
     def refuse(*_):

@@ -122,7 +122,7 @@ def test_a_pose_after_too_long_a_silence_does_not_bring_it_back():
     assert machine.state == "safe"
 
 
-def test_a_late_pose_within_the_safe_time_is_told_as_it_was():
+def test_a_late_pose_within_the_safe_time_is_reported_as_it_was():
     machine = started()
     held, back = machine.pose(0.3)
     assert held[1:3] == ("active", "holding")

@@ -20,14 +20,14 @@ from ikns.finger.emulator import Servo, Wire
 from ikns.finger.laws import LAWS
 
 #: Longer than anything here takes, seconds.
-PATIENCE = 10.0
+TIMEOUT = 10.0
 
 
-def wait_for(condition, patience=PATIENCE):
+def wait_for(condition, timeout=TIMEOUT):
     """Seconds until it holds."""
     began = time.monotonic()
     while not condition():
-        if time.monotonic() - began > patience:
+        if time.monotonic() - began > timeout:
             pytest.fail("it did not happen in time")
         time.sleep(0.002)
     return time.monotonic() - began
@@ -248,7 +248,9 @@ def test_a_port_that_comes_back_is_taken_up_again(servo, wire):
         assert finger.state().mode == "active"
 
 
-def test_a_port_that_comes_back_without_answers_is_told_to_let_go(servo, wire):
+def test_a_port_that_comes_back_without_answers_is_reported_to_switch_torque_off(
+    servo, wire
+):
     # Questions alone would keep the servo's watchdog content, and it under torque.
     with finger_on(wire, watchdog=2.0) as finger:
         stream(finger, 0.8, 0.1)
@@ -359,7 +361,7 @@ def start(program, wire):
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdout=pipe, stderr=pipe)
     if process.stdout.readline() != b"ready\n":
-        pytest.fail(process.communicate(timeout=PATIENCE)[1].decode())
+        pytest.fail(process.communicate(timeout=TIMEOUT)[1].decode())
     return process
 
 
@@ -379,7 +381,7 @@ def test_no_exit_leaves_torque_on(servo, wire, ending, number):
     if number is not None:
         assert servo.torque
         os.kill(process.pid, number)
-    process.communicate(timeout=PATIENCE)
+    process.communicate(timeout=TIMEOUT)
     assert not servo.torque
     assert "torque on" in [text for _, text in servo.events]
     assert (
@@ -399,7 +401,7 @@ def test_impatience_does_not_leave_torque_on(servo, wire):
     for _ in range(3):
         os.kill(process.pid, signal.SIGINT)
         time.sleep(0.05)
-    process.communicate(timeout=PATIENCE)
+    process.communicate(timeout=TIMEOUT)
     assert not servo.torque
     assert not servo.watchdog_error
 
@@ -407,7 +409,7 @@ def test_impatience_does_not_leave_torque_on(servo, wire):
 def test_after_a_kill_the_servos_own_watchdog_stops_it(servo, wire):
     process = start(LEAVES + ENDINGS["with"], wire)
     process.kill()
-    process.communicate(timeout=PATIENCE)
+    process.communicate(timeout=TIMEOUT)
     took = wait_for(lambda: servo.watchdog_error)
     assert took < 2.0  # 0.3 s, on a busy machine
     wait_for(lambda: servo.motor.velocity == 0)

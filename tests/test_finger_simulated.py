@@ -31,7 +31,7 @@ URDF = Path(__file__).parents[1] / "urdf" / "finger.urdf"
 
 
 class Time:
-    """A clock that moves when told."""
+    """A clock that moves on request."""
 
     def __init__(self):
         self.now = 100.0

@@ -75,7 +75,7 @@ def up_to_verdict(protocol: LiveProtocol, first: int = 0) -> int:
 def test_a_step_records_its_seconds_right_after_its_countdown():
     protocol = new()
     assert [c.what for c in protocol.begin(0.0)] == ["ready"]
-    assert feed(protocol, 0, 50) == []  # nobody is ready
+    assert feed(protocol, 0, 50) == []  # no one is ready
     protocol.key("next", 0.5)
     assert feed(protocol, 50, 60) == []
     assert protocol.state == "countdown"
@@ -157,7 +157,7 @@ def test_a_recording_ends_on_time_though_no_frame_comes():
     assert protocol.take is None
 
 
-def test_with_nobody_at_the_keys_verdicts_are_followed():
+def test_without_keys_verdicts_are_followed():
     protocol = new(auto_takes=2, accepted=["static", "free"])
     at, what = 0, [c.what for c in protocol.begin(0.0)]
     assert what == ["ready", "countdown"]
@@ -174,7 +174,7 @@ def test_with_nobody_at_the_keys_verdicts_are_followed():
     assert protocol.skipped == ["point_02"]
 
 
-def test_with_nobody_at_the_keys_a_useless_static_trial_ends_it():
+def test_without_keys_a_useless_static_trial_ends_it():
     protocol = new(auto_takes=1)
     protocol.begin(0.0)
     feed(protocol, 0, 100)

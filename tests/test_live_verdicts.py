@@ -74,7 +74,7 @@ def test_an_unsteady_hand_is_recommended_for_redo():
         assert "not steady" in verdict.reason
 
 
-def test_the_same_place_again_is_told():
+def test_the_same_place_again_is_reported():
     recording = piece(small_person.protocol(), 3)
     again = Judge(Skeleton.load())
     again.skeleton = judge().skeleton
@@ -87,7 +87,7 @@ def test_the_same_place_again_is_told():
     assert verdict.values["nearest_cm"] == 0
 
 
-def test_an_elbow_that_rests_is_told():
+def test_an_elbow_that_rests_is_reported():
     recording = piece(small_person.protocol(), 4)
     seen = np.isfinite(recording.markers).all(axis=(1, 2))
     frozen = np.tile(recording.markers[np.argmax(seen)], (len(recording.time), 1, 1))
@@ -99,7 +99,7 @@ def test_an_elbow_that_rests_is_told():
     assert "elbow hardly moved" in verdict.reason
 
 
-def test_frozen_markers_are_told():
+def test_frozen_markers_are_reported():
     recording = piece(small_person.protocol(), 4)
     seen = np.isfinite(recording.markers).all(axis=(1, 2))
     frozen = np.tile(recording.markers[np.argmax(seen)], (len(recording.time), 1, 1))
@@ -108,7 +108,7 @@ def test_frozen_markers_are_told():
     assert "elbow hardly moved: 0 deg" in verdict.reason
 
 
-def test_hidden_markers_are_told():
+def test_hidden_markers_are_reported():
     recording = piece(small_person.protocol(), 0)
     hand = [i for i, label in enumerate(recording.labels) if label == "RFIN"]
     hidden = recording.markers.copy()
@@ -149,7 +149,7 @@ def test_a_marker_that_was_put_elsewhere_is_told(change):
     assert any(words in verdict.reason for words in told), verdict.reason
 
 
-def test_a_marker_that_the_static_trial_never_shows_is_told():
+def test_a_marker_that_the_static_trial_never_shows_is_reported():
     static = small_person.protocol().static.recording
     step = ProtocolStep("static", "static", 1.2)
     hidden = static.markers.copy()
@@ -170,7 +170,7 @@ def test_a_marker_that_the_static_trial_never_shows_is_told():
     assert judge().judge(step, unknown).keep
 
 
-def test_a_person_who_moves_in_the_static_trial_is_told_the_marker():
+def test_a_person_who_moves_in_the_static_trial_is_reported_with_the_marker():
     static = small_person.protocol().static.recording
     moving = static.markers.copy()
     column = static.labels.index("RFIN")

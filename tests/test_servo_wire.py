@@ -205,7 +205,7 @@ def test_the_command_overwrites_nothing(tmp_path, capfd):
     check_refused(["servo", "--link", str(link)], tmp_path, capfd, names=link)
 
 
-def test_the_command_serves_until_it_is_told_to_stop(tmp_path):
+def test_the_command_serves_until_it_is_reported_to_stop(tmp_path):
     link = tmp_path / "bus"
     process = subprocess.Popen(
         [sys.executable, "-c", "from ikns.cli import main; raise SystemExit(main())"]

@@ -354,7 +354,7 @@ def test_a_rate_of_nothing_is_refused(tmp_path, rate):
         begun(session, rate=rate)
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(FileError, match="cannot be written: not a directory"):
         create_session(tmp_path / "file" / "s")

@@ -26,7 +26,7 @@ from ikns.live.stream import (
     open_source,
 )
 from ikns.live.stream.lsl_feed import ANY_MOCAP
-from ikns.live.stream.lsl_layout import read_layout
+from ikns.live.stream.lsl_layout import read_lsl_layout
 from ikns.live.stream.lsl_library import lsl, lsl_settings
 from ikns.recording.recording import Recording
 
@@ -41,7 +41,7 @@ def recording(n: int, rate: float = 200.0) -> Recording:
 
 @pytest.fixture
 def name() -> str:
-    """Name that no test beside this one uses."""
+    """Name that only this test uses."""
     return f"test-{uuid.uuid4().hex[:8]}"
 
 
@@ -133,7 +133,7 @@ def test_frames_held_up_are_late(name: str) -> None:
     assert source.continuity.counts.jitter["largest"] >= 0.15
 
 
-def test_a_stream_that_breaks_off_is_told_and_found_again(name: str) -> None:
+def test_a_stream_that_breaks_off_is_reported_and_found_again(name: str) -> None:
     there = recording(5)
     outlet = LslOutlet(there.labels, there.rate, name=name)
     with opened(name) as source:
@@ -240,7 +240,7 @@ def test_a_description_without_markers_is_refused(
     )
     xml = f"<info><desc><channels>{inside}</channels></desc></info>"
     with pytest.raises(StreamError) as refused:
-        read_layout(xml, "lsl:x")
+        read_lsl_layout(xml, "lsl:x")
     assert says in str(refused.value)
 
 
@@ -279,7 +279,7 @@ def test_where_a_stream_is_missing_those_that_are_there_are_named(name: str) -> 
         opened("'\"")
 
 
-def test_uneven_stamps_are_told_and_no_frame_is_called_lost(name: str) -> None:
+def test_uneven_stamps_are_reported_and_no_frame_is_called_lost(name: str) -> None:
     outlet = vendor(name, AXES)
     stamps = 50 + np.array([0, 0.010, 0.034, 0.035, 0.041, 0.050])
     with opened(name) as source:
@@ -312,7 +312,7 @@ def test_a_stream_that_pauses_but_answers_is_kept(
             time.sleep(0.01)
 
 
-def test_silence_is_told_and_iterating_gives_up(name: str) -> None:
+def test_silence_is_reported_and_iterating_gives_up(name: str) -> None:
     there = recording(5)
     with LslOutlet(there.labels, there.rate, name=name) as outlet:
         with opened(name, read_timeout=1.2) as source:

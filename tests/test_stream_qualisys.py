@@ -69,7 +69,7 @@ def test_frames_that_qtm_leaves_out_are_counted() -> None:
     assert (counts.received, counts.dropped, counts.repeated) == (7, 4, 1)
 
 
-def test_a_connection_that_breaks_is_told_and_made_again() -> None:
+def test_a_connection_that_breaks_is_reported_and_made_again() -> None:
     with QtmServer(LABELS) as server, opened(server) as source:
         assert len(read(source, 1)) == 1
         server.hang_up()
@@ -92,7 +92,7 @@ def test_other_markers_after_a_break_are_not_read() -> None:
             assert source.read(0.05) is None
 
 
-def test_a_reader_that_sleeps_loses_the_oldest_and_is_told(
+def test_a_reader_that_sleeps_loses_the_oldest_and_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("ikns.live.stream.client_thread._INBOX", 10)
@@ -126,7 +126,7 @@ def test_a_server_without_what_is_needed_is_refused(
     assert str(refused.value).startswith(f"qualisys:127.0.0.1:{server.port}: ")
 
 
-def test_a_port_where_nobody_listens_is_refused() -> None:
+def test_a_port_where_no_one_listens_is_refused() -> None:
     with QtmServer(LABELS) as server:
         port = server.port
     with pytest.raises(StreamError, match=f"answer at 127.0.0.1:{port} within 1 s"):

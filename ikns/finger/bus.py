@@ -193,7 +193,7 @@ class Bus:
         return b"".join(number.to_bytes(size, "little") for number in numbers)
 
     def _transfer(self, doing: str, instruction: int, data: bytes, count: int) -> bytes:
-        """Send an instruction until it is answered; return the data of the response."""
+        """Send an instruction until the servo responds; return the response's data."""
         for attempt in range(self.tries - 1):
             try:
                 return self._transfer_once(doing, instruction, data, count)
@@ -219,7 +219,7 @@ class Bus:
             packet = [0, 0, self.id, content + 2]
         packet += [instruction, *data, 0, 0] if wide else [instruction, *data, 0]
         no_response = NoResponse(
-            f"{self.port}: servo {self.id} did not answer when {doing}."
+            f"{self.port}: servo {self.id} did not respond when {doing}."
         )
         try:
             response, result, error = self._packets.txRxPacket(self._port, packet)

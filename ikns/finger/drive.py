@@ -15,10 +15,12 @@ from ikns.finger.state import FingerState
 
 __all__ = ["Drive"]
 
+#: Unit of the bus watchdog's register, s.
 _WATCHDOG_UNIT = 0.02
 #: Seconds between checks that torque is still on, and between attempts to reopen the
 #: port.
 _CHECK_INTERVAL, _REOPEN_INTERVAL = 0.1, 0.2
+#: Where a read of the state starts, by protocol; see `Drive._measure`.
 _FIRST_REGISTERS = {
     2: ("moving", "realtime_tick", "goal_position", "profile_velocity"),
     1: ("present_position", "goal_pwm", "profile_velocity", "goal_position"),
@@ -158,7 +160,7 @@ class Drive:
                 raise
             self._torque = False  # it stands still; the next cycle restarts it there
             self._fail(
-                f"the servo heard nothing for {self._configuration.watchdog:g} s"
+                f"the servo received nothing for {self._configuration.watchdog:g} s"
             )
             return
         self._sent = ticks
@@ -231,7 +233,7 @@ class Drive:
             elif self._watchdog_tripped():
                 self._torque = False
                 self._fail(
-                    f"the servo heard nothing for {self._configuration.watchdog:g} s"
+                    f"the servo received nothing for {self._configuration.watchdog:g} s"
                 )
 
     def _measure(self) -> FingerState:
@@ -272,7 +274,7 @@ class Drive:
             self._guard.fail(reason.rstrip("."))
 
     def _reopen(self) -> None:
-        """Reopen the port once it is back; torque is then switched on anew."""
+        """Reopen the port once it is back; torque is then switched on again."""
         now = time.monotonic()
         if now - self._reopened < _REOPEN_INTERVAL:
             return

@@ -146,20 +146,16 @@ class Servo:
         if duration <= 0:
             return
         self._check_watchdog()
-        memory, model = self.memory, self.model
-        speed = memory["profile_velocity"] * model.velocity_unit or math.inf
-        acceleration = math.inf
-        if "profile_acceleration" in model:
-            acceleration = memory["profile_acceleration"] or math.inf
-            acceleration *= model.acceleration_unit
+        memory = self.memory
+        rate, acceleration, max_effort = memory.motion_limits()
         goal = self.motor.profile if self.watchdog_error else memory["goal_position"]
         self.motor.move(
             duration,
             goal,
             torque=self.torque,
-            rate=speed,
+            rate=rate,
             acceleration=acceleration,
-            max_effort=self._max_effort(),
+            max_effort=max_effort,
         )
         if self.motor.overloaded:
             self.raise_alert(_OVERLOAD)
@@ -195,14 +191,6 @@ class Servo:
         self._silent_until = self._now + _BOOT
         self._note("started again")
         self._update_registers()
-
-    def _max_effort(self) -> float:
-        memory, model = self.memory, self.model
-        top = model["pwm_limit"].upper
-        shares = [memory["pwm_limit"] / top, abs(memory["goal_pwm"]) / top]
-        if "goal_current" in model and memory["operating_mode"] in (0, 5):
-            shares.append(abs(memory["goal_current"]) / model["current_limit"].upper)
-        return min(shares)
 
     def _check_watchdog(self) -> None:
         """Stop when nothing was received for too long."""

@@ -13,14 +13,14 @@ __all__ = ["FAULTS", "Fault", "parse_fault"]
 #: Kinds of faults, and what each one does with its value, if it takes one.
 FAULTS: dict[str, str] = {
     "silence": "nothing passes, in either direction",
-    "mute": "the servo obeys but does not answer",
-    "delay": "answers come VALUE seconds late (0.05)",
-    "crc": "answers have a wrong checksum",
-    "id": "answers carry the id VALUE (one more)",
+    "mute": "the servo obeys but does not respond",
+    "delay": "responses come VALUE seconds late (0.05)",
+    "crc": "responses have a wrong checksum",
+    "id": "responses carry the id VALUE (one more)",
     "alert": "an electrical shock switches the motor off until a reboot",
     "overheat": "the motor is hotter than allowed and switches off",
     "power": "the supply fails for a moment; the servo starts again",
-    "unplug": "the adapter is pulled out in the middle of an answer",
+    "unplug": "the adapter is unplugged in the middle of a response",
 }
 _VALUES = {"delay": 0.05, "id": math.nan}
 #: Kinds that happen at an instant and have no duration.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ikns.finger.control_table import Register
 from ikns.finger.models import Model
 
@@ -78,6 +80,28 @@ class Memory:
                 if 0 <= i < count:
                     data[i] = byte
         return bytes(data)
+
+    def motion_limits(self) -> tuple[float, float, float]:
+        """Limits that the registers set on motion.
+
+        Returns
+        -------
+        rate, acceleration : float
+            Ticks per second (squared); infinite without a limit.
+        max_effort : float
+            Share of full effort.
+        """
+        model, values = self._model, self._values
+        rate = values["profile_velocity"] * model.velocity_unit or math.inf
+        acceleration = math.inf
+        if "profile_acceleration" in model:
+            acceleration = values["profile_acceleration"] or math.inf
+            acceleration *= model.acceleration_unit
+        top = model["pwm_limit"].upper
+        shares = [values["pwm_limit"] / top, abs(values["goal_pwm"]) / top]
+        if "goal_current" in model and values["operating_mode"] in (0, 5):
+            shares.append(abs(values["goal_current"]) / model["current_limit"].upper)
+        return rate, acceleration, min(shares)
 
     def check(self, address: int, data: bytes) -> list[tuple[Register, int]]:
         """Return the registers and values that bytes would write.

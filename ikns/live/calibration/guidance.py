@@ -78,8 +78,8 @@ class HandTracker:
 
     def position(self, markers: Array) -> Array | None:
         """Hand, or the mean of both, in the thorax frame, (3,) m; None if not seen."""
-        worn = self._skeleton.marker_set
-        pose = self._solver.solve(worn.pick(self._labels, markers), self._q)
+        marker_set = self._skeleton.marker_set
+        pose = self._solver.solve(marker_set.pick(self._labels, markers), self._q)
         if not math.isfinite(pose.residual):
             return None
         self._q = pose.q
@@ -99,7 +99,7 @@ class Guidance:
 
     def __init__(self, source: Source, judge: Judge, n_points: int) -> None:
         self._labels, self._judge, self._n_points = source.labels, judge, n_points
-        self._worn = MarkerSet.load(judge.marker_set).without_static()
+        self._marker_set = MarkerSet.load(judge.marker_set).without_static()
         self._tracker: tuple[Skeleton, HandTracker] | None = None
         self._targets: tuple[object, TargetPoints] | None = None
         self._before: tuple[float, Array] | None = None
@@ -128,7 +128,7 @@ class Guidance:
         assert step is not None
         seen, speed, distance, direction = 0, math.nan, math.nan, ""
         if frame is not None:
-            markers = self._worn.pick(self._labels, frame.markers)
+            markers = self._marker_set.pick(self._labels, frame.markers)
             seen = int(np.isfinite(markers).all(axis=1).sum())
             position = self._hand_position(frame)
             if position is not None:
@@ -148,7 +148,7 @@ class Guidance:
             step,
             protocol.seconds_left,
             seen,
-            len(self._worn.labels),
+            len(self._marker_set.labels),
             silence,
             speed,
             distance,

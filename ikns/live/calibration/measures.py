@@ -75,8 +75,8 @@ def marker_displacement(markers: Array) -> Array:
 
 def missing_percent(recording: Recording, skeleton: Skeleton) -> float:
     """Share of markers of the set that were not seen, %."""
-    worn = skeleton.marker_set
-    markers = worn.pick(recording.labels, recording.markers)
+    marker_set = skeleton.marker_set
+    markers = marker_set.pick(recording.labels, recording.markers)
     return percent(~np.isfinite(markers).all(axis=2))
 
 

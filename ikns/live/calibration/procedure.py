@@ -45,17 +45,17 @@ def check_labels(
     MarkerMismatch
         With the labels that are missing.
     """
-    worn = MarkerSet.load(marker_set).without_static()
+    moving = MarkerSet.load(marker_set).without_static()
     needed = sorted(
         column
-        for own, _ in sight_needs(generic.with_nominal_markers(worn), chain).values()
+        for own, _ in sight_needs(generic.with_nominal_markers(moving), chain).values()
         for column in own
     )
-    columns = worn.columns(source.labels)
-    missing = [worn.labels[i] for i in needed if columns[i] < 0]
+    columns = moving.columns(source.labels)
+    missing = [moving.labels[i] for i in needed if columns[i] < 0]
     if missing:
         raise MarkerMismatch(
-            f"{source.name}: expected markers {', '.join(missing)} of {worn.name}, "
+            f"{source.name}: expected markers {', '.join(missing)} of {moving.name}, "
             f"found only {', '.join(source.labels)}."
         )
 

@@ -95,15 +95,15 @@ def judge_static(
     min_static : float
         Shortest duration to accept, s.
     """
-    worn = MarkerSet.load(marker_set)
-    markers = worn.pick(recording.labels, recording.markers)
+    expected = MarkerSet.load(marker_set)
+    markers = expected.pick(recording.labels, recording.markers)
     seen = np.all(np.isfinite(markers), axis=2)
-    never = [m for m, s in zip(worn.labels, seen.any(axis=0), strict=True) if not s]
+    never = [m for m, s in zip(expected.labels, seen.any(axis=0), strict=True) if not s]
     spread = marker_displacement(markers)
     values: dict[str, Any] = {
         "seconds": len(recording.time) / recording.rate,
-        "markers_seen": len(worn.labels) - len(never),
-        "markers_expected": len(worn.labels),
+        "markers_seen": len(expected.labels) - len(never),
+        "markers_expected": len(expected.labels),
         "markers_never_seen": never,
         "missing_percent": percent(~seen),
         "spread_mm": millimeters(spread.max(initial=0.0)),
@@ -118,13 +118,13 @@ def judge_static(
     reason = ""
     if spread.max() > STILL_MARKERS:
         reason = (
-            f"The person moved: {worn.labels[int(spread.argmax())]} by "
+            f"The person moved: {expected.labels[int(spread.argmax())]} by "
             f"{millimeters(spread.max()):.0f} mm, expected at most "
             f"{millimeters(STILL_MARKERS):.0f} mm."
         )
     elif not report.converged:
         reason = "The body could not be fitted to the markers."
-    elif lost := _lost(worn, seen.any(axis=0), recording.labels, report.dropped):
+    elif lost := _lost(expected, seen.any(axis=0), recording.labels, report.dropped):
         reason = (
             f"Never in sight: {', '.join(lost)}; what the static trial does not show "
             "cannot be used later."
@@ -137,7 +137,7 @@ def judge_static(
 
 
 def _lost(
-    worn: MarkerSet,
+    expected: MarkerSet,
     seen: NDArray[np.bool_],
     labels: Sequence[str],
     dropped: Sequence[str],
@@ -146,10 +146,10 @@ def _lost(
 
     They are of segments with other markers in sight, and their labels are recorded.
     """
-    shown = {m.link for m, s in zip(worn.markers, seen, strict=True) if s}
+    shown = {m.link for m, s in zip(expected.markers, seen, strict=True) if s}
     return [
         m.label
-        for m, s in zip(worn.markers, seen, strict=True)
+        for m, s in zip(expected.markers, seen, strict=True)
         if not (s or m.static_only)
         and m.link in shown
         and m.label in dropped

@@ -202,9 +202,9 @@ class RateControl:
         if isnan(self.c[0]):
             self.c = self._within(position)
         elif self._rate is not None:
-            way = (self._rate + rate) * (dt / 2)
-            most = np.abs(way)
-            moved = self.c + way
+            step = (self._rate + rate) * (dt / 2)
+            most = np.abs(step)
+            moved = self.c + step
             pull = -np.expm1(-most / self.travel) * (position - moved)
             moved += np.minimum(np.maximum(pull, -most), most)
             if hand_speed < self.max_hand_speed:

@@ -66,9 +66,9 @@ def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
 
 def _apart(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
     """Name the two markers of a segment whose distance is farthest off."""
-    pairs, worn = segment_pairs(solver.skeleton, solver.chain)
+    pairs, calibrated = segment_pairs(solver.skeleton, solver.chain)
     first, second = markers[pairs.T]
-    change = np.linalg.norm(first - second, axis=1) - worn
+    change = np.linalg.norm(first - second, axis=1) - calibrated
     k = int(np.nanargmax(np.abs(change)))
     return f"{say_apart(solver.skeleton, pairs[k], change[k])} than at calibration"
 

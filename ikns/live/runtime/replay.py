@@ -60,6 +60,20 @@ def replay_run(run: Run) -> Replayed:
     ------
     FileError
         When the settings or the subject are missing or damaged.
+
+    Examples
+    --------
+    A session of ``ikns run`` has all that a replay needs; this one has no subject:
+
+    >>> import tempfile
+    >>> from ikns.live.session import create_session, open_run, read_run
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     session = create_session(folder)
+    ...     about = {"labels": ["C7"], "joint_names": [], "rate": 100.0}
+    ...     open_run(session, configuration={}, **about).close()
+    ...     replay_run(read_run(session))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ikns.errors.FileError: ...run-01/subject: expected a folder that ...
     """
     subject = Subject.load(run.subject_folder)
     try:

@@ -11,7 +11,7 @@ from typing import Any
 
 from ikns.errors import StreamError
 from ikns.live.stream.frame import Event, Frame
-from ikns.live.stream.lsl_layout import LslLayout, read_layout
+from ikns.live.stream.lsl_layout import LslLayout, read_lsl_layout
 from ikns.live.stream.lsl_library import lsl
 from ikns.live.stream.lsl_numbers import Numbers
 
@@ -184,7 +184,7 @@ class LslFeed:
             inlet = self._pylsl.StreamInlet(
                 found, max_buflen=_BUFFER, max_chunklen=1, recover=False, as_numpy=True
             )
-            layout = read_layout(inlet.info(self._timeout).as_xml(), self.name)
+            layout = read_lsl_layout(inlet.info(self._timeout).as_xml(), self.name)
             offset = inlet.time_correction(self._timeout)
             offset += time.monotonic() - self._pylsl.local_clock()
             inlet.open_stream(self._timeout)

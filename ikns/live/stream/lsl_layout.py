@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ikns.errors import StreamError
 
-__all__ = ["LslLayout", "marker_channels", "read_layout"]
+__all__ = ["LslLayout", "channel_fields", "read_lsl_layout"]
 
 _UNITS = {
     **dict.fromkeys(["", "m", "meter", "meters", "metre", "metres"], 1.0),
@@ -47,7 +47,7 @@ class LslLayout:
         return sample[self.columns] * self.scale
 
 
-def marker_channels(labels: Iterable[str]) -> Iterator[dict[str, str]]:
+def channel_fields(labels: Iterable[str]) -> Iterator[dict[str, str]]:
     """Describe three channels for each marker."""
     for label in labels:
         for axis in "XYZ":
@@ -59,7 +59,7 @@ def marker_channels(labels: Iterable[str]) -> Iterator[dict[str, str]]:
             }
 
 
-def read_layout(xml: str, source: str) -> LslLayout:
+def read_lsl_layout(xml: str, source: str) -> LslLayout:
     """Read a stream's description.
 
     Parameters

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ikns.errors import InvalidInput
 from ikns.live.stream.loopback import only_from_this_machine
-from ikns.live.stream.lsl_layout import marker_channels
+from ikns.live.stream.lsl_layout import channel_fields
 from ikns.live.stream.lsl_library import lsl
 
 __all__ = ["LslOutlet"]
@@ -121,7 +121,7 @@ class LslOutlet:
 
 def _describe(desc: Any, labels: Sequence[str]) -> None:
     channels = desc.append_child("channels")
-    for fields in marker_channels(labels):
+    for fields in channel_fields(labels):
         channel = channels.append_child("channel")
         for key, value in fields.items():
             channel.append_child_value(key, value)
