@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.marker_errors import marker_errors
+from ikns._kernels.body.descent import errors_at
 from ikns._kernels.body.marker_ik import solve_frame
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
 from ikns._kernels.body.paths import Paths, place_frames
@@ -168,19 +168,7 @@ def _worst_residual(
     problem: MarkerProblem, s: Scratch, link: Indices, q: Floats
 ) -> float:
     """Compare the markers taken last with a pose, which they need not have led to."""
-    marker_errors(
-        problem.tree,
-        problem.marker_joint,
-        problem.marker_position,
-        s.weight,
-        s.target,
-        q,
-        s.origin,
-        s.rotation,
-        s.translation,
-        s.x,
-        s.error,
-    )
+    errors_at(problem, s, q)
     largest = -1.0
     for m in range(len(link)):
         if link[m] >= 0 and s.weight[m] > 0:
