@@ -28,12 +28,12 @@ def view(
         typer.Argument(help="Recording to play: .c3d, .trc or Vicon .csv."),
     ] = None,
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("view.html"),
-    png: Annotated[Path | None, typer.Option(help="Picture to write as well.")] = None,
+    png: Annotated[Path | None, typer.Option(help="Picture to write too.")] = None,
     point: Annotated[
         int | None,
         typer.Option(
-            help="PCA point, from 1, at which the arm shows its null space; that with "
-            "the widest range by default."
+            help="PCA point, from 1, at which the arm shows its null space; default: "
+            "the one with the widest range."
         ),
     ] = None,
     open_page: Annotated[
@@ -44,7 +44,7 @@ def view(
 ) -> None:
     """Show PCA points, volume and null space around the body, in one HTML file.
 
-    With a recording the page plays it, beside what the map says.
+    With a recording the page plays it, together with the map.
     """
     from ikns.calibration import track_chain
     from ikns.calibration.simulated import is_simulated

@@ -274,7 +274,7 @@ def _show_attempts(
                 for a in results
             ],
         ),
-        f"{counted(left, 'trial')} left; the same command goes on."
+        f"{counted(left, 'trial')} left; the same command continues."
         if left
         else "All trials are done.",
         f"Wrote {identity.folder}",
