@@ -65,7 +65,7 @@ from ikns.simulation.places import (
 from ikns.simulation.protocol import _RESTING, _STATIC_SD, _pose
 from ikns.simulation.wander import tremor, wander
 from ikns.view.render import png
-from ikns.view.style import GREY, INK, RED, house_style, new_figure
+from ikns.view.style import GREY, INK, RED, figure_style, new_figure
 
 CHAIN, SIDE = "right_arm", "right"
 POINTS, RATE, TRUE_RATE = 3, 50.0, 25.0
@@ -330,7 +330,7 @@ def print_table(table: dict[str, dict]) -> None:
 
 def figure(subjects: list[dict[str, list[list[float]]]]) -> Figure:
     """Draw every interval beside its truth, in the order of the truth."""
-    with house_style():
+    with figure_style():
         drawn = new_figure(
             f"Intervals that hold the truth, {len(subjects)} people",
             simulated=True,

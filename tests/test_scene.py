@@ -18,10 +18,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, InvalidInput
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.self_motion import (
+    posture_at_point,
+    postures_along,
+)
 from ikns.view.scene import Scene, map_scene
 from ikns.view.scene.body import (
     arm_links,
@@ -32,12 +35,6 @@ from ikns.view.scene.body import (
 )
 from ikns.view.scene.commands import ROOT, line_mesh
 from ikns.view.scene.places import _TRAIL_STEP, _thinned, point_commands
-from ikns.view.scene.postures import (
-    HELD,
-    posture_at_point,
-    postures_along,
-    self_motion,
-)
 from ikns.view.scene.shapes import visual_shapes
 from ikns.view.style import point_color
 
@@ -169,7 +166,7 @@ def test_markers_sit_on_the_body_where_the_skeleton_wears_them() -> None:
         assert path in objects(commands)
 
 
-# --- postures ------------------------------------------------------------------------
+# --- the map's own person ------------------------------------------------------------
 
 
 @cache
@@ -178,52 +175,7 @@ def person() -> tuple[Skeleton, NullSpaceMap]:
     return made.skeleton, made.null_space_map
 
 
-def hand(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    position, rotation = person()[0].hands_in_thorax(q)
-    return position[..., 0, :], rotation[..., 0, :, :]
-
-
-def chain_of(q: np.ndarray) -> np.ndarray:
-    names = person()[0].joint_names
-    return q[..., [names.index(joint) for joint in chain_joints(CHAIN)]]
-
-
-@pytest.mark.parametrize("point", range(10))
-def test_the_arm_stands_at_its_point_in_the_middle_of_the_range(point: int) -> None:
-    body, learned = person()
-    q = posture_at_point(body, learned, CHAIN, point)
-    # The last step is below 1e-8 rad, and Newton's next would square it.
-    np.testing.assert_allclose(hand(q)[0], learned.centers_[point], atol=1e-8)
-    middle = (learned.lower_[point, 0] + learned.upper_[point, 0]) / 2
-    along = chain_of(q) @ learned.directions_[point, 0]
-    assert along == pytest.approx(middle, abs=1e-8)
-    assert ((q >= body.lower) & (q <= body.upper)).all()
-
-
-@pytest.mark.parametrize("point", range(10))
-def test_the_sweep_holds_the_hand_while_the_elbow_moves(point: int) -> None:
-    body, learned = person()
-    q = posture_at_point(body, learned, CHAIN, point)
-    sweep = self_motion(body, learned, CHAIN, point, q)
-    place, rotation = hand(sweep)
-    turn = Rotation.from_matrix(rotation @ hand(q)[1].T).magnitude()
-    # Each component is corrected until it is below HELD.
-    assert np.linalg.norm(place - hand(q)[0], axis=1).max() < np.sqrt(3) * HELD
-    assert turn.max() < np.sqrt(3) * HELD
-    assert (sweep == q).all(axis=1).any()
-    # No step is longer than 0.05 rad but for its correction, second order in it.
-    steps = np.linalg.norm(np.diff(sweep, axis=0), axis=1)
-    assert steps.max() < 0.055
-    c = chain_of(sweep) @ learned.directions_[point, 0]
-    ends = learned.lower_[point, 0], learned.upper_[point, 0]
-    assert (np.diff(c) > 0).all()
-    # The last step is cut to end there, and corrected: second order in 0.05 rad.
-    np.testing.assert_allclose(c[[0, -1]], ends, atol=0.05**2)
-    elbow = body.link_in_thorax(sweep[[0, -1]], "right_forearm")[0]
-    assert np.linalg.norm(np.diff(elbow, axis=0)) > 0.02
-
-
-def test_nothing_sweeps_where_the_range_is_empty() -> None:
+def test_nothing_plays_where_the_range_is_empty() -> None:
     body, learned = person()
     still = NullSpaceMap.from_arrays(
         learned.centers_,
@@ -231,49 +183,15 @@ def test_nothing_sweeps_where_the_range_is_empty() -> None:
         0 * learned.lower_,
         0 * learned.upper_,
     )
-    q = posture_at_point(body, still, CHAIN, 0)
-    np.testing.assert_array_equal(self_motion(body, still, CHAIN, 0, q), [q])
     scene = map_scene(body, still, CHAIN, simulated=True)
     assert len(scene.times) == 0
     assert all(command["type"] != "set_animation" for command in scene.commands)
 
 
-@pytest.mark.parametrize("chain", ["right_arm_clavicle", "both_arms", "left_arm"])
-def test_other_chains_sweep_with_their_hands_held(chain: str) -> None:
-    body = Skeleton.load()
-    names, sides = chain_joints(chain), (-1.0 if chain == "left_arm" else 1.0)
-    places = np.array([0.35, -0.15, 0.15]) + 0.1 * np.array(list(np.ndindex(2, 2, 2)))
-    places[:, 2] *= 0.0 if chain == "both_arms" else sides
-    places[:, 2] += 0.01 * np.arange(8)
-    z = np.array([1.0 if "rotation" in name or "abd" in name else 0 for name in names])
-    z /= np.linalg.norm(z)
-    learned = NullSpaceMap.from_arrays(
-        places, np.tile(z, (8, 1)), np.full(8, 0.0), np.full(8, 0.8)
-    )
-    q = posture_at_point(body, learned, chain, 2)
-    sweep = self_motion(body, learned, chain, 2, q)
-    assert len(sweep) > 3
-    acting = [
-        s for s, side in enumerate(("right", "left")) if any(side in n for n in names)
-    ]
-    hands = body.hands_in_thorax(sweep)[0][:, acting]
-    away = np.linalg.norm(hands - body.hands_in_thorax(q)[0][acting], axis=-1)
-    assert away.max() < np.sqrt(3) * HELD
-
-
-def test_ghosts_lie_along_z() -> None:
+def test_ghosts_are_arms_at_their_postures() -> None:
     body, learned = person()
     q = posture_at_point(body, learned, CHAIN, 3)
-    c = np.array([-0.2, 0.0, 0.5, 1.0])
-    ghosts = postures_along(body, learned, CHAIN, 3, q, c)
-    z = learned.directions_[3, 0]
-    away = chain_of(ghosts) - chain_of(q)
-    np.testing.assert_allclose(away, (away @ z)[:, None] * z, atol=1e-12)
-    lower, upper = learned.lower_[3, 0], learned.upper_[3, 0]
-    signal = (chain_of(ghosts) @ z - lower) / (upper - lower)
-    np.testing.assert_allclose(signal, c, atol=1e-12)
-    others = [k for k, n in enumerate(body.joint_names) if n not in chain_joints(CHAIN)]
-    np.testing.assert_array_equal(ghosts[:, others], np.tile(q[others], (4, 1)))
+    ghosts = postures_along(body, learned, CHAIN, 3, q, np.array([-0.2, 0.0, 0.5, 1.0]))
     links = arm_links(body, CHAIN)
     assert links == ["right_upper_arm", "right_forearm", "right_hand"]
     commands = ghost_commands(

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from ikns.body.model_file import segment_lengths, urdf_folder
 from ikns.finger.geometry import joint_angles, opening
 from ikns.view.scene import LiveView, map_scene, with_finger
-from ikns.view.scene.drawing import drawn_nodes
+from ikns.view.scene.drawing import visible_nodes
 from ikns.view.scene.finger import finger_path, flexion_commands
 
 #: Poses are products of seven matrices of doubles of size 1.
@@ -65,7 +65,7 @@ def test_it_is_worn_at_the_wrist_and_its_tip_is_the_opening_above_the_palm(
     wrist = segment_lengths(person.skeleton.urdf)[f"{side}_forearm"]
     assert in_forearm[1, 3] == -wrist
     assert np.linalg.det(in_forearm[:3, :3]) == pytest.approx(1)
-    drawn = [path for path, *_ in drawn_nodes(scene)]
+    drawn = [path for path, *_ in visible_nodes(scene)]
     # Base, six modules, and the post that carries them.
     assert sum(path.startswith(finger_path(side)) for path in drawn) == 8
 

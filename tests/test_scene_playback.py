@@ -29,7 +29,7 @@ from ikns.view.scene import Scene, map_scene, recording_scene, scene_html, scene
 from ikns.view.scene.body import drawn_links
 from ikns.view.scene.browser import find_browser
 from ikns.view.scene.commands import ROOT
-from ikns.view.scene.drawing import drawn_nodes
+from ikns.view.scene.drawing import visible_nodes
 from ikns.view.scene.page import packed_json
 from ikns.view.scene.playback import (
     MOST_FRAMES,
@@ -376,7 +376,7 @@ def test_the_browser_named_by_the_environment_comes_first(tmp_path: Path) -> Non
 
 
 def test_the_drawing_reads_the_scene_as_the_page_does() -> None:
-    found = {path: pose for path, pose, _ in drawn_nodes(scene())}
+    found = {path: pose for path, pose, _ in visible_nodes(scene())}
     assert not any("/sweep/" in path or "/ghosts/" in path for path in found)
     body = small_person.subject().skeleton
     row = int(np.argmin(np.abs(scene().times - scene().start)))

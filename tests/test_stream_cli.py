@@ -102,7 +102,7 @@ def test_a_stream_that_dies_without_a_word_is_noticed_and_found_again(
         (["--speed", "nan"], "speed above 0, found nan"),
         (["--fault", "lose=0.1"], "unknown fault 'lose=0.1', expected drop, late"),
         (["--seed", "-1"], "seed of 0 or more, found -1"),
-        (["--wait", "0.2"], "nobody listened within 0.2 s"),
+        (["--wait", "0.2"], "no one listened within 0.2 s"),
     ],
 )
 def test_what_cannot_be_served_is_refused(

@@ -16,7 +16,7 @@ from ikns.view.style import (
     PURPLE,
     RED,
     SKY,
-    house_style,
+    figure_style,
     new_figure,
 )
 from interpolation.field import PAPER_LAYOUT
@@ -49,7 +49,7 @@ _DPI = 150
 def save(figure: Figure, folder: Path, name: str) -> Path:
     """Write a figure as PNG."""
     folder.mkdir(parents=True, exist_ok=True)
-    with house_style():
+    with figure_style():
         figure.savefig(folder / f"{name}.png", dpi=_DPI)
     return folder / f"{name}.png"
 
@@ -58,7 +58,7 @@ def schemes_figure(people: People) -> Figure:
     """Errors and jumps of every scheme on ten points."""
     names = list(SCHEMES)
     at = np.arange(len(names))
-    with house_style():
+    with figure_style():
         figure = new_figure(
             f"Which interpolation? Ten points, {len(people)} people",
             simulated=True,
@@ -124,7 +124,7 @@ def layouts_figure(people: People) -> Figure:
     sizes = list(people[0]["layouts"][PAPER_LAYOUT])
     paper = [one["layouts"][PAPER_LAYOUT] for one in people]
     minutes = [middle([one[n] for one in paper], "minutes") for n in sizes]
-    with house_style():
+    with figure_style():
         figure = new_figure(
             f"How many points, and where? {len(people)} people",
             simulated=True,
@@ -193,7 +193,7 @@ def sweep_figure(
     if what == "variance":
         lines = (("components", "components summed"), *lines[1:])
     people = len(next(iter(next(iter(sweeps.values())).values())))
-    with house_style():
+    with figure_style():
         figure = new_figure(
             f"Which {what}? Recorded with markers, {people} people",
             simulated=True,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ikns.view.style import BLUE, GREY, INK, ORANGE, PALE, house_style, new_figure
+from ikns.view.style import BLUE, GREY, INK, ORANGE, PALE, figure_style, new_figure
 from reaches.modes import DEFAULT, controls
 from reaches.simulated import CHAIN, Person
 
@@ -14,7 +14,7 @@ def draw(folder: Path, person: Person) -> None:
     subject = person.subject
     learned = subject.null_space_map
     made = controls(subject.skeleton, learned, CHAIN, list(subject.motions))
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "c in position and in rate mode", simulated=True, height=4.6
         )

@@ -1,4 +1,4 @@
-"""The commands, and how a fault becomes one sentence and exit code 2."""
+"""The commands; every error becomes one sentence and exit code 2."""
 
 from __future__ import annotations
 
@@ -85,32 +85,32 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 on success, 2 on bad input, 130 when interrupted.
     """
     try:
-        # Not standalone, so that typer raises what it would print over several lines.
+        # Not standalone: typer then raises errors instead of printing several lines.
         code = typer.main.get_command(app).main(
             args=_repeat("--exploration", sys.argv[1:] if argv is None else argv),
             prog_name="ikns",
             standalone_mode=False,
         )
     except typer.TyperException as error:  # such as an unknown option
-        fault = error.format_message()
-        if not fault:  # no arguments at all: the help is already on the screen
+        message = error.format_message()
+        if not message:  # no arguments at all: the help was printed
             return 2
-        fault = f"{fault.rstrip('.')}; see ikns --help."
+        message = f"{message.rstrip('.')}; see ikns --help."
     except ikns.IknsError as error:
-        fault = str(error)
+        message = str(error)
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename}: "
-        fault = f"{where}{(error.strerror or str(error)).lower()}."
+        message = f"{where}{(error.strerror or str(error)).lower()}."
     except typer.Abort:
         return 130
     else:
         return code or 0
-    sys.stderr.write(f"ikns: {' '.join(fault.split())}\n")
+    sys.stderr.write(f"ikns: {' '.join(message.split())}\n")
     return 2
 
 
 def _repeat(option: str, argv: Sequence[str]) -> list[str]:
-    """Let an option take several values, which typer only knows as repeated options.
+    """Repeat an option before each of its values, as typer expects.
 
     >>> _repeat("--of", ["--of", "a", "b", "--to", "c"])
     ['--of', 'a', '--of', 'b', '--to', 'c']

@@ -1,7 +1,7 @@
 """``ikns calibrate``: static trial and explorations in, subject folder out.
 
-They come from files or, with ``--live``, from cameras and a person who is told what to
-do; after that both go the same way.
+The recordings come from files or, with ``--live``, from a marker stream and a person
+who follows prompts; the rest is the same.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ikns.output_folder import check_output_folder
 __all__ = ["calibrate", "calibration_parts"]
 
 
-#: Options that only a live calibration knows.
+#: Options of a live calibration only.
 _LIVE_ONLY = (
     "source",
     "recordings",
@@ -43,11 +43,11 @@ def calibrate(
     ] = None,
     exploration: Annotated[
         list[Path] | None,
-        typer.Option(help="Recordings of the hand at the points, one or more."),
+        typer.Option(help="Recordings with the hand held at the points, one or more."),
     ] = None,
     live: Annotated[
         bool,
-        typer.Option("--live", help="Record them now, from --source, with prompts."),
+        typer.Option("--live", help="Record now, from --source, with prompts."),
     ] = False,
     source: Annotated[
         str | None,
@@ -55,20 +55,21 @@ def calibrate(
     ] = None,
     recordings: Annotated[
         Path | None,
-        typer.Option(help="Folder for what is recorded live; SUBJECT-recordings."),
+        typer.Option(help="Folder for live recordings; default: OUT-recordings."),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with recordings that exist.")
+        bool, typer.Option("--resume", help="Continue with recordings that exist.")
     ] = False,
     auto: Annotated[
-        bool, typer.Option("--auto", help="Live without keys: follow every verdict.")
+        bool,
+        typer.Option("--auto", help="Live without a keyboard: follow every verdict."),
     ] = False,
     marker_set: MarkerSetName = "oxford24",
     side: Annotated[
         Literal["right", "left", "both"], typer.Option(help="Arm of the task.")
     ] = "right",
     clavicle: Annotated[
-        bool, typer.Option("--clavicle", help="The clavicle belongs to the task too.")
+        bool, typer.Option("--clavicle", help="Include the clavicle in the chain.")
     ] = False,
     stature: Annotated[float | None, typer.Option(help="Standing height, m.")] = None,
     mass: Annotated[float | None, typer.Option(help="Body mass, kg.")] = None,
@@ -86,20 +87,21 @@ def calibrate(
     ] = 3.0,
     n_dof: Annotated[int, typer.Option(help="Degrees of freedom to control.")] = 1,
     max_hand_speed: Annotated[
-        float, typer.Option(help="A slower hand is still, m/s.")
+        float, typer.Option(help="Hand speed below which it counts as still, m/s.")
     ] = 0.05,
     radius: Annotated[
-        float | None, typer.Option(help="Farthest a sample is from its point, m.")
+        float | None,
+        typer.Option(help="Largest distance of a sample from its point, m."),
     ] = None,
     outside: Annotated[
         Literal["nearest", "project", "nan"],
-        typer.Option(help="What holds outside the points' volume."),
+        typer.Option(help="Map outside the volume of the points."),
     ] = "nearest",
     min_static: Annotated[
-        float, typer.Option(help="Shortest static trial to accept, s.")
+        float, typer.Option(help="Shortest static trial accepted, s.")
     ] = 1.0,
     min_still: Annotated[
-        float, typer.Option(help="Least time of still samples at a point, s.")
+        float, typer.Option(help="Least duration of still samples at a point, s.")
     ] = 0.5,
     force: Force = False,
     as_json: AsJson = False,
@@ -121,7 +123,7 @@ def calibrate(
             f"expected --stature, --mass and --sex together or none of them, found "
             f"only {' and '.join(given)}."
         )
-    _check_where_from(context, live=live)
+    _check_input(context, live=live)
     check_output_folder(out, FILES, force=force)
     # Three times None is none of them.
     generic = (
@@ -162,8 +164,8 @@ def calibrate(
             generic=generic,
             marker_set=marker_set,
             chain=chain,
-            # Also where points were left out live: the clustering starts from the box
-            # of all, and clusters that stay empty are left out.
+            # Also when points were skipped live: the clustering starts from the box of
+            # all samples, and clusters that stay empty are left out.
             n_points=points,
             n_dof=n_dof,
             max_hand_speed=max_hand_speed,
@@ -182,8 +184,8 @@ def calibrate(
     )
 
 
-def _check_where_from(context: typer.Context, *, live: bool) -> None:
-    """Make sure that either files or a source are given, and not both."""
+def _check_input(context: typer.Context, *, live: bool) -> None:
+    """Check that either files or a live source are given, not both."""
     given = {
         name
         for name in context.params
@@ -210,7 +212,7 @@ def _check_where_from(context: typer.Context, *, live: bool) -> None:
 
 
 def calibration_parts(report: dict[str, Any]) -> list[Any]:
-    """Return tables and sentences that say how a calibration went."""
+    """Return tables and sentences on the quality of a calibration."""
     static, extrinsic = report["static"], report["extrinsic"]
     least = report["settings"]["min_samples"]
     moved = sorted(extrinsic["joints_deg"].items(), key=lambda item: -item[1])[:2]

@@ -30,8 +30,8 @@ def control(
 ) -> None:
     """Write the control signal of a recording: c from 0 to 1, frame by frame.
 
-    It is the map's own; `ikns run --source replay:FILE` also smooths it and leaves out
-    frames that do not count.
+    This is the map's own signal; `ikns run --source replay:FILE` also smooths it and
+    rejects frames.
     """
     from ikns.calibration import track_chain
     from ikns.live.control.recorded import control_table

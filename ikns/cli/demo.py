@@ -28,7 +28,7 @@ _RESULTS = ("control.csv", "report.html", "summary.json", "view.html", "workspac
 
 def demo(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("ikns-demo"),
-    seed: Annotated[int, typer.Option(help="Which virtual subject.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the virtual subject.")] = 1,
     quick: Annotated[
         bool, typer.Option("--quick", help="3 s a point instead of 5 s.")
     ] = False,
@@ -37,9 +37,8 @@ def demo(
 ) -> None:
     """Calibrate a virtual subject from C3D files and report on it.
 
-    The subject is simulated, so the truth is known and the report says how close the
-    result comes. Its motion follows the Jacobian's null space, which the method never
-    sees.
+    The subject is simulated, so the report can compare the result with the truth. Its
+    motion follows the Jacobian's null space, which the method is not given.
     """
     from ikns.calibration.subject import FILES
     from ikns.experiments.demo import demo_summary, run_demo

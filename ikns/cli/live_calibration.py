@@ -1,4 +1,4 @@
-"""The screen and the keys of ``ikns calibrate --live``; the rest is in experiments."""
+"""Screen and keys of ``ikns calibrate --live``; the protocol is in live."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LiveOptions", "record_live"]
 
-#: Takes of a step with nobody at the keys, before it is left out.
+#: With --auto: takes of a step before it is skipped.
 _AUTO_TAKES = 3
 _KEYS: dict[str, Key] = {
     "\n": "next",
@@ -45,7 +45,7 @@ _PROMPTS = {
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What ``--live`` was told."""
+    """Options of ``--live``."""
 
     source: str
     recordings: Path
@@ -69,7 +69,7 @@ def record_live(
     min_static: float,
     min_still: float,
 ) -> tuple[Path, list[Path], list[dict[str, Any]]]:
-    """Go through the protocol with a person.
+    """Record the calibration of a person, step by step.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def record_live(
         done = len(judge.places)
         raise NotEnoughData(
             f"{options.recordings}: stopped with {done} of {options.points} points "
-            "accepted; the recordings stay, so go on with --resume."
+            "accepted; the recordings are kept, continue with --resume."
         )
     return *accepted_recordings(folder, steps), folder.takes
 
@@ -164,7 +164,7 @@ class _Screen:
         self._live = sys.stderr.isatty()
 
     def change(self, change: Change, verdict: Verdict | None, where: str) -> None:
-        """Tell what happened to a step."""
+        """Print what happened to a step."""
         step, what = change.step, change.what
         if step is None:
             return
@@ -216,9 +216,9 @@ class _Screen:
 
 
 def _figures(verdict: Verdict) -> str:
-    """Figures of a verdict on one line."""
+    """Measured values of a verdict on one line."""
     values = verdict.values
-    said = []
+    found = []
     for name, form in (
         ("markers_seen", "{} markers seen"),
         ("still_percent", "hand steady {:.0f} %"),
@@ -236,15 +236,15 @@ def _figures(verdict: Verdict) -> str:
         if isinstance(value, list):
             value = " x ".join(f"{v:.0f}" for v in value)
         if value is not None:
-            said.append(form.format(value))
-    return ", ".join(said) or "nothing to judge"
+            found.append(form.format(value))
+    return ", ".join(found) or "nothing to judge"
 
 
 @contextmanager
 def _keys(*, listen: bool) -> Iterator[Callable[[bool], list[Key]]]:
-    """Keys from stdin: at once from a terminal, else one whenever one is waited for.
+    """Keys from stdin: at once from a terminal, else one at a time when asked.
 
-    Where stdin ends, nobody will press another key, which is to quit.
+    The end of stdin counts as quit: no more keys will come.
     """
     if not listen:
         yield lambda waiting: []

@@ -1,4 +1,4 @@
-"""What every command that drives a finger shares: its session, and how it is ended."""
+"""Session and signals of the commands that drive a finger."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["live_session", "say", "software", "stopped_by_signals"]
 
 
 def software() -> dict[str, str]:
-    """Versions that a result may depend on."""
+    """Return the versions that a result may depend on."""
     names = ("numpy", "numba", "pin")
     return {
         "ikns": ikns.__version__,
@@ -40,7 +40,7 @@ def live_session(
     participant: str,
     resume: bool,
 ) -> Iterator[RunWriter]:
-    """Open the next run of a session; with `resume`, of one that is there already."""
+    """Open the next run of a session: a new one or, with `resume`, an existing one."""
     from ikns.calibration.subject import FILES
     from ikns.live.session import create_session, mend_session, open_run
 
@@ -85,5 +85,5 @@ def stopped_by_signals() -> Iterator[threading.Event]:
 
 
 def say(sentence: str) -> None:
-    """Say something on a line of its own, whatever the last one holds."""
+    """Print a sentence on a new line of stderr."""
     sys.stderr.write(f"\nikns: {sentence}\n")

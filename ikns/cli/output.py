@@ -18,7 +18,7 @@ __all__ = [
     "table",
 ]
 
-#: Columns of a table where nobody says how many there are.
+#: Columns of a table that is written to a file or a pipe, which have no width.
 _WIDTH = 100
 
 
@@ -56,7 +56,6 @@ def show(result: Mapping[str, Any], *parts: Any, as_json: bool) -> None:
         return
     from rich.console import Console
 
-    # A file or a pipe has no width; tables are made for this one.
     width = None if sys.stdout.isatty() else _WIDTH
     console = Console(highlight=False, markup=False, soft_wrap=True, width=width)
     for part in parts:
@@ -92,13 +91,13 @@ def _missing(value: Any) -> bool:
 
 
 def notes(sentences: Iterable[str]) -> list[str]:
-    """Mark sentences that a person should read."""
+    """Mark sentences as notes."""
     return [f"Note: {sentence}" for sentence in sentences]
 
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Bars on stderr while it is a terminal; call with (step, done, total)."""
+    """Show bars on stderr if it is a terminal; call with (step, done, total)."""
     if not sys.stderr.isatty():
         yield lambda step, done, total: None
         return

@@ -1,4 +1,4 @@
-"""``ikns pick``: experiment 2 with a person, its clock and its table in a browser."""
+"""``ikns pick``: experiment 2 with a person, clock and results in a browser."""
 
 from __future__ import annotations
 
@@ -61,18 +61,21 @@ def pick(
     ] = None,
     repeats: Annotated[
         int | None,
-        typer.Option(help="Of each object in each condition.", show_default="1"),
+        typer.Option(
+            help="Repeats of each object in each condition.", show_default="1"
+        ),
     ] = None,
     training: Annotated[
         int | None,
         typer.Option(help="Objects before each condition.", show_default="10"),
     ] = None,
     limit: Annotated[
-        float | None, typer.Option(help="Seconds for an object.", show_default="20")
+        float | None,
+        typer.Option(help="Time limit for an object, s.", show_default="20"),
     ] = None,
     rest: Rest = None,
     seed: Annotated[
-        int | None, typer.Option(help="Of the orders.", show_default="0")
+        int | None, typer.Option(help="Seed of the orders.", show_default="0")
     ] = None,
     subject: ForIkns = None,
     source: SourceAddress = None,
@@ -95,9 +98,9 @@ def pick(
     """Pick objects up and put them down with the robot finger, against the clock.
 
     Two pages open: one for the participant, one for the experimenter, who starts and
-    stops the clock and says how it went. The ring button is a key: one that types a
-    space on the participant's page. Every attempt is on disk when it ends; Ctrl-C
-    breaks off, and the same command goes on.
+    stops the clock and records the outcome. The ring button is a key that types a space
+    on the participant's page. Every attempt is saved when it ends; after Ctrl-C the
+    same command continues the visit.
     """
     from ikns.experiments.conduct import Experiment, PickingExperiment
     from ikns.experiments.picking import OBJECT_IDS, pick_schedule

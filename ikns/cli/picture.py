@@ -1,4 +1,4 @@
-"""A figure as a file: refused before any work, written whole or not at all."""
+"""A figure as a file: checked before any work, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _ENDINGS = (".png", ".svg", ".pdf")
 
 
 def refuse_picture(path: Path | None, *, force: bool) -> None:
-    """Make sure, before any work, that a picture may be written there.
+    """Check, before any work, that a picture may be written.
 
     Raises
     ------
     InvalidInput
-        When its ending is none we write, or the file may not be written.
+        When its ending is unknown, or the file may not be written.
     """
     if path is None:
         return
@@ -31,7 +31,7 @@ def refuse_picture(path: Path | None, *, force: bool) -> None:
 
 
 def write_picture(path: Path, figure: Any) -> None:
-    """Write a matplotlib figure in the format that the name asks for."""
+    """Write a matplotlib figure in the format of its ending."""
     from ikns.view.render import pdf, png, svg
 
     draw = {".png": png, ".svg": svg, ".pdf": pdf}[path.suffix.lower()]

@@ -1,4 +1,4 @@
-"""``ikns replay``: a recorded session computed again, checked, or exported."""
+"""``ikns replay``: compute a recorded session again, check and export it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def replay(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compute c and the commands of a session again, and compare them bit for bit."""
+    """Compute c and the commands of a session again and compare them bit for bit."""
     from ikns.live.runtime import replay_run
     from ikns.live.session import check_session, export_run, read_run
 

@@ -1,4 +1,4 @@
-"""``ikns robot``: the same comparison on a robot's recorded joint angles."""
+"""``ikns robot``: learned against analytic on a robot's recorded joint angles."""
 
 from __future__ import annotations
 
@@ -32,29 +32,32 @@ def robot(
             help="CSV with the columns time_s and JOINT_rad (or JOINT_deg, JOINT_m)."
         ),
     ],
-    frame: Annotated[str, typer.Option(help="The link that does the task.")],
+    frame: Annotated[str, typer.Option(help="Link that does the task.")],
     task: Annotated[
         Literal["both", "pose", "position"], typer.Option(help="What was held.")
     ] = "both",
     points: Annotated[int, typer.Option(help="PCA points.", min=1)] = 10,
     radius: Annotated[
-        float | None, typer.Option(help="Samples farther from their point go, m.")
+        float | None,
+        typer.Option(help="Largest distance of a sample from its point, m."),
     ] = None,
-    speed: Annotated[float, typer.Option(help="A slower frame is held, m/s.")] = 0.05,
+    speed: Annotated[
+        float, typer.Option(help="Speed below which the frame counts as held, m/s.")
+    ] = 0.05,
     simulated: Annotated[
-        bool, typer.Option("--simulated", help="Say so in tables and picture.")
+        bool, typer.Option("--simulated", help="Label tables and picture as simulated.")
     ] = False,
     figure: Annotated[
         Path | None, typer.Option(help="Picture to write, .png, .svg or .pdf.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the intervals.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the intervals.", min=0)] = 0,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Learn directions from a robot's joint angles and hold them against its Jacobian.
+    """Learn directions from a robot's joint angles and compare them with its Jacobian.
 
-    The robot holds its frame at some places and moves the rest, as a person does in the
-    calibration.
+    The robot holds its frame at several places and moves in its null space, as a person
+    does in the calibration.
     """
     from ikns.analysis.compare import compare_robot
     from ikns.nullspace.map import MapWarning, robot_null_space_samples

@@ -1,4 +1,4 @@
-"""``ikns run``: from live markers to a finger, with everything written down."""
+"""``ikns run``: from live markers to a finger, with everything recorded."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["run"]
 
-#: How often the line on the terminal is written, s.
+#: Interval of the status line on the terminal, s.
 _LINE_EVERY = 0.2
 
 
@@ -37,7 +37,7 @@ def run(
         str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
     ] = "sim:",
     session: Annotated[
-        Path | None, typer.Option(help="Folder to write everything into.")
+        Path | None, typer.Option(help="Folder to record everything in.")
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Add a run to a session that exists.")
@@ -54,8 +54,8 @@ def run(
     safe_state: Annotated[
         Literal["limp", "hold", "open"],
         typer.Option(
-            help="What the finger does when poses fail to come: letting go of a held "
-            "object may itself be the hazard."
+            help="State of the finger when poses stop coming; releasing a held object "
+            "may itself be the hazard."
         ),
     ] = "limp",
     hold_speed: Annotated[
@@ -68,7 +68,7 @@ def run(
     realtime: Annotated[
         bool,
         typer.Option(
-            "--realtime", help="Before other programs, where the system allows it."
+            "--realtime", help="Real-time priority for the control loop, if allowed."
         ),
     ] = False,
     as_json: AsJson = False,
@@ -87,7 +87,7 @@ def run(
     if duration is not None and not 0 < duration < math.inf:
         raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
     if resume and session is None:
-        raise InvalidInput("--resume needs the --session to go on with.")
+        raise InvalidInput("--resume needs the --session to continue.")
     if realtime:
         check_realtime()
     settings = ControlSettings(hold_speed=hold_speed)
@@ -161,7 +161,7 @@ def run(
 
 @contextmanager
 def _status_line() -> Iterator[list[Callable[[LoopStatus], None]]]:
-    """Write one line over and over, while stderr is a terminal."""
+    """Rewrite one line on stderr if it is a terminal."""
     if not sys.stderr.isatty():
         yield []
         return
@@ -171,7 +171,7 @@ def _status_line() -> Iterator[list[Callable[[LoopStatus], None]]]:
         nonlocal last
         if status.time - last >= _LINE_EVERY:
             last = status.time
-            # A line that wraps could not be written over.
+            # A wrapped line could not be rewritten.
             room = shutil.get_terminal_size().columns - 1
             sys.stderr.write(f"\r\x1b[K{_line(status)[:room]}")
             sys.stderr.flush()
@@ -189,7 +189,7 @@ def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], N
 
 
 def _line(s: LoopStatus) -> str:
-    """Say how it goes, what matters most first: a narrow terminal cuts the rest."""
+    """Return the status, most important first: a narrow terminal cuts the rest."""
     drive = f"{s.state:<7} c {s.c:5.2f} flexion {s.flexion:4.2f} ({s.measured:4.2f})"
     pace = f"{s.rate:4.0f}/s p99 {1e3 * s.latency:4.2f} ms"
     if s.rejection:

@@ -1,4 +1,4 @@
-"""``ikns scale``: a body from stature, mass and sex alone."""
+"""``ikns scale``: a skeleton from stature, mass and sex alone."""
 
 from __future__ import annotations
 

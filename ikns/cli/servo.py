@@ -1,4 +1,4 @@
-"""``ikns servo``: a simulated Dynamixel servo on a pseudo-terminal, for desk work."""
+"""``ikns servo``: emulate a Dynamixel servo on a pseudo-terminal, without hardware."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ _KEYS = {
     "p": "power",
     "u": "unplug",
 }
-#: A port that was pulled out by key comes back after so long, seconds.
-_AWAY = 3.0
+#: A port unplugged by key is back after this long, s.
+_UNPLUGGED = 3.0
 
 
 def servo(
     model: Annotated[
         str, typer.Option(help="xl430, xm430, mx28 or ax12 (Protocol 1.0).")
     ] = "xl430",
-    id: Annotated[int, typer.Option(help="Its number on the bus.")] = 1,
+    id: Annotated[int, typer.Option(help="ID on the bus.")] = 1,
     baud: Annotated[int, typer.Option(help="Bits per second.")] = 57600,
     link: Annotated[
-        Path | None, typer.Option(help="Symbolic link to make to its port.")
+        Path | None, typer.Option(help="Symbolic link to create to its port.")
     ] = None,
     fault: Annotated[
         list[str] | None,
@@ -51,14 +51,14 @@ def servo(
         float | None, typer.Option(help="Position that it cannot pass, ticks.")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Seconds until it ends by itself.")
+        float | None, typer.Option(help="Seconds to run; default: until q or Ctrl-C.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate a Dynamixel servo on a port of its own, and break it on demand.
+    """Emulate a Dynamixel servo on a serial port, with faults on demand.
 
     Faults: silence, mute, delay, crc, id, alert, overheat, power, unplug. On a
-    terminal their first letters start them, r repairs and q quits.
+    terminal their first letters inject them, r repairs and q quits.
     """
     import math
 
@@ -74,7 +74,7 @@ def servo(
         made.motor.obstacles = ends
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
     with (
-        contextlib.suppress(KeyboardInterrupt),  # the usual way to end it
+        contextlib.suppress(KeyboardInterrupt),  # the usual way to stop it
         Wire(made, link=link, faults=faults) as wire,
         _keys() as key,
     ):
@@ -98,7 +98,7 @@ def servo(
             if pressed == "r":
                 wire.clear_faults()
             elif pressed in _KEYS:
-                lasts = _AWAY if pressed == "u" else math.inf
+                lasts = _UNPLUGGED if pressed == "u" else math.inf
                 wire.inject(_KEYS[pressed], lasts)
                 sys.stderr.write(f"{wire.elapsed:8.2f} s  {FAULTS[_KEYS[pressed]]}\n")
             events = list(made.events)
@@ -110,7 +110,7 @@ def servo(
 
 @contextlib.contextmanager
 def _keys() -> Iterator[Callable[[], str]]:
-    """Keys as they are pressed, where there is a keyboard; waits a little."""
+    """Yield a function that waits 0.05 s for a key; without a keyboard none comes."""
     if not sys.stdin.isatty():
 
         def no_key() -> str:

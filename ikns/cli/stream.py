@@ -1,4 +1,4 @@
-"""``ikns stream``: a recording as a live LSL stream, for desk work and tests."""
+"""``ikns stream``: replay a recording as a live LSL stream, for tests."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def stream(
     name: Annotated[
         str | None, typer.Option(help="Name of the stream; the file's by default.")
     ] = None,
-    speed: Annotated[float, typer.Option(help="1 is as it was recorded.")] = 1.0,
+    speed: Annotated[float, typer.Option(help="1: as recorded.")] = 1.0,
     loop: Annotated[
         bool, typer.Option("--loop", help="Start over at the end, until Ctrl-C.")
     ] = False,
@@ -34,9 +34,9 @@ def stream(
             "(late and freeze with seconds)."
         ),
     ] = "",
-    seed: Annotated[int, typer.Option(help="Of the faults.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the faults.")] = 0,
     wait: Annotated[
-        float, typer.Option(help="Seconds to wait for a first listener.")
+        float, typer.Option(help="Seconds to wait for the first listener.")
     ] = 3600.0,
     everywhere: Annotated[
         bool,
@@ -64,11 +64,13 @@ def stream(
     title = recording.stem if name is None else name
     rate = frames.rate * speed
     with LslOutlet(frames.labels, rate, name=title, everywhere=everywhere) as outlet:
-        _say(f"lsl:{title} has {len(frames.labels)} markers at {rate:g} frames/s.")
+        _print_progress(
+            f"lsl:{title} has {len(frames.labels)} markers at {rate:g} frames/s."
+        )
         if outlet.open_ports:
-            _say("other machines can reach its ports, too.")
-        if not _heard(outlet, wait):
-            raise StreamError(f"lsl:{title}: nobody listened within {wait:g} s.")
+            _print_progress("other machines can reach its ports, too.")
+        if not _has_listener(outlet, wait):
+            raise StreamError(f"lsl:{title}: no one listened within {wait:g} s.")
         sent = broadcast(
             frames, outlet, speed=speed, loop=loop, faults=faults, seed=seed
         )
@@ -98,18 +100,18 @@ def stream(
     )
 
 
-def _heard(outlet: LslOutlet, wait: float) -> bool:
-    """Wait in steps, so that Ctrl-C is heard."""
+def _has_listener(outlet: LslOutlet, wait: float) -> bool:
+    """Wait for a listener, in steps so that Ctrl-C works."""
     import time
 
-    give_up = time.monotonic() + wait
-    while time.monotonic() < give_up:
+    deadline = time.monotonic() + wait
+    while time.monotonic() < deadline:
         if outlet.wait_for_listener(min(0.2, wait)):
             return True
     return False
 
 
-def _say(sentence: str) -> None:
-    """Tell a person at a terminal how it goes; stdout is for the result."""
+def _print_progress(sentence: str) -> None:
+    """Print progress on a terminal's stderr; stdout is for the result."""
     if sys.stderr.isatty():
         sys.stderr.write(f"{sentence}\n")

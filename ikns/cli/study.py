@@ -1,4 +1,4 @@
-"""``ikns study``: declare a study, and simulate it where it is not done yet."""
+"""``ikns study``: declare a study and simulate its participants."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ study_app = typer.Typer(
     add_completion=False,
 )
 
-#: Between two lines of progress where there is no terminal, s.
+#: Interval of progress lines without a terminal, s.
 _EVERY = 30.0
-#: Failed cells that are named.
+#: Most failed cells that are named.
 _NAMED = 5
 
 StudyFolder = Annotated[Path, typer.Argument(help="Folder of the study.")]
@@ -53,21 +53,19 @@ def run(
     jobs: Annotated[int, typer.Option(help="Processes; -1: one for each core.")] = -1,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Dask scheduler that computes instead, tcp://HOST:PORT."),
+        typer.Option(help="Dask scheduler to compute on, tcp://HOST:PORT."),
     ] = None,
-    participants: Annotated[
-        int | None, typer.Option(help="Only the first so many.")
-    ] = None,
+    participants: Annotated[int | None, typer.Option(help="Only the first N.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate what a study lacks; a run that was stopped goes on where it was.
+    """Simulate the visits that a study lacks; a stopped run continues where it was.
 
-    The results are the same bits with any number of processes, here or on a cluster.
+    Results are bit-identical for any number of processes, here or on a cluster.
     """
     from ikns.experiments.study import read_study, run_study
 
     study = read_study(folder)
-    with _told() as report:
+    with _progress_or_lines() as report:
         done = run_study(
             folder,
             n_jobs=jobs,
@@ -106,8 +104,8 @@ study_app.command()(plan)
 
 
 @contextmanager
-def _told() -> Iterator[Callable[[str, int, int], None]]:
-    """Report progress: as a bar on a terminal, elsewhere as a line now and then."""
+def _progress_or_lines() -> Iterator[Callable[[str, int, int], None]]:
+    """Report progress: a bar on a terminal, elsewhere a line now and then."""
     if sys.stderr.isatty():
         with progress() as report:
             yield report

@@ -1,4 +1,4 @@
-"""``ikns study plan``: how many participants a declared margin takes."""
+"""``ikns study plan``: how many participants a declared margin needs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plan"]
 
-#: What is compared, in which unit, and over what a participant's trials are averaged.
+#: Quantity, unit, and the levels over which a participant's trials are averaged.
 _VALUE = {
     "tracking": ("RMSE", "of 100", "trajectories"),
     "picking": ("time", "s", "objects"),
@@ -34,60 +34,57 @@ _VALUE = {
 def plan(
     study: Annotated[
         Path | None,
-        typer.Argument(help="Study whose margin, design and seed are taken."),
+        typer.Argument(help="Study that declares margin, design and seed."),
     ] = None,
     experiment: Annotated[
         Literal["tracking", "picking"] | None,
-        typer.Option(help="Which one; of a study: the first declared."),
+        typer.Option(help="Experiment; of a study: the first declared."),
     ] = None,
     margin: Annotated[
         float | None,
         typer.Option(
-            help="Difference that does not matter: RMSE of 100, or s. Equivalence "
-            "within it is to be shown.",
+            help="Margin of equivalence: RMSE of 100, or s.",
         ),
     ] = None,
     difference: Annotated[
         float,
-        typer.Option(help="True one; without a margin it is to be shown."),
+        typer.Option(help="True difference; without a margin, the one to detect."),
     ] = 0.0,
     participants: Annotated[
-        int | None, typer.Option(help="How many the study has.", min=2)
+        int | None, typer.Option(help="Of the study.", min=2)
     ] = None,
     levels: Annotated[
         int | None, typer.Option(help="Trajectories or objects.", min=1)
     ] = None,
     repeats: Annotated[
-        int | None, typer.Option(help="Of each in each condition.", min=1)
+        int | None, typer.Option(help="Of each level in each condition.", min=1)
     ] = None,
     spread: Annotated[
         float | None,
-        typer.Option(
-            help="Standard deviation of the difference from participant to participant."
-        ),
+        typer.Option(help="Standard deviation of the difference between participants."),
     ] = None,
     level_spread: Annotated[
         float | None,
-        typer.Option(help="From level to level within a participant; with --spread."),
+        typer.Option(help="Between levels within a participant; with --spread."),
     ] = None,
     trial_spread: Annotated[
         float | None,
-        typer.Option(help="Of repeats of one condition; with --spread."),
+        typer.Option(help="Between repeats of one condition; with --spread."),
     ] = None,
     pilot: Annotated[
         Path | None,
-        typer.Option(help="Study whose visits say how much differences spread."),
+        typer.Option(help="Pilot study whose visits give the spread of differences."),
     ] = None,
-    power: Annotated[float, typer.Option(help="That is wanted.")] = 0.8,
-    alpha: Annotated[float, typer.Option(help="Of each one-sided test.")] = 0.05,
+    power: Annotated[float, typer.Option(help="Target power.")] = 0.8,
+    alpha: Annotated[float, typer.Option(help="Level of each one-sided test.")] = 0.05,
     most: Annotated[
-        int, typer.Option(help="Participants to try at most.", min=2, max=5000)
+        int, typer.Option(help="Most participants to try.", min=2, max=5000)
     ] = 500,
     simulations: Annotated[
-        int, typer.Option(help="Studies simulated per number of participants.", min=1)
+        int, typer.Option(help="Simulated studies per number of participants.", min=1)
     ] = 10_000,
     seed: Annotated[
-        int | None, typer.Option(help="Of the simulated studies.", min=0)
+        int | None, typer.Option(help="Seed of the simulated studies.", min=0)
     ] = None,
     figure: Annotated[
         Path | None, typer.Option(help="Power curve to write, .png, .svg or .pdf.")
@@ -95,11 +92,11 @@ def plan(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Say with how many participants a study can answer its question.
+    """Compute the number of participants that a study needs.
 
     Power by simulation: studies are drawn from an assumed spread and tested as the real
     one will be, one mean per participant. The spread is the paper's, a pilot's, or
-    given; it is named with its source, for everything depends on it.
+    given; everything depends on it, so it is printed with its source.
     """
     from ikns.statistics.plan import plan_participants
 
@@ -146,8 +143,8 @@ def plan(
         else f"equivalence within {design.margin:g} {unit}"
     )
     if figure is not None:
-        said = _assumption(assumed.found, design)
-        _draw(figure, made, assumed, aim=aim, target=power, said=said)
+        note = _assumption(assumed.found, design)
+        _draw(figure, made, assumed, aim=aim, target=power, note=note)
     warned = design.warnings + assumed.warnings
     show(
         _result(study, pilot, design, assumed, made)
@@ -167,14 +164,14 @@ def plan(
 
 
 def _assumption(found: AssumedSpread, design: PlannedDesign) -> str:
-    """Say how much the differences are taken to spread, and who says so."""
+    """Return a sentence with the assumed spread of the differences and its source."""
     quantity, unit, over = _VALUE[design.experiment]
     parts = found.spread
-    told = [f"{parts.subject:.3g} {unit} between participants"]
+    deviations = [f"{parts.subject:.3g} {unit} between participants"]
     if parts.level:
-        told.append(f"{parts.level:.3g} between {over} within a participant")
+        deviations.append(f"{parts.level:.3g} between {over} within a participant")
     if parts.trial:
-        told.append(f"{parts.trial:.3g} of repeats of a condition")
+        deviations.append(f"{parts.trial:.3g} of repeats of a condition")
     interval = ""
     if math.isfinite(found.low):
         interval = (
@@ -183,7 +180,7 @@ def _assumption(found: AssumedSpread, design: PlannedDesign) -> str:
         )
     return (
         f"Assumed: differences of {quantity} with standard deviations of "
-        f"{', '.join(told)} ({found.source}{interval})."
+        f"{', '.join(deviations)} ({found.source}{interval})."
     )
 
 
@@ -259,13 +256,7 @@ def _result(
 
 
 def _draw(
-    path: Path,
-    made: SamplingPlan,
-    assumed: PilotSpread,
-    *,
-    aim: str,
-    target: float,
-    said: str,
+    path: Path, made: SamplingPlan, assumed: PilotSpread, *, aim: str, target: float, note: str
 ) -> None:
     from ikns.view.power import power_figure
 
@@ -278,6 +269,6 @@ def _draw(
         simulated=assumed.simulated,
         needed=made.size.subjects,
         declared=None if made.declared is None else made.declared.design.subjects,
-        note=textwrap.fill(said, 105),
+        note=textwrap.fill(note, 105),
     )
     write_picture(path, drawn)

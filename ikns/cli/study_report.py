@@ -1,4 +1,4 @@
-"""``ikns report``: a study's visits as one page, figures and numbers."""
+"""``ikns report``: a study's visits as a page, figures and tables."""
 
 from __future__ import annotations
 
@@ -26,35 +26,35 @@ def report(
         int | None,
         typer.Option(
             min=-1,
-            help="Processes that read visits; -1: one for each core, which many "
-            "visits have by themselves.",
+            help="Processes that read visits; -1: one for each core, the default for "
+            "many visits.",
         ),
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Turn visits into tables, figures, statistics and one page that says it all.
+    """Write tables, figures and statistics of a study's visits, and a page with all.
 
     Everything is computed again from the recorded attempts. People and simulated
-    participants are never mixed; the page says which is which.
+    participants are never pooled; the page says which is which.
     """
     from ikns.experiments.study.summary import summarize
     from ikns.experiments.study.summary.numbers import numbers
     from ikns.view.study_report import report_files, write_study_report
 
     place = study / "report" if out is None else out
-    if study.is_dir():  # else it is the study that is missing, not where to write
+    if study.is_dir():  # otherwise the study is missing, not the output
         check_output_folder(place, report_files(), force=force)
-    with progress() as told:
-        summary = summarize(study, workers=jobs, progress=told)
+    with progress() as on_progress:
+        summary = summarize(study, workers=jobs, progress=on_progress)
         with output_folder(place) as folder:
-            write_study_report(folder, summary, progress=told)
+            write_study_report(folder, summary, progress=on_progress)
     page = place / "report.html"
     result = {"report": page} | numbers(summary)
     parts: list[Any] = []
     for group in result["groups"]:
-        said = "Simulated participants" if group["simulated"] else "Participants"
-        parts += _tables(group, said)
+        who = "Simulated participants" if group["simulated"] else "Participants"
+        parts += _tables(group, who)
         for each in group["answers"]:
             parts += [each["question"], *(f"  {a}" for a in each["answer"]), ""]
     show(
@@ -66,13 +66,13 @@ def report(
     )
 
 
-def _tables(group: dict[str, Any], whose: str) -> list[Any]:
+def _tables(group: dict[str, Any], who: str) -> list[Any]:
     """Short tables for the terminal."""
     made = []
     if group["tracking"] is not None:
         made.append(
             table(
-                f"{whose}: RMSE of tracking, of 100",
+                f"{who}: RMSE of tracking, of 100",
                 {
                     "condition": "s",
                     "trajectory": "s",
@@ -97,7 +97,7 @@ def _tables(group: dict[str, Any], whose: str) -> list[Any]:
     if group["picking"] is not None:
         made.append(
             table(
-                f"{whose}: pick and place",
+                f"{who}: pick and place",
                 {
                     "condition": "s",
                     "object": "s",

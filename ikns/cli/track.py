@@ -54,30 +54,35 @@ def track(
     conditions: Annotated[
         str | None,
         typer.Option(
-            help="ikns, gamepad, keyboard, mouse, or virtual: who plays by itself.",
+            help="ikns, gamepad, keyboard, mouse, or virtual: a simulated operator.",
             show_default="ikns,gamepad",
         ),
     ] = None,
     profiles: Annotated[
-        str | None, typer.Option(help="Curves.", show_default="T1,T2,T3")
+        str | None,
+        typer.Option(help="Reference trajectories.", show_default="T1,T2,T3"),
     ] = None,
     repeats: Annotated[
         int | None,
-        typer.Option(help="Of each curve in each condition.", show_default="3"),
+        typer.Option(
+            help="Repeats of each trajectory in each condition.", show_default="3"
+        ),
     ] = None,
     training: Annotated[
         int | None,
         typer.Option(help="Trials before each condition.", show_default="10"),
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(help="Of a curve.", show_default="25")
+        float | None,
+        typer.Option(help="Duration of a trajectory, s.", show_default="25"),
     ] = None,
     align: Annotated[
-        float | None, typer.Option(help="Seconds before a curve.", show_default="5")
+        float | None,
+        typer.Option(help="Time to align before a trajectory, s.", show_default="5"),
     ] = None,
     rest: Rest = None,
     seed: Annotated[
-        int | None, typer.Option(help="Of the curves.", show_default="0")
+        int | None, typer.Option(help="Seed of the trajectories.", show_default="0")
     ] = None,
     subject: ForIkns = None,
     source: SourceAddress = None,
@@ -88,28 +93,29 @@ def track(
     smooth: Annotated[
         bool,
         typer.Option(
-            "--smooth", help="The pointer shows the smoothed flexion, not c itself."
+            "--smooth", help="The pointer shows the smoothed flexion instead of c."
         ),
     ] = False,
     safe_state: SafeState = "limp",
     stick: Annotated[
         Literal["left", "trigger"],
-        typer.Option(help="Of the gamepad: left stick, up, or right trigger."),
+        typer.Option(help="Gamepad input: left stick, up, or right trigger."),
     ] = "left",
     view: View = True,
     realtime: Realtime = False,
     rate: Annotated[
-        float, typer.Option(help="How often a page's signal is written down, Hz.")
+        float,
+        typer.Option(help="Rate at which a page's control signal is recorded, Hz."),
     ] = 100.0,
     host: Host = "127.0.0.1",
     port: Port = 0,
     browser: Browser = True,
     as_json: AsJson = False,
 ) -> None:
-    """Follow curves with the arm's null space, a gamepad, keyboard or mouse.
+    """Follow trajectories with the arm's null space, a gamepad, keyboard or mouse.
 
     Two pages open: one for the participant, one for the experimenter. Every attempt is
-    on disk when it ends; Ctrl-C breaks off, and the same command goes on.
+    saved when it ends; after Ctrl-C the same command continues the visit.
     """
     from ikns.experiments.conduct import Experiment, TrackingExperiment
     from ikns.experiments.tracking import draw_profile, schedule

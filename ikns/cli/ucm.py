@@ -1,4 +1,4 @@
-"""``ikns ucm``: joint variance that a task does not see, against that which it does."""
+"""``ikns ucm``: joint variance within and outside the null space of a task."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ def ucm(
     subject: SubjectFolder,
     task: Annotated[
         Literal["position", "pose"],
-        typer.Option(help="What the hand keeps: position, or orientation too."),
+        typer.Option(help="What the hand holds: position, or orientation too."),
     ] = "position",
     onset_speed: Annotated[
         float,
         typer.Option(
             min=0.0,
-            help="Hand speed (m/s) between whose first and last crossing a repetition "
-            "lies; with a single recording the hand is still below it.",
+            help="Hand speed, m/s: a repetition lasts from its first to its last "
+            "crossing; in a single recording the hand is still below it.",
         ),
     ] = 0.05,
     surrogates: Annotated[
-        int, typer.Option(min=1, help="How often to shuffle the joints.")
+        int, typer.Option(min=1, help="Number of surrogates.")
     ] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the surrogates.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the surrogates.")] = 0,
     figure: Annotated[
         Path | None, typer.Option(help="Picture to write: .png, .svg or .pdf.")
     ] = None,

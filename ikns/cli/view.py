@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import webbrowser
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,9 @@ from ikns.cli.options import AsJson, Force
 from ikns.cli.output import progress, show, table
 from ikns.errors import InvalidInput
 from ikns.output_file import refuse_overwriting, write_bytes, write_text
+
+if TYPE_CHECKING:
+    from ikns.view.scene import Scene
 
 __all__ = ["view"]
 
@@ -25,12 +28,12 @@ def view(
         typer.Argument(help="Recording to play: .c3d, .trc or Vicon .csv."),
     ] = None,
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("view.html"),
-    png: Annotated[Path | None, typer.Option(help="Picture to write as well.")] = None,
+    png: Annotated[Path | None, typer.Option(help="Picture to write too.")] = None,
     point: Annotated[
         int | None,
         typer.Option(
-            help="PCA point, from 1, at which the arm shows its null space; that with "
-            "the widest range by default."
+            help="PCA point, from 1, at which the arm shows its null space; default: "
+            "the one with the widest range."
         ),
     ] = None,
     open_page: Annotated[
@@ -41,7 +44,7 @@ def view(
 ) -> None:
     """Show PCA points, volume and null space around the body, in one HTML file.
 
-    With a recording the page plays it, beside what the map says.
+    With a recording the page plays it, together with the map.
     """
     from ikns.calibration import track_chain
     from ikns.calibration.simulated import is_simulated
@@ -93,35 +96,41 @@ def view(
     if open_page:
         webbrowser.open(out.resolve().as_uri())
     given = 0 if frames is None else len(frames.time)
-    seconds = float(scene.times[-1]) if len(scene.times) else 0.0
     size = len(page.encode())
-    result = {
-        "subject": subject,
-        "recording": recording,
-        "simulated": simulated,
-        "html": out,
-        "png": png,
-        "points": len(learned.centers_),
-        "frames_of_the_recording": given,
-        "frames_played": len(scene.times),
-        "seconds": seconds,
-        "page_bytes": size,
-        "notes": remarks,
-    }
-    rows = [
-        ["PCA points", f"{len(learned.centers_)}"],
-        ["seconds to play", f"{seconds:.1f}"],
-        ["size of the page, MB", f"{size / 1e6:.1f}"],
-    ]
-    if given > len(scene.times):
-        rows.insert(2, ["frames played", f"{len(scene.times)} of {given}"])
     show(
-        result,
+        {
+            "subject": subject,
+            "recording": recording,
+            "simulated": simulated,
+            "html": out,
+            "png": png,
+            "points": len(learned.centers_),
+            "frames_of_the_recording": given,
+            "frames_played": len(scene.times),
+            "seconds": _seconds(scene),
+            "page_bytes": size,
+            "notes": remarks,
+        },
         table(
             scene.title + (" (simulated)" if simulated else ""),
             {"quantity": "s", "value": "s"},
-            rows,
+            _rows(scene, points=len(learned.centers_), given=given, size=size),
         ),
         f"Wrote {out}" if png is None else f"Wrote {out} and {png}",
         as_json=as_json,
     )
+
+
+def _seconds(scene: Scene) -> float:
+    return float(scene.times[-1]) if len(scene.times) else 0.0
+
+
+def _rows(scene: Scene, *, points: int, given: int, size: int) -> list[list[str]]:
+    rows = [
+        ["PCA points", f"{points}"],
+        ["seconds to play", f"{_seconds(scene):.1f}"],
+        ["size of the page, MB", f"{size / 1e6:.1f}"],
+    ]
+    if given > len(scene.times):
+        rows.insert(2, ["frames played", f"{len(scene.times)} of {given}"])
+    return rows

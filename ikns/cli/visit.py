@@ -81,22 +81,12 @@ def conduct(
             # A source that does not answer is reported before anything is written.
             with open_arm_source(arm, subject):
                 ikns.warm_up()
-        log = VisitLog(
-            identity.folder,
-            {
-                "participant": identity.participant,
-                "simulated": simulated,
-                "study": "" if identity.study is None else identity.study.name,
-                "variation": "",
-                "variation_settings": {},
-                "participant_number": identity.number,
-                "seed": seed,
-                "input": {x: describe_input(x, arm, pages) for x in conditions},
-                "session": _relative(session, identity.folder) if subject else None,
-                "versions": software(),
-            }
-            | dict(about),
-        )
+        common = _about(identity, arm, pages, conditions, simulated=simulated)
+        common |= {
+            "seed": seed,
+            "session": _relative(session, identity.folder) if subject else None,
+        }
+        log = VisitLog(identity.folder, common | dict(about))
         if identity.study is not None:
             from ikns.experiments.study import save_declaration
 
@@ -191,6 +181,29 @@ def _checked(
     return subject, simulated
 
 
+def _about(
+    identity: VisitIdentity,
+    arm: ArmOptions,
+    pages: PageOptions,
+    conditions: Sequence[str],
+    *,
+    simulated: bool,
+) -> dict[str, Any]:
+    """Return the entries of ``visit.json`` that both experiments have."""
+    return {
+        "participant": identity.participant,
+        "simulated": simulated,
+        "study": "" if identity.study is None else identity.study.name,
+        "variation": "",
+        "variation_settings": {},
+        "participant_number": identity.number,
+        "seed": None,
+        "input": {name: describe_input(name, arm, pages) for name in conditions},
+        "session": None,
+        "versions": software(),
+    }
+
+
 def _page_drivers(held: Mapping[str, HeldInput]) -> Drivers:
     """Return the drivers of the conditions that the participant's page provides."""
 
@@ -261,7 +274,7 @@ def _show_attempts(
                 for a in results
             ],
         ),
-        f"{counted(left, 'trial')} left; the same command goes on."
+        f"{counted(left, 'trial')} left; the same command continues."
         if left
         else "All trials are done.",
         f"Wrote {identity.folder}",

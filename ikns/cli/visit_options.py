@@ -25,17 +25,18 @@ __all__ = [
 ]
 
 VisitFolder = Annotated[
-    Path | None, typer.Argument(help="Folder of the visit; one that exists goes on.")
+    Path | None,
+    typer.Argument(help="Folder of the visit; an existing one is continued."),
 ]
 FromStudy = Annotated[
     Path | None,
-    typer.Option(help="Study folder: design and place of the visit are its."),
+    typer.Option(help="Study folder: sets design and folder of the visit."),
 ]
 Participant = Annotated[
     str | None, typer.Option(help="Pseudonym, letters and digits.", show_default="01")
 ]
 Number = Annotated[
-    int | None, typer.Option(help="Participant's number from 0, which sets the order.")
+    int | None, typer.Option(help="Participant's number, from 0; sets the order.")
 ]
 Rest = Annotated[
     float | None, typer.Option(help="Seconds between conditions.", show_default="120")
@@ -53,7 +54,7 @@ SessionFolder = Annotated[
 ]
 SafeState = Annotated[
     Literal["limp", "hold", "open"],
-    typer.Option(help="What the finger does when poses fail to come."),
+    typer.Option(help="State of the finger when poses stop coming."),
 ]
 View = Annotated[
     bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
@@ -62,14 +63,14 @@ Realtime = Annotated[
     bool,
     typer.Option(
         "--realtime",
-        help="For ikns: before other programs, where the system allows it.",
+        help="For ikns: real-time priority for the control loop, if allowed.",
     ),
 ]
 Host = Annotated[
     str,
     typer.Option(
-        help="Address to serve the pages at; any but this machine's own needs the "
-        "token in the address that is printed, and is not encrypted."
+        help="Address to serve the pages at; other than on this machine, they need the "
+        "token in the printed address and are not encrypted."
     ),
 ]
 Port = Annotated[int, typer.Option(help="0 takes a free one.")]

@@ -1,4 +1,4 @@
-"""Shapes that the figures accept, checked once."""
+"""Checks of the arrays that figures take."""
 
 from __future__ import annotations
 

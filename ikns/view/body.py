@@ -1,4 +1,4 @@
-"""A plain body to draw behind data: arms from the skeleton, a trunk for orientation.
+"""A plain body to draw behind data: arms of the skeleton, a trunk for orientation.
 
 All coordinates are meters in the thorax frame: X forward, Y up, Z right.
 """
@@ -18,7 +18,7 @@ __all__ = ["arm_points", "body_surfaces"]
 Array = NDArray[np.float64]
 
 # Girth of the drawing as fractions of the shoulder-to-shoulder distance, read off the
-# shapes of urdf/upper_body.urdf. It is a backdrop: nothing is computed from it.
+# shapes of urdf/upper_body.urdf. Nothing is computed from it.
 _ARM_RADII = (0.115, 0.095, 0.07, 0.05)
 _TRUNK_PROFILE = (  # height under the shoulders, half width, half depth
     (-1.35, 0.44, 0.29),

@@ -1,4 +1,4 @@
-"""Learned against analytic null spaces in one figure: alike, and at what cost."""
+"""Learned against analytic null spaces in one figure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ikns.view.style import (
     INK,
     ORANGE,
     PURPLE,
-    house_style,
+    figure_style,
     new_figure,
 )
 
@@ -27,7 +27,7 @@ __all__ = ["comparison_figure"]
 
 Array = NDArray[np.float64]
 
-#: Told apart by shape and lightness as well as by color.
+#: Distinct in shape and lightness as well as in color.
 _MARKS = ((BLUE, "o"), (ORANGE, "D"), (GREEN, "s"), (PURPLE, "^"))
 
 
@@ -37,12 +37,12 @@ def comparison_figure(
     simulated: bool,
     crosstalk: Crosstalk | None = None,
 ) -> Figure:
-    """Angles, variance, leak and crosstalk, with intervals and what chance would give.
+    """Draw angles, variance, leak and crosstalk, with intervals and chance levels.
 
     Parameters
     ----------
     found : mapping of name to NullSpaceComparison
-        Such as one for each thing that the hand holds, at most four, of one map.
+        Of one map, at most four, such as one for each task of the hand.
     simulated : bool
         Whether the data come from a virtual subject; the title says so.
     crosstalk : Crosstalk, optional
@@ -58,7 +58,7 @@ def comparison_figure(
             f"expected 1 to {len(_MARKS)} comparisons to draw, found {len(found)}."
         )
     most = max(len(each.points) for each in found.values())
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "Learned against analytic null space",
             simulated=simulated,

@@ -30,7 +30,7 @@ from ikns.view.report import (
     Table,
     write_report,
 )
-from ikns.view.style import house_style
+from ikns.view.style import figure_style
 
 __all__ = ["write_demo_report"]
 
@@ -73,7 +73,7 @@ def write_demo_report(path: Path, demo: Demo, summary: Mapping[str, Any]) -> Non
         From :func:`ikns.experiments.demo.demo_summary`.
     """
     figures = _figures(demo, summary)
-    with house_style():
+    with figure_style():
         figures["workspace"].savefig(
             path.with_name("workspace.png"), dpi=_DPI, metadata={"Software": None}
         )

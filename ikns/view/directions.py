@@ -1,4 +1,4 @@
-"""Directions learned at each PCA point, by joint and against the analytic ones."""
+"""Learned directions at each PCA point, by joint and against the analytic ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ikns.view.style import (
     ORANGE,
     PURPLE,
     RED,
-    house_style,
+    figure_style,
     joint_labels,
     new_figure,
 )
@@ -27,7 +27,7 @@ __all__ = ["directions_figure", "principal_angle_figure"]
 Array = NDArray[np.float64]
 
 _COLUMNS = 5
-#: Told apart by shape as well as by color.
+#: Distinct in shape as well as in color.
 _MARKS = ((BLUE, "o"), (ORANGE, "D"), (GREEN, "s"), (PURPLE, "^"), (RED, "v"))
 
 
@@ -38,7 +38,7 @@ def directions_figure(
     simulated: bool,
     analytic: ArrayLike | None = None,
 ) -> Figure:
-    """Components of the null-space direction Z at every PCA point, one bar a joint.
+    """Draw the components of direction Z at every PCA point, one bar per joint.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def directions_figure(
     columns = min(_COLUMNS, n_points)
     rows = -(-len(panels) // columns)
     at = np.arange(n_joints)
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "Direction Z at each PCA point",
             simulated=simulated,
@@ -113,7 +113,7 @@ def principal_angle_figure(
     simulated: bool,
     goal: float | None = None,
 ) -> Figure:
-    """Angle between learned and analytic null space at every PCA point.
+    """Draw the angle between learned and analytic null space at every PCA point.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def principal_angle_figure(
         raise InvalidInput(f"expected angles (P,) of one length, found {sizes}.")
     n_points = next(iter(sizes))[0]
     at = np.arange(1, n_points + 1)
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "Learned against analytic null space",
             simulated=simulated,

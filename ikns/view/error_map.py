@@ -1,4 +1,4 @@
-"""Where in the workspace something is how wrong: slices of the volume from above."""
+"""A map of errors over the workspace: horizontal slices, seen from above."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
-from ikns.view.style import GREY, INK, PAGE_WIDTH, PALE, house_style, new_figure
+from ikns.view.style import GREY, INK, PAGE_WIDTH, PALE, figure_style, new_figure
 
 __all__ = ["Slices", "error_map_figure", "workspace_slices"]
 
@@ -19,7 +19,7 @@ _MARGIN = 0.03  # m around the PCA points
 
 
 class Slices(NamedTuple):
-    """Places to ask at, in horizontal slices through PCA points; m, thorax frame.
+    """Grids of places in horizontal slices through PCA points; m, thorax frame.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Slices(NamedTuple):
 def workspace_slices(
     centers: ArrayLike, *, n: int = 3, spacing: float = 0.01
 ) -> Slices:
-    """Slices that cover PCA points, at equal distances between lowest and highest.
+    """Return slices that cover PCA points, evenly spaced from lowest to highest.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def workspace_slices(
     n : int
         How many slices.
     spacing : float
-        Of the places within a slice, m.
+        Of the grid within a slice, m.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def workspace_slices(
             f"{spacing:g}."
         )
     low, high = points.min(axis=0), points.max(axis=0)
-    # At the very ends a volume has no width.
+    # At its ends the volume has no width.
     height = low[1] + (high[1] - low[1]) * np.arange(1, n + 1) / (n + 1)
     forward, right = (
         np.arange(low[k] - _MARGIN, high[k] + _MARGIN + spacing / 2, spacing)
@@ -99,16 +99,16 @@ def error_map_figure(
     slices : Slices
         As from :func:`workspace_slices`.
     errors : (S, A, B) array
-        Not negative, at ``slices.places``; NaN (outside the volume, say) stays white.
+        Not negative, at ``slices.places``; NaN, such as outside the volume, is white.
     centers : (P, 3) array
         PCA points, m; each is drawn in the slice nearest to it, numbered from 1.
     label : str
-        Of the color bar: what is wrong, with its unit in parentheses.
+        Of the color bar: the error, with its unit in parentheses.
     simulated : bool
         Whether the data come from a virtual subject; the title says so.
     title : str
     highest : float, optional
-        End of the color scale; larger errors have its color. Default: the largest.
+        End of the color scale, also for larger errors. Default: the largest.
 
     Returns
     -------
@@ -126,10 +126,10 @@ def error_map_figure(
     known = wrong[np.isfinite(wrong)]
     most = float(known.max(initial=0.0)) if highest is None else highest
     of_point = np.abs(points[:, 1:2] - slices.height).argmin(axis=1)
-    # Panels share the width beside the color bar, at one scale on both axes.
+    # Panels share the width next to the color bar, at one scale on both axes.
     deep = float(np.ptp(slices.forward) / max(np.ptp(slices.right), 1e-9))
     width = (PAGE_WIDTH - 1.8) / len(slices.height)
-    with house_style():
+    with figure_style():
         figure = new_figure(
             title, simulated=simulated, height=1.5 + min(deep * width, 6.0)
         )
@@ -141,7 +141,7 @@ def error_map_figure(
                 slices.right,
                 slices.forward,
                 wrong[k],
-                # Even in lightness, and so the same in grey and to any eye.
+                # Even in lightness: readable in grey and with any color vision.
                 cmap="cividis_r",
                 vmin=0.0,
                 vmax=most or 1.0,
@@ -162,7 +162,7 @@ def error_map_figure(
 
 
 def _where(height: float) -> str:
-    """Name a height, m.
+    """Describe a height, m, relative to the notch (the origin of the thorax).
 
     >>> _where(-0.214), _where(0.05)
     ('21 cm under the notch', '5 cm over the notch')

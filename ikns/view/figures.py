@@ -1,7 +1,7 @@
 """Every figure of the package: plain SI arrays in, a matplotlib Figure out.
 
-No figure touches pyplot or asks for a screen. Each takes ``simulated`` and says in its
-title when the data come from a virtual subject.
+No figure uses pyplot or needs a screen. Each takes ``simulated`` and says in its title
+when the data come from a virtual subject.
 """
 
 from ikns.view.body import arm_points

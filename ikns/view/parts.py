@@ -36,7 +36,7 @@ Cell = str | int | float | bool | None
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure, what to look at in it, and what it shows to those who do not see it."""
+    """A figure with its caption and its alternative text."""
 
     figure: Figure
     caption: str
@@ -64,7 +64,7 @@ class Section:
 
 @dataclass(frozen=True)
 class KeyNumber:
-    """A result: its name, its value with unit, and what it means in plain words."""
+    """A result: its name, its value with unit, and its meaning in plain words."""
 
     name: str
     value: str
@@ -80,7 +80,7 @@ class NextStep:
 
 
 class ReportPage:
-    """Sets parts as HTML and numbers figures and tables while the page grows.
+    """Turns parts into HTML and numbers figures and tables in their order.
 
     Parameters
     ----------
@@ -111,14 +111,14 @@ class ReportPage:
         share = min(100.0, 100 * picture.figure.get_figwidth() / PAGE_WIDTH)
         return (
             f'<figure><img src="{data_uri(picture.figure)}" '
-            # Text has one size in all pictures: a narrow figure stays narrow.
+            # Text has one size in all pictures, so a narrow figure stays narrow.
             f'style="width: {share:.0f}%" alt="{escape(picture.alt)}">\n'
             f"<figcaption><b>Figure {self.figures}.</b> {inline(picture.caption)}"
             f"{self.suffix}</figcaption></figure>"
         )
 
     def table(self, table: Table) -> str:
-        """Table with columns of numbers set right."""
+        """Table whose columns of numbers are aligned right."""
         for row in table.rows:
             if len(row) != len(table.columns):
                 raise InvalidInput(
@@ -194,7 +194,7 @@ def steps_html(steps: Sequence[NextStep]) -> str:
 
 
 def inline(text: str) -> str:
-    """Plain text as HTML; `backticks` set code.
+    """Return plain text as HTML; `backticks` set code.
 
     >>> inline("`a < b`")
     '<code>a &lt; b</code>'
@@ -218,7 +218,7 @@ def _cell(value: Cell, decimals: int) -> str:
 
 
 def _decimals(cells: Sequence[Cell]) -> int:
-    """Decimals that give the largest number of a column three digits."""
+    """Return the decimals with which the largest number has three digits."""
     sizes = [abs(c) for c in cells if isinstance(c, float) and math.isfinite(c) and c]
     return min(6, max(0, 2 - math.floor(math.log10(max(sizes))))) if sizes else 0
 

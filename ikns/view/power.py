@@ -1,4 +1,4 @@
-"""How likely a planned study is to reach its aim, by number of participants."""
+"""Power of a planned study by number of participants."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ikns.errors import InvalidInput
 from ikns.view.arrays import same_length, series
-from ikns.view.style import BLUE, INK, ORANGE, house_style, new_figure
+from ikns.view.style import BLUE, INK, ORANGE, figure_style, new_figure
 
 __all__ = ["power_figure"]
 
@@ -36,17 +36,17 @@ def power_figure(
     interval : (2, n) array
         Its Monte Carlo interval, low and high.
     aim : str
-        What a study is to show, such as "equivalence within 1".
+        Aim of a study, such as "equivalence within 1".
     target : float
-        Power that is wanted, 0 to 1; drawn as a line.
+        Target power, 0 to 1; drawn as a line.
     simulated : bool
         Whether the assumed spread comes from virtual subjects; the title says so.
     needed : int, optional
-        Fewest participants that reach it.
+        Fewest participants that reach the target.
     declared : int, optional
-        That the study has.
+        Participants that the study declares.
     note : str
-        Where the assumed spread is from; below the axis.
+        Source of the assumed spread; printed below the axis.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def power_figure(
         )
     if not ((both >= 0) & (both <= 1)).all() or not ((share >= 0) & (share <= 1)).all():
         raise InvalidInput("expected power of 0 to 1, found a value outside.")
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "Power of the study that is planned, by simulation",
             simulated=simulated,

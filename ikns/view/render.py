@@ -1,4 +1,4 @@
-"""A figure as bytes: the same figure always gives the same bytes."""
+"""A figure as bytes; the same figure always gives the same bytes."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import warnings
 import numpy as np
 from matplotlib.figure import Figure
 
-from ikns.view.style import house_style
+from ikns.view.style import figure_style
 
 __all__ = ["data_uri", "pdf", "png", "svg"]
 
 #: Dots per inch of a PNG: about two per pixel of a page 900 pixels wide.
 _DPI = 170
-#: Points in one figure above which an SVG (60 bytes each) outgrows the PNG.
+#: Points of a figure above which an SVG (60 bytes each) is larger than the PNG.
 _MOST_POINTS = 3000
 
 
@@ -35,7 +35,7 @@ def pdf(figure: Figure) -> bytes:
 
 
 def data_uri(figure: Figure) -> str:
-    """Picture for ``<img src>``: an SVG, or a PNG where that is smaller.
+    """Return the picture for ``<img src>``: an SVG, or a PNG where that is smaller.
 
     >>> data_uri(Figure(figsize=(1, 1)))[:26]
     'data:image/svg+xml;base64,'
@@ -50,16 +50,16 @@ def data_uri(figure: Figure) -> str:
 def _is_crowded(figure: Figure) -> bool:
     lines = [line for axes in figure.axes for line in axes.lines]
     points = sum(np.size(line.get_xdata()) for line in lines)
-    # Surfaces and clouds of points are what 3-D axes are used for.
+    # 3-D axes are used for surfaces and clouds of points.
     return points > _MOST_POINTS or any(axes.name == "3d" for axes in figure.axes)
 
 
 def _saved(figure: Figure, kind: str) -> bytes:
     stream = io.BytesIO()
-    # Without these, the bytes hold the time of day or matplotlib's version.
+    # Otherwise the bytes would hold the date or matplotlib's version.
     dated = {"svg": "Date", "png": "Software", "pdf": "CreationDate"}[kind]
-    with house_style(), warnings.catch_warnings():
-        # A label in a script that the font lacks shows boxes; the page still stands.
+    with figure_style(), warnings.catch_warnings():
+        # A label in a script that the font lacks shows boxes.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
         figure.savefig(stream, format=kind, dpi=_DPI, metadata={dated: None})
     return stream.getvalue()

@@ -1,4 +1,4 @@
-"""A report: one HTML file that holds its pictures, loads nothing and prints well."""
+"""A report: one HTML file that contains its pictures and loads nothing."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def write_report(
     key_numbers: Sequence[KeyNumber] = (),
     next_steps: Sequence[NextStep] = (),
 ) -> None:
-    """Write a report; an earlier file stays as it was until the new one is complete.
+    """Write a report; an earlier file is kept until the new one is complete.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ def write_report(
     title : str
         Heading of the page.
     sections : sequence of Section
-        Body of the report, in order.
+        In order.
     simulated : bool
         Whether the data come from a virtual subject; the header, every caption and
         every table then say so.
     lead : str
-        One paragraph under the title: the outcome.
+        Paragraph under the title: the outcome.
     facts : mapping, optional
         Subject and provenance for the header: side, chain, seed, versions.
     key_numbers : sequence of KeyNumber
@@ -84,7 +84,7 @@ def write_report(
     )
     target = Path(path)
     try:
-        # A file name may hold bytes that are no text; they become question marks.
+        # File names may hold bytes that are not text; they become question marks.
         write_bytes(target, page.encode("utf-8", errors="replace"))
     except OSError as error:
         raise FileError(f"{target}: cannot be written: {error.strerror}.") from None

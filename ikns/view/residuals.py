@@ -1,4 +1,4 @@
-"""How well the model's markers lie where the cameras saw them."""
+"""Distance between the markers of the model and those that were seen."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 from ikns.view.arrays import same_length, series
-from ikns.view.style import BLUE, GREY, PALE, RED, house_style, new_figure
+from ikns.view.style import BLUE, GREY, PALE, RED, figure_style, new_figure
 
 __all__ = ["residual_figure"]
 
@@ -27,7 +27,7 @@ def residual_figure(
     marker_labels: Sequence[str] = (),
     segments: Sequence[str] = (),
 ) -> Figure:
-    """Distance between seen and modeled markers, over time and by marker.
+    """Draw the distance between seen and modeled markers, over time and by marker.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def residual_figure(
             f"found {len(marker_labels)} and {len(segments)}."
         )
     tall = 0 if rms is None else 0.14 * len(rms)
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "Distance between seen and modeled markers",
             simulated=simulated,

@@ -1,4 +1,4 @@
-"""The control signal: against the true swivel, and over time."""
+"""The control signal against the true swivel, and over time."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from ikns.view.arrays import same_length, series
-from ikns.view.style import BLUE, GREY, INK, house_style, new_figure, point_color
+from ikns.view.style import BLUE, GREY, INK, figure_style, new_figure, point_color
 
 __all__ = ["control_figure", "swivel_figure"]
 
 Array = NDArray[np.float64]
 
 _COLUMNS = 5
-#: The axis of c never reaches farther than this: outside the volume c has no bound.
+#: Widest axis of c: outside the volume c has no bound.
 _FARTHEST_C = (-1.5, 2.5)
 
 
@@ -28,7 +28,7 @@ def swivel_figure(
     *,
     simulated: bool,
 ) -> Figure:
-    """Control signal against the elbow's true swivel, one panel per PCA point.
+    """Draw c against the elbow's true swivel, one panel per PCA point.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def swivel_figure(
     r = series(correlations, "correlations")
     columns = min(_COLUMNS, max(1, len(r)))
     rows = max(1, -(-len(r) // columns))
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "Control signal against the true elbow swivel",
             simulated=simulated,
@@ -95,7 +95,7 @@ def control_figure(
     simulated: bool,
     gate: float | None = None,
 ) -> Figure:
-    """Control signal and hand speed over time, shaded where the hand left the volume.
+    """Draw c and hand speed over time, shaded where the hand is outside the volume.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def control_figure(
     signals = signal[:, None] if signal.ndim == 1 else signal
     within = np.asarray(inside, dtype=bool)
     same_length(time=t, control_signal=signals, hand_speed=speed, inside=within)
-    with house_style():
+    with figure_style():
         figure = new_figure("Control signal over time", simulated=simulated, height=3.9)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.7, 1])
         for axes in (upper, lower):
@@ -152,7 +152,7 @@ def _shade(axes: Any, time: Array, where: NDArray[np.bool_]) -> None:
     if not edges.size:
         return
     start, stop = time[np.minimum(edges, len(time) - 1).reshape(-1, 2)].T
-    # One artist for all: a hand that trembles at the border makes thousands.
+    # One artist for all: a trembling hand at the border makes thousands of intervals.
     axes.broken_barh(
         np.stack([start, stop - start], axis=1),
         (0, 1),
@@ -164,7 +164,7 @@ def _shade(axes: Any, time: Array, where: NDArray[np.bool_]) -> None:
 
 
 def _bound_c(axes: Any, signals: Array) -> None:
-    """Show all of c, but not far beyond its range, and say what is cut off."""
+    """Limit the axis of c and say how many values lie beyond it."""
     finite = signals[np.isfinite(signals)]
     low = max(_FARTHEST_C[0], float(np.min(finite, initial=0.0)) - 0.1)
     high = min(_FARTHEST_C[1], float(np.max(finite, initial=1.0)) + 0.1)

@@ -20,20 +20,20 @@ __all__ = [
     "PALE",
     "RED",
     "VOLUME",
-    "house_style",
+    "figure_style",
     "joint_labels",
     "new_figure",
     "point_color",
 ]
 
-# Okabe and Ito, "Color Universal Design" (2008): told apart with any color vision.
+# Okabe and Ito, "Color Universal Design" (2008): distinct with any color vision.
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 BLUE, RED, PURPLE, YELLOW = "#0072B2", "#D55E00", "#CC79A7", "#F0E442"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#E4E4E4"
 #: The paper shows the interpolation volume in light red; it is drawn translucent.
 VOLUME = "#CC2233"
 
-#: Neighbors in this order differ in lightness as well as in hue.
+#: Neighbors differ in lightness as well as in hue.
 _CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, YELLOW)
 
 #: Width of a full figure, inches; 100 pixels of the report's page each.
@@ -41,7 +41,7 @@ PAGE_WIDTH = 9.0
 
 _STYLE = {
     "font.family": "sans-serif",
-    # Comes with matplotlib, so every machine draws the same picture.
+    # Ships with matplotlib, so every machine draws the same picture.
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.5,
     "axes.titlesize": 8.5,
@@ -63,10 +63,10 @@ _STYLE = {
     "legend.fontsize": 8.5,
     "lines.linewidth": 1.1,
     "svg.fonttype": "path",
-    # Ids inside an SVG are random without it.
+    # Otherwise the ids in an SVG are random.
     "svg.hashsalt": "ikns",
     "text.color": INK,
-    # A label with dollar signs is a label, not a formula.
+    # Dollar signs in a label do not start a formula.
     "text.parse_math": False,
     "xtick.color": GREY,
     "xtick.labelcolor": INK,
@@ -78,8 +78,8 @@ _STYLE = {
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
-    """Draw in our style whatever the user's own matplotlib settings are."""
+def figure_style() -> Iterator[None]:
+    """Draw in this style, whatever the user's matplotlib settings are."""
     with matplotlib.style.context(["default", _STYLE]):
         yield
 
@@ -107,7 +107,7 @@ def new_figure(
 
 
 def point_color(point: int) -> tuple[float, float, float]:
-    """Color of a PCA point; past the seventh the hues return darker.
+    """Return the color of a PCA point; after the seventh the hues repeat darker.
 
     >>> point_color(0) == point_color(7)
     False
@@ -118,7 +118,7 @@ def point_color(point: int) -> tuple[float, float, float]:
 
 
 def joint_labels(joint_names: Sequence[str]) -> list[str]:
-    """Joint names for reading, in the given order, without a side they all share.
+    """Return joint names as text, without the side if all share it.
 
     >>> joint_labels(["right_elbow_flexion", "right_wrist_flexion"])
     ['elbow flexion', 'wrist flexion']

@@ -1,4 +1,4 @@
-"""Joint variance that the task sees and does not see, over a movement or by point."""
+"""Joint variance within and outside the null space, over a movement or by point."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 from ikns.view.arrays import same_length, series
-from ikns.view.style import BLUE, GREY, INK, ORANGE, house_style, new_figure
+from ikns.view.style import BLUE, GREY, INK, ORANGE, figure_style, new_figure
 
 __all__ = ["variance_split_figure"]
 
@@ -31,12 +31,12 @@ def variance_split_figure(
     surrogates: ArrayLike | None = None,
     no_structure: float | None = None,
 ) -> Figure:
-    """V_UCM and V_ORT, and below them dVz beside that of surrogates.
+    """Draw V_UCM and V_ORT, and below them dVz with that of surrogates.
 
     Parameters
     ----------
     at : (T,) array
-        Where: normalized time, %, or numbers of PCA points.
+        Normalized time, %, or numbers of PCA points.
     v_ucm, v_ort : (T,) array
         Variance per degree of freedom, rad^2; NaN leaves a gap.
     delta_vz : (T,) array
@@ -62,7 +62,7 @@ def variance_split_figure(
     ucm, ort = series(v_ucm, "v_ucm"), series(v_ort, "v_ort")
     same_length(at=x, v_ucm=ucm, v_ort=ort, delta_vz=z)
     ranges = [_range(given, len(x)) for given in (interval, surrogates)]
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "Joint variance along and across the uncontrolled manifold",
             simulated=simulated,
@@ -70,7 +70,7 @@ def variance_split_figure(
             width=7.5,
         )
         upper, lower = figure.subplots(2, 1, sharex=True)
-        # Told apart by dash and mark as well as by color.
+        # Distinct in dash and mark as well as in color.
         _draw(upper, over, x, _square_degrees(ucm), BLUE, "V_UCM: unseen by the task")
         _draw(
             upper,

@@ -1,4 +1,4 @@
-"""The paper's figure: where the hand went, and where the null space was learned."""
+"""The paper's figure: path of the hand, and where the null space was learned."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ikns.view.style import (
     GREY,
     INK,
     VOLUME,
-    house_style,
+    figure_style,
     new_figure,
     point_color,
 )
@@ -43,7 +43,7 @@ def workspace_figure(
     facets: ArrayLike | None = None,
     arms: ArrayLike | None = None,
 ) -> Figure:
-    """Hand trajectory beside the clusters and the interpolation volume.
+    """Draw the path of the hand, and the clusters and the interpolation volume.
 
     Parameters
     ----------
@@ -76,13 +76,13 @@ def workspace_figure(
         )
     body = [] if arms is None else body_surfaces(arms)
     rightwards = bool(np.mean(point[:, 2]) >= 0)
-    with house_style():
+    with figure_style():
         figure = new_figure(
             "Hand in the thorax frame, and where the null space was learned",
             simulated=simulated,
             height=5.0,
         )
-        # Three-dimensional axes do not tell the layout engine how large they are.
+        # The layout engine does not know the size of 3-D axes.
         figure.set_layout_engine("none")
         left: Any = figure.add_axes((0.0, 0.06, 0.48, 0.85), projection="3d")
         right: Any = figure.add_axes((0.5, 0.06, 0.48, 0.85), projection="3d")
@@ -176,7 +176,7 @@ def _draw_points(axes: Any, centers: Array) -> None:
         zorder=8,
         label="PCA point",
     )
-    # The numbers stand outside the volume, so that no sample is hidden.
+    # Numbers are outside the volume, so that no sample is hidden.
     outward = centers - centers.mean(axis=0)
     length = np.linalg.norm(outward, axis=1, keepdims=True)
     outward = np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
@@ -216,7 +216,7 @@ def _frame(axes: Any, drawn: list[Array], *, rightwards: bool, tick: float) -> N
     axes.tick_params(pad=-1)
     axes.set_box_aspect(high - low, zoom=_zoom(high - low))
     axes.set_proj_type("ortho")
-    # Otherwise matplotlib puts whole artists in front of each other by their mean.
+    # Otherwise matplotlib orders whole artists by their mean depth.
     axes.computed_zorder = False
     # From the front, on the side of the hand that moves.
     axes.view_init(elev=_ELEVATION, azim=_AZIMUTH if rightwards else 180 - _AZIMUTH)
@@ -226,13 +226,13 @@ def _frame(axes: Any, drawn: list[Array], *, rightwards: bool, tick: float) -> N
 
 
 def _zoom(size: Array) -> float:
-    """Shrink long and tall boxes, which matplotlib scales by their diagonal alone."""
+    """Shrink long and tall boxes: matplotlib scales by the diagonal alone."""
     turn, tilt = np.deg2rad([_AZIMUTH, _ELEVATION])
     right, forward, up = size / np.linalg.norm(size)
     width = right * np.sin(turn) + forward * np.cos(turn)
     depth = right * np.cos(turn) + forward * np.sin(turn)
     height = up * np.cos(tilt) + depth * np.sin(tilt)
-    # What fits into the panels with tick labels, found by looking.
+    # Found by trial to fit the panels with their tick labels.
     return float(min(1.0, 0.85 / width, 0.8 / height))
 
 

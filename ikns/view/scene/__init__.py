@@ -1,9 +1,9 @@
 """The 3-D view: a scene as plain data, and what shows it.
 
 :func:`map_scene` and :func:`recording_scene` make a :class:`Scene`,
-:func:`with_finger` puts a finger on a forearm of it;
-:func:`scene_html` turns it into a page that stands alone, :func:`scene_picture` into a
-PNG, and :class:`LiveView` shows it in the browser while it moves.
+:func:`with_finger` adds a finger to a forearm. :func:`scene_html` turns a scene into a
+self-contained page, :func:`scene_picture` into a PNG, and :class:`LiveView` shows it in
+the browser while it moves.
 """
 
 from ikns.view.scene.finger import with_finger

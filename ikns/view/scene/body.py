@@ -30,9 +30,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Light enough for data to stand out on it; the arms that carry the task are darker.
+#: Light, so that data are visible on it; the arms of the task are darker.
 _BODY, _ARM, _MARKER = "#D9DCE2", "#9FA9B8", "#4A4F57"
-_MARKER_RADIUS = 0.006  # m, a little less than the usual 14 mm ball
+_MARKER_RADIUS = 0.006  # m, slightly less than that of the usual 14 mm marker
 
 
 def drawn_links(skeleton: Skeleton) -> list[str]:

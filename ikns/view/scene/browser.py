@@ -22,7 +22,7 @@ _NAMES = (
     "google-chrome-stable",
     "chrome",
 )
-#: WebGL in software, and no calls to anybody.
+#: WebGL in software, and no network access of its own.
 _OPTIONS = (
     "--headless",
     "--hide-scrollbars",
@@ -65,7 +65,7 @@ def find_browser(environ: Mapping[str, str] | None = None) -> str | None:
 
 def browser_options() -> list[str]:
     """Options with which a browser draws 3-D on a machine without a screen."""
-    # Chromium refuses its sandbox to root. The page is ours and loads nothing.
+    # Chromium has no sandbox for root. The page is ours and loads nothing.
     root = hasattr(os, "geteuid") and os.geteuid() == 0
     return [*_OPTIONS, *(["--no-sandbox"] if root else [])]
 
@@ -98,7 +98,7 @@ def screenshot(
             f"--user-data-dir={place / 'profile'}",
             f"--window-size={width},{height}",
             f"--force-device-scale-factor={scale:g}",
-            # Time in the page runs on until it has drawn, however slow the machine is.
+            # Virtual time gives a slow machine enough time to draw.
             "--virtual-time-budget=4000",
             f"--screenshot={picture}",
             (place / "page.html").as_uri() + "#picture",

@@ -1,11 +1,11 @@
-"""MeshCat's drawing commands as plain data: what to draw, before anything draws it.
+"""MeshCat's drawing commands as plain data, independent of what draws them.
 
 MeshCat (https://github.com/meshcat-dev/meshcat) keeps a tree of named nodes and takes
 commands as dicts. Ours hold NumPy arrays where there are many numbers; the same list
 feeds a static page, a live view and a plain drawing.
 
 Everything is in meters in the thorax frame (X forward, Y up, Z right), under the node
-``/ikns`` whose transform stands it upright in MeshCat's world, where Z is up.
+``/ikns`` whose transform sets it upright in MeshCat's world, where Z is up.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 __all__ = [
     "ROOT",
     "Command",
-    "Look",
     "line_mesh",
     "object_command",
     "pose_matrix",
@@ -33,14 +32,12 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Command = dict[str, Any]
-#: A material without its color, see :func:`object_command`.
-Look = dict[str, Any]
 
 ROOT = "/ikns"
-#: Sides of a tube that stands for a line (lines themselves are one pixel wide).
+#: Sides of a tube that is drawn for a line (WebGL lines are one pixel wide).
 _SIDES = 6
-#: One light from the front right above, where one looks from, and weak ones around; in
-#: MeshCat's world (forward, left, up).
+#: One light from the viewer (front, right, above) and weak ones around it, in MeshCat's
+#: world (forward, left, up).
 _LIGHTS: tuple[tuple[str, str, Any], ...] = (
     ("AmbientLight", "intensity", 0.62),
     ("FillLight", "intensity", 0.15),
@@ -53,7 +50,7 @@ _NOT_EQUAL, _REPLACE = 517, 7681  # THREE.NotEqualStencilFunc, THREE.ReplaceSten
 
 
 def root_commands() -> list[Command]:
-    """Empty the scene and stand the thorax upright: no grid, no axes, soft light."""
+    """Empty the scene and set the thorax upright: no grid, no axes, soft light."""
     upright = np.eye(4)
     upright[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
     return [
@@ -103,12 +100,12 @@ def object_command(
     opacity : float
         Below 1 it is translucent.
     layer : int
-        Translucent things are drawn in this order. Those with one number above 0 are
-        drawn as one body: where two overlap, only one shows.
+        Translucent objects are drawn in this order. Those that share a number above 0
+        are drawn as one body: where two overlap, only one is visible.
     shiny : bool
-        Whether light plays on it.
+        Whether it is shaded and reflects light.
     on_top : bool
-        Whether it is seen through whatever stands before it.
+        Whether it is visible through objects in front of it.
     """
     material: dict[str, Any] = {
         "uuid": f"{path}:material",
@@ -167,7 +164,7 @@ def _object(
     materials: Sequence[dict[str, Any]],
     **more: Any,
 ) -> Command:
-    # Names made from the path, so that the same scene is always the same text.
+    # Ids from the path, so that the same scene always gives the same text.
     named = [{"uuid": f"{path}:geometry", **geometry} for geometry in geometries]
     body = {"uuid": f"{path}:object", "type": kind, "material": materials[0]["uuid"]}
     if named:

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from ikns.view.scene.commands import ROOT, Command
 from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
-from ikns.view.style import GREY, INK, house_style
+from ikns.view.style import GREY, INK, figure_style
 
-__all__ = ["drawn_nodes", "scene_drawing"]
+__all__ = ["visible_nodes", "scene_drawing"]
 
 Array = NDArray[np.float64]
 
@@ -31,8 +31,8 @@ _DPI = 100
 _AROUND = 20  # facets around a cylinder or a sphere
 
 
-def drawn_nodes(scene: Scene) -> list[tuple[str, Array, Command]]:
-    """Return what the scene shows at its start: path, pose in the thorax, object.
+def visible_nodes(scene: Scene) -> list[tuple[str, Array, Command]]:
+    """Return what a scene shows at its start: path, pose in the thorax frame, object.
 
     The pose is (4, 4); nodes that are hidden, by themselves or above, are left out.
     """
@@ -66,11 +66,11 @@ def drawn_nodes(scene: Scene) -> list[tuple[str, Array, Command]]:
 
 def scene_drawing(scene: Scene, *, width: int, height: int) -> bytes:
     """Picture of a scene at its start as PNG, `width` times `height` pixels."""
-    with house_style():
+    with figure_style():
         figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
         axes: Any = figure.add_axes((0, 0, 1, 1), projection="3d")
         triangles, colors = [], []
-        for _, pose, drawn in drawn_nodes(scene):
+        for _, pose, drawn in visible_nodes(scene):
             if drawn["object"]["type"] == "Sprite":
                 place = pose[:3, 3][_TO_DRAWING]
                 text = drawn["textures"][0]["text"]
@@ -119,7 +119,7 @@ def _look(axes: Any, scene: Scene) -> None:
 
 
 def _shaded(triangles: Array, material: Command, towards: Array) -> Array:
-    """Color (F, 4) of triangles (F, 3, 3): lit from where one looks, and from above."""
+    """Color (F, 4) of triangles (F, 3, 3): lit from the viewer and from above."""
     color = np.array(to_rgb(f"#{material['color']:06x}"))
     light = towards / np.linalg.norm(towards) + [0.0, 0.6, 0.0]
     light /= np.linalg.norm(light)

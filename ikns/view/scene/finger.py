@@ -1,8 +1,8 @@
 """The simulated finger of ``urdf/finger.urdf`` on the forearm, as commands.
 
 Its base is at the wrist, on the side of the palm, and as high above it as the closed
-finger reaches down; the straight finger runs along the hand. Nobody has measured how a
-finger is worn, so the place is an assumption.
+finger reaches down; the straight finger runs along the hand. This place is an
+assumption: where people wear the finger was not measured.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def with_finger(scene: Scene, skeleton: Skeleton, side: str) -> Scene:
             object_command(node, shape.geometry, color),
             transform_command(node, shape.in_link),
         ]
-    # What holds it is not part of the URDF: a post, so that it does not float.
+    # The mount is not part of the URDF; a post stands in, so that it does not float.
     post = {"type": "BoxGeometry", "width": _POST, "height": WIDEST, "depth": _POST}
     foot = pose_matrix(np.eye(3), np.array([-_POST, -WIDEST / 2, 0.0]))
     commands += [
@@ -127,7 +127,7 @@ def _read(joint: ET.Element, tag: str, key: str) -> str:
 
 
 def _paths(base: str) -> dict[str, str]:
-    """Node of every link: each module hangs from the one that carries it."""
+    """Return the node of every link: each module is a child of the one before."""
     names = [name for name, _, _ in _joints()]
     modules = {name: "/".join([base, *names[: k + 1]]) for k, name in enumerate(names)}
     return {"finger_base": base} | modules

@@ -1,4 +1,4 @@
-"""The live view of a person whose live loop never waits for it."""
+"""The live 3-D view of a person; the control loop never waits for it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def body_view(
 ) -> Iterator[tuple[LiveView, Callable[[LoopStatus], None]]]:
     """Serve the 3-D view of a subject with a finger.
 
-    Statuses are drawn by a thread of its own, the newest only.
+    A thread of its own draws the newest status and skips the others.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def body_view(
     view : LiveView
         On this machine only.
     take : callable
-        Shows a status; it does not wait.
+        Shows a status; returns at once.
     """
     scene = map_scene(
         subject.skeleton,

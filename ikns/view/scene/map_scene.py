@@ -1,4 +1,4 @@
-"""The scene of a map: what the arm can do at one PCA point, among all of them."""
+"""The scene of a map: its PCA points, and the self-motion of the arm at one."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.self_motion import posture_at_point, visited_posture
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, property_command, root_commands
 from ikns.view.scene.places import point_commands, volume_commands
 from ikns.view.scene.playback import animation_command
-from ikns.view.scene.postures import posture_at_point, visited_posture
 from ikns.view.scene.scene import Layer, Scene, camera_and_target
 from ikns.view.scene.swivel import Swivel, swivel_commands, swivel_tracks
 from ikns.view.style import INK, VOLUME, point_color
 
 __all__ = ["chosen_point", "hidden", "map_commands", "map_layers", "map_scene"]
 
-#: Legend of things in many colors.
+#: Legend entry of objects in many colors.
 _MANY = "conic-gradient({} 33%, {} 0 67%, {} 0)".format(
     *(to_hex(point_color(k)) for k in range(3))
 )
@@ -40,8 +40,8 @@ def map_scene(
 ) -> Scene:
     """Scene of a map: body, PCA points, volume, ghosts along Z, sweep of the elbow.
 
-    The body plays the sweep: its hand is held while c goes from 0 to 1 and back; one
-    ghost goes along Z with the same c.
+    The body plays the sweep: the hand is held while c goes from 0 to 1 and back. One
+    ghost moves along Z with the same c.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ def map_scene(
         Whether the map comes from a virtual subject; the page says so.
     title : str
     point : int, optional
-        Row of ``learned.centers_`` where the body stands. Default: the point with the
-        widest range.
+        Row of ``learned.centers_`` at which the body is drawn. Default: the point with
+        the widest range.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def map_scene(
         f"{'Arms' if two else 'Arm'} at PCA point {chosen + 1} with the "
         f"{'hands' if two else 'hand'} held: the Jacobian's self-motion "
         "(body) beside the learned direction Z (ghosts)."
-        # A subject folder keeps where the hand was, but not how the arm stood.
+        # A subject folder holds hand positions, but no postures.
         + ("" if visited is not None else " The posture is assumed."),
         simulated,
         commands + hidden(layers),
@@ -121,7 +121,7 @@ def map_commands(learned: NullSpaceMap) -> list[Command]:
 def map_layers(
     skeleton: Skeleton, learned: NullSpaceMap, point: int, *, playing: bool = False
 ) -> list[Layer]:
-    """Name what of a map can be switched; `playing` hides what is at one point."""
+    """Return the layers of a map; `playing` hides those at one point."""
     links = dict.fromkeys(m.link for m in skeleton.marker_set.markers)
     worn = tuple(f"{ROOT}/body/{link}/markers" for link in links)
     ghost = to_hex(point_color(point))
@@ -138,7 +138,7 @@ def map_layers(
 
 
 def hidden(layers: Sequence[Layer]) -> list[Command]:
-    """Hide what is not shown at first."""
+    """Hide the layers that are not shown at first."""
     return [
         property_command(path, "visible", False)
         for layer in layers

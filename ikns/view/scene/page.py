@@ -21,7 +21,7 @@ from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
 
 __all__ = ["packed_json", "scene_html"]
 
-#: Arrays up to this many numbers are written as such.
+#: Arrays up to this size are written as numbers.
 _SHORT = 16
 _KINDS = {"f": ("<f4", "f4"), "u": ("<u4", "u4"), "i": ("<u4", "u4")}
 
@@ -33,7 +33,7 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
     ----------
     scene : Scene
     live : str, optional
-        Address on the same server from which poses come
+        Address on the same server that sends poses
         (:class:`ikns.view.scene.live.LiveView`).
 
     Raises
@@ -57,7 +57,7 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
         here.joinpath(name).read_text(encoding="utf-8")
         for name in ("page.css", "page.js")
     )
-    # The browser itself refuses whatever else the page would load.
+    # The browser itself refuses everything else.
     policy = (
         "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
         f"img-src data: blob:{'; connect-src ' + repr('self') if live else ''}"
@@ -92,7 +92,7 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
 
 
 def packed_json(value: Any) -> str:
-    """Return JSON that may stand in a page; long arrays are base64 of float32.
+    """Return JSON to embed in a page; long arrays are base64 of float32.
 
     >>> packed_json({"matrix": np.eye(2)})
     '{"matrix":[[1.0,0.0],[0.0,1.0]]}'
@@ -117,7 +117,7 @@ def _packed(value: Any) -> Any:
 
 @cache
 def _viewer() -> str:
-    # Found, not imported: the package starts with IPython and a message queue.
+    # Not imported: that would load IPython and a message queue.
     package = find_spec("meshcat")
     folder = Path((package and package.origin) or "meshcat").parent
     file = folder / "viewer" / "dist" / "main.min.js"

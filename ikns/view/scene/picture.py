@@ -1,4 +1,4 @@
-"""A scene as PNG: by a browser where there is one, else drawn plainly."""
+"""A scene as PNG: by a browser where there is one, else by matplotlib."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from ikns.view.scene.scene import Scene
 
 __all__ = ["ScenePicture", "scene_picture"]
 
-#: Window of the picture and pixels of the picture for each of the window's.
+#: Size of the window, CSS pixels, and pixels of the picture per CSS pixel.
 _WIDTH, _HEIGHT, _SCALE = 1100, 800, 1.5
 
 
 class ScenePicture(NamedTuple):
-    """A picture and how it came about.
+    """A picture and a note on how it was drawn.
 
     Parameters
     ----------
     png : bytes
     note : str or None
-        Why it is plainer than the page, and what would help.
+        Why it is plainer than the page, and what to install; None from a browser.
     """
 
     png: bytes
@@ -39,7 +39,7 @@ def scene_picture(
     ----------
     scene : Scene
     environ : mapping, optional
-        Where a browser is looked for, see
+        Environment in which a browser is searched, see
         :func:`ikns.view.scene.browser.find_browser`.
     """
     browser = find_browser(environ)

@@ -1,4 +1,4 @@
-"""Where the null space was learned: PCA points, the volume between them, the trail."""
+"""PCA points, the volume between them, and trails, as commands."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NUMBER = 0.026  # height of a point's number, m
 _NUMBER_AWAY = 0.026  # of a number from its point, m
 _TRAIL_RADIUS = 0.0014  # m
 _EDGE_RADIUS = 0.0008  # m
-#: The trail keeps places this far apart, m: a hand held still is not drawn.
+#: Distance of the places of a trail, m: a hand that is held adds none.
 _TRAIL_STEP = 0.004
 
 
@@ -85,13 +85,13 @@ def trail_commands(
     radius: float = _TRAIL_RADIUS,
     on_top: bool = False,
 ) -> list[Command]:
-    """Draw where a hand or an elbow went, (T, 3) m; NaN breaks the line."""
+    """Draw the path of a hand or an elbow, (T, 3) m; NaN breaks the line."""
     tube = line_mesh(_thinned(places, _TRAIL_STEP), radius=radius)
     return [object_command(path, tube, color, shiny=False, on_top=on_top)]
 
 
 def _thinned(places: Array, step: float) -> Array:
-    """Places at least `step` apart along the way, its last, and one NaN a gap."""
+    """Return places at least `step` apart, the last one, and one NaN per gap."""
     kept: list[Array] = []
     for k, place in enumerate(places):
         known = bool(np.isfinite(place).all())

@@ -1,6 +1,6 @@
-"""Poses over time: tracks that a player interpolates, and the command that plays them.
+"""Animation: tracks that a player interpolates, and the command that plays them.
 
-A track moves one node; its times are seconds from the first frame, shared by all.
+A track moves one node. Times are seconds from the first frame, shared by all tracks.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ class Track:
     position : (F, 3) array
         m.
     quaternion : (F, 4) array, optional
-        x, y, z, w; neighbors on the same half of the sphere, as a player blends them.
+        x, y, z, w; neighbors have one sign, as a player interpolates between them.
     visible : (F,) boolean array, optional
-        Whether it is shown; what is not keeps its last place.
+        Whether it is shown; a hidden node keeps its last place.
     """
 
     path: str
@@ -54,7 +54,7 @@ class Track:
 
 
 def kept_frames(time: Array, *, rate: float = 30.0) -> NDArray[np.int64]:
-    """Frames to play: every one, or every n-th so that about `rate` a second stay.
+    """Return the frames to play: every n-th, so that about `rate` per second remain.
 
     Never more than 18 000 (ten minutes at 30/s).
 
@@ -94,7 +94,7 @@ def pose_tracks(
 
 
 def markers_in_thorax(markers: Array, q: Array) -> Array:
-    """Markers in the world (F, M, 3) m as the thorax of `q` (F, 25) sees them."""
+    """Transform markers in the world (F, M, 3) m to the thorax frame of `q` (F, 25)."""
     unknown = ~np.all(np.isfinite(q[:, :7]), axis=1)
     turn = np.where(unknown[:, None], [0.0, 0, 0, 1], q[:, 3:7])
     rotation = Rotation.from_quat(turn).as_matrix()
@@ -119,7 +119,7 @@ def marker_tracks(places: Array, labels: tuple[str, ...], path: str) -> list[Tra
 
 
 def animation_command(times: Array, tracks: list[Track]) -> Command:
-    """Play tracks at `times` (F,) s, over and over, standing still at first."""
+    """Play tracks at `times` (F,) s in a loop, paused at first."""
     when = np.asarray(times, dtype=np.float32)
 
     def clip(track: Track) -> Command:
@@ -144,13 +144,13 @@ def animation_command(times: Array, tracks: list[Track]) -> Command:
                     "values": track.visible.astype(np.uint8),
                 }
             )
-        # Three.js counts times in frames of a clip: one a second makes them seconds.
+        # Three.js counts times in frames of a clip: at 1 fps they are seconds.
         return {"fps": 1, "name": track.path, "tracks": parts}
 
     return {
         "type": "set_animation",
         "animations": [{"path": t.path, "clip": clip(t)} for t in tracks],
-        # Infinity has no place in JSON; at 10^9 nobody is watching any more.
+        # JSON has no infinity; 10^9 repetitions are as good.
         "options": {"play": False, "repetitions": 10**9},
     }
 

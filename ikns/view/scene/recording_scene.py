@@ -1,4 +1,4 @@
-"""The scene of a recording: the body plays it, among the points of a map."""
+"""The scene of a recording: the body plays it, with the PCA points of a map."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.self_motion import posture_at_point
 from ikns.recording.recording import Recording
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, object_command, root_commands
@@ -28,7 +29,6 @@ from ikns.view.scene.playback import (
     marker_tracks,
     markers_in_thorax,
 )
-from ikns.view.scene.postures import posture_at_point
 from ikns.view.scene.scene import Layer, Scene, camera_and_target
 from ikns.view.scene.swivel import Swivel, swivel_commands
 from ikns.view.style import BLUE
@@ -44,7 +44,7 @@ _BALL = {
     "widthSegments": 16,
     "heightSegments": 12,
 }
-#: Frames that are played, each second.
+#: Frames played per second.
 _RATE = 30.0
 
 
@@ -61,7 +61,7 @@ def recording_scene(
 ) -> Scene:
     """Scene of a recording: the body plays it, with its markers and the hand's trail.
 
-    Ghosts and sweep are there too, switched off at first.
+    Ghosts and sweep are hidden at first.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def recording_scene(
     ]
     layers = [
         Layer("markers seen", (f"{ROOT}/seen",), _SEEN),
-        Layer("where the hand went", (f"{ROOT}/trail",), BLUE),
+        Layer("path of the hand", (f"{ROOT}/trail",), BLUE),
         *map_layers(skeleton, learned, chosen, playing=True),
     ]
     return Scene(
@@ -137,7 +137,7 @@ def recording_scene(
 def _seen_markers(
     skeleton: Skeleton, motion: Motion, recording: Recording, kept: NDArray[np.int64]
 ) -> list[Track]:
-    """Tracks of the markers that the cameras saw and the skeleton knows."""
+    """Return tracks of the markers that were seen and belong to the marker set."""
     worn = skeleton.marker_set
     markers = worn.pick(recording.labels, recording.markers)[kept]
     places = markers_in_thorax(markers, motion.q[kept])

@@ -1,4 +1,4 @@
-"""A whole scene as data, and where one looks at it from."""
+"""A scene as data, and its camera."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ __all__ = ["FIELD_OF_VIEW", "Layer", "Scene", "camera_and_target"]
 
 Array = NDArray[np.float64]
 
-#: Vertical angle of view, deg: long enough that near things do not loom.
+#: Vertical angle of view, deg: small, so that near objects are not enlarged much.
 FIELD_OF_VIEW = 28.0
-#: From the front, above and the side of the arm, in the thorax frame.
+#: Direction of the camera: front, above, and the side of the arm; thorax frame.
 _FROM = np.array([0.80, 0.30, 0.52])
 #: Top of the head and foot of the trunk, for the size of the picture, m.
 _TRUNK = ((-0.03, 0.32, 0.0), (-0.06, -0.23, 0.0))
@@ -26,14 +26,14 @@ _TRUNK = ((-0.03, 0.32, 0.0), (-0.06, -0.23, 0.0))
 
 @dataclass(frozen=True)
 class Layer:
-    """Something that a viewer can switch on and off.
+    """A group of nodes that a viewer can switch on and off.
 
     Parameters
     ----------
     name : str
         For people.
     paths : tuple of str
-        Nodes that make it up.
+        Its nodes.
     color : str
         For the legend, as CSS has it.
     shown : bool
@@ -48,7 +48,7 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is drawn, and what stands around it.
+    """What is drawn, with title, legend, camera and animation.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Scene:
         MeshCat's, in order (see :mod:`ikns.view.scene.commands`).
     layers : list of Layer
     camera, target : (3,) array
-        Where from and where to one looks, m in the thorax frame.
+        Position of the camera and the point it looks at, m in the thorax frame.
     times : (F,) array
         Of the animation's frames, s; empty without one.
     c : (F,) array
@@ -84,7 +84,7 @@ class Scene:
 def camera_and_target(
     skeleton: Skeleton, learned: NullSpaceMap, chain: str, q: Array
 ) -> tuple[Array, Array]:
-    """Where to look from and to, so that trunk, acting arms and points are in sight.
+    """Return a camera that has trunk, acting arms and PCA points in view.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def camera_and_target(
     chain : str
         Joints of the map.
     q : (..., 18 or 25) array
-        Every posture that is shown; unknown ones (NaN) do not count.
+        Every posture that is shown; unknown ones (NaN) are ignored.
 
     Returns
     -------

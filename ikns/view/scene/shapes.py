@@ -1,4 +1,4 @@
-"""The body's shapes as its URDF draws them, so that a scaled body looks scaled."""
+"""The visual shapes of a URDF, scaled as the body is."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Shape:
     Parameters
     ----------
     link : str
-        That carries it.
+        Link that carries it.
     geometry : dict
         As three.js describes it, meters; a cylinder stands along Y.
     in_link : (4, 4) array

@@ -1,6 +1,6 @@
-"""What the arm can do with the hand held: learned (ghosts along Z) and by the Jacobian.
+"""Motion of the arm with the hand held: learned (ghosts along Z) and by the Jacobian.
 
-Both go through one posture at a PCA point and between the same ends m and M.
+Both pass through one posture at a PCA point, between the same ends m and M.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.self_motion import postures_along, self_motion
 from ikns.view.scene.body import arm_links, ghost_commands
 from ikns.view.scene.commands import ROOT, Command
 from ikns.view.scene.places import trail_commands
 from ikns.view.scene.playback import Track, body_tracks, pose_tracks
-from ikns.view.scene.postures import postures_along, self_motion
 from ikns.view.style import INK, point_color
 
 __all__ = ["Swivel", "swivel_commands", "swivel_tracks"]
 
 Array = NDArray[np.float64]
 
-#: Where ghosts stand, as control signals; the body is in the middle.
+#: Control signals of the ghosts; the body is in the middle.
 _STEPS = np.array([0.0, 0.25, 0.75, 1.0])
-#: There and back takes this long, s.
+#: Duration of a sweep and its return, s.
 _PERIOD = 6.0
 _LINE = 0.0025  # radius of the elbow's and the hand's paths, m
 
@@ -48,7 +48,7 @@ class Swivel:
     along : (N, 18) array
         Straight along Z, with the sweep's c.
     middle : int
-        Row of the sweep that both go through.
+        Row of the sweep that both pass through.
     """
 
     point: int
@@ -67,7 +67,7 @@ class Swivel:
         columns = [skeleton.joint_names.index(joint) for joint in chain_joints(chain)]
         lower, upper = learned.lower_[point, 0], learned.upper_[point, 0]
         signal = sweep[:, columns] @ learned.directions_[point, 0] - lower
-        # A point where nothing moved has no range, and no say in c.
+        # A point where nothing moved has no range, and no c.
         c = signal / (upper - lower) if upper > lower else np.zeros(len(sweep))
         return cls(
             point=point,
@@ -79,30 +79,30 @@ class Swivel:
         )
 
     @property
-    def _there(self) -> Array:
-        """When the sweep's postures come on the way there, s: slow at both ends."""
+    def _outward_times(self) -> Array:
+        """Times of the sweep's postures on the outward way, s: slow at both ends."""
         way = np.linspace(0.0, 1.0, len(self.sweep))
         return _PERIOD / 2 * np.arccos(1 - 2 * way) / np.pi
 
     @property
     def times(self) -> Array:
-        """When the postures come, there and back, s; empty where nothing moves."""
+        """Times of the postures out and back, s; empty where nothing moves."""
         if len(self.sweep) < 2:
             return np.zeros(0)
-        there = self._there
+        there = self._outward_times
         return np.concatenate([there, _PERIOD - there[-2::-1]])
 
     @property
     def start(self) -> float:
-        """When the posture comes that both go through, s."""
-        return float(self._there[self.middle]) if len(self.sweep) > 1 else 0.0
+        """Time of the posture that both pass through, s."""
+        return float(self._outward_times[self.middle]) if len(self.sweep) > 1 else 0.0
 
     @property
     def playing_c(self) -> Array:
         """Control signal at `times`."""
-        return self._and_back(self.c) if len(self.sweep) > 1 else np.zeros(0)
+        return self._with_return(self.c) if len(self.sweep) > 1 else np.zeros(0)
 
-    def _and_back(self, values: Array) -> Array:
+    def _with_return(self, values: Array) -> Array:
         return np.concatenate([values, values[-2::-1]])
 
 
@@ -111,8 +111,8 @@ def swivel_commands(
 ) -> list[Command]:
     """Draw ghosts, paths of elbow and hand, and what moves.
 
-    With `playing`, the body itself shows the sweep and one more ghost moves along Z;
-    otherwise two translucent arms stand at the ends of the sweep.
+    With `playing`, the body shows the sweep and one more ghost moves along Z; otherwise
+    two translucent arms show the ends of the sweep.
     """
     links, color = arm_links(skeleton, chain), point_color(swivel.point)
     ghosts = f"{ROOT}/ghosts"
@@ -160,7 +160,7 @@ def swivel_tracks(skeleton: Skeleton, swivel: Swivel, chain: str) -> list[Track]
     if len(swivel.sweep) < 2:
         return []
     links = arm_links(skeleton, chain)
-    sweep, along = swivel._and_back(swivel.sweep), swivel._and_back(swivel.along)
+    sweep, along = swivel._with_return(swivel.sweep), swivel._with_return(swivel.along)
     return body_tracks(skeleton, sweep) + pose_tracks(
         skeleton, along, links, f"{ROOT}/ghosts/moving/0"
     )

@@ -1,4 +1,4 @@
-"""What the figures of a study share: a color and a mark for every condition."""
+"""Shared parts of the figures of a study: styles of conditions, legend, titles."""
 
 from __future__ import annotations
 
@@ -10,49 +10,55 @@ from matplotlib.figure import Figure
 
 from ikns.view.style import BLUE, GREEN, INK, ORANGE, PURPLE, new_figure
 
-__all__ = ["Look", "looks", "outside_legend", "scatter_places", "study_figure"]
+__all__ = [
+    "ConditionStyle",
+    "condition_styles",
+    "outside_legend",
+    "scatter_places",
+    "study_figure",
+]
 
 
-class Look(NamedTuple):
-    """How a condition is drawn; told apart by shape and lightness as well."""
+class ConditionStyle(NamedTuple):
+    """Color and mark of a condition; marks differ too."""
 
     color: str
     mark: str
 
 
-_LOOKS = (
-    Look(BLUE, "o"),
-    Look(ORANGE, "D"),
-    Look(GREEN, "s"),
-    Look(PURPLE, "^"),
-    Look(INK, "v"),
+_STYLES = (
+    ConditionStyle(BLUE, "o"),
+    ConditionStyle(ORANGE, "D"),
+    ConditionStyle(GREEN, "s"),
+    ConditionStyle(PURPLE, "^"),
+    ConditionStyle(INK, "v"),
 )
 
 
-def looks(conditions: Sequence[str]) -> dict[str, Look]:
-    """Look of every condition, the same in all figures of a report."""
-    return {name: _LOOKS[k % len(_LOOKS)] for k, name in enumerate(conditions)}
+def condition_styles(conditions: Sequence[str]) -> dict[str, ConditionStyle]:
+    """Return the style of every condition, the same in all figures of a report."""
+    return {name: _STYLES[k % len(_STYLES)] for k, name in enumerate(conditions)}
 
 
 def study_figure(
     title: str, *, simulated: bool, height: float, width: float = 9.0
 ) -> Figure:
-    """Return an empty figure that says in its title when nobody took part."""
-    said = f"{title} (simulated participants)" if simulated else title
-    return new_figure(said, simulated=False, height=height, width=width)
+    """Return an empty figure; its title says whether participants are simulated."""
+    text = f"{title} (simulated participants)" if simulated else title
+    return new_figure(text, simulated=False, height=height, width=width)
 
 
 def scatter_places(count: int, *, width: float) -> np.ndarray:
-    """Places of dots side by side around 0, so that few hide one another."""
+    """Return offsets of dots around 0, so that few hide one another."""
     if count < 2:
         return np.zeros(count)
-    # Golden steps: neighbors in order are far apart, whatever the count.
+    # Steps of the golden ratio: neighbors in order are far apart for any count.
     turns = np.arange(count) * 0.6180339887498949 % 1.0
     return np.asarray(width * (turns - 0.5))
 
 
 def outside_legend(figure: Figure, axes: Any) -> None:
-    """One legend for all panels, beside the title."""
+    """Add one legend for all panels, next to the title."""
     handles, names = axes.get_legend_handles_labels()
     named = dict(zip(names, handles, strict=True))
     if named:

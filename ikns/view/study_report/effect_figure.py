@@ -1,4 +1,4 @@
-"""How large a difference is, and whether it lies within the declared margin."""
+"""Difference against the declared margin, and standardized effects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ikns.statistics import Effect, Equivalence
 from ikns.view.study_report.drawing import study_figure
-from ikns.view.style import BLUE, GREEN, GREY, INK, PALE, house_style
+from ikns.view.style import BLUE, GREEN, GREY, INK, PALE, figure_style
 
 __all__ = ["effect_figure"]
 
@@ -23,7 +23,7 @@ def effect_figure(
     quantity: str,
     simulated: bool,
 ) -> Figure:
-    """90 % interval against the margin, beside standardized effects.
+    """Draw the 90 % interval against the margin, next to standardized effects.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def effect_figure(
     simulated : bool
     """
     shown = [effect for effect in effects if not effect.unit]
-    with house_style():
+    with figure_style():
         figure = study_figure(
             f"Difference of {quantity}", simulated=simulated, height=2.3
         )

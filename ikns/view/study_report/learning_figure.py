@@ -1,4 +1,4 @@
-"""RMSE over a participant's trials, with the curves that were fitted."""
+"""RMSE over trials, with the fitted learning curves."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from matplotlib.figure import Figure
 from ikns.experiments.study.summary import TrackingSummary
 from ikns.experiments.study.summary.by_trial import rmse_by_trial
 from ikns.statistics import LearningCurves
-from ikns.view.study_report.drawing import looks, outside_legend, study_figure
-from ikns.view.style import GREEN, GREY, INK, PALE, PURPLE, house_style
+from ikns.view.study_report.drawing import (
+    condition_styles,
+    outside_legend,
+    study_figure,
+)
+from ikns.view.style import GREEN, GREY, INK, PALE, PURPLE, figure_style
 
 __all__ = ["learning_figure"]
 
@@ -21,30 +25,30 @@ _LINES = {
 
 
 def learning_figure(found: TrackingSummary) -> Figure:
-    """Mean over participants by trial, each trajectory's own difficulty taken out.
+    """Draw the mean by trial, corrected for the difficulty of each trajectory.
 
-    Training is on other curves, so that it stands apart and as it was measured.
+    Training is on other trajectories and is drawn uncorrected.
     """
     fitted: dict[str, LearningCurves] = {}
     for compared in found.comparisons:
         if compared.analysis is not None:
             fitted = compared.analysis.learning | fitted
-    style = looks(found.conditions)
+    style = condition_styles(found.conditions)
     trials, training = found.trials(), found.trials("training")
-    with house_style():
+    with figure_style():
         figure = study_figure("RMSE over trials", simulated=found.simulated, height=3.0)
         panels = figure.subplots(1, len(found.conditions), sharey=True, squeeze=False)[
             0
         ]
         for axes, condition in zip(panels, found.conditions, strict=True):
-            look = style[condition]
+            own = style[condition]
             before = rmse_by_trial(training, condition, center=False)
             axes.plot(
                 before.trial - before.trial.max(initial=0),
                 before.mean,
-                look.mark,
+                own.mark,
                 mfc="white",
-                mec=look.color,
+                mec=own.color,
                 ms=4,
                 label="training",
             )
@@ -53,8 +57,8 @@ def learning_figure(found: TrackingSummary) -> Figure:
                 during.trial,
                 during.mean,
                 during.deviation,
-                fmt=look.mark,
-                color=look.color,
+                fmt=own.mark,
+                color=own.color,
                 ms=4,
                 capsize=2,
                 lw=0.8,

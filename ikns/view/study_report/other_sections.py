@@ -1,4 +1,4 @@
-"""What was done, variations, methods, the paper examined again, what is left out."""
+"""Sections on attempts, variations, methods, the paper, and what is left out."""
 
 from __future__ import annotations
 
@@ -199,15 +199,15 @@ def left_out_section(summary: StudySummary, *, most: int = 50) -> Section | None
     """Visits that could not be used, each with its reason; None without any."""
     if not summary.left_out:
         return None
-    said = [each.reason for each in summary.left_out[:most]]
+    reasons = [each.reason for each in summary.left_out[:most]]
     if len(summary.left_out) > most:
-        said.append(f"And {len(summary.left_out) - most} more.")
+        reasons.append(f"And {len(summary.left_out) - most} more.")
     count = len(summary.left_out)
     return Section(
         "Left out",
         [
             f"{count} of {summary.visits + count} visits could not be used; nothing "
             "of them is in this report.",
-            *said,
+            *reasons,
         ],
     )

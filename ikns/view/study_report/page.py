@@ -1,4 +1,4 @@
-"""The page of a study: answers first, simulated parts labelled, nothing loaded."""
+"""The page of a study: answers first, simulated parts labeled, nothing loaded."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from ikns.view.parts import (
 )
 from ikns.view.study_report.texts import BANNER, CANNOT
 
-__all__ = ["Part", "study_html"]
+__all__ = ["GroupPart", "study_html"]
 
 
-class Part(NamedTuple):
-    """What a report says of the people, or of the simulated participants."""
+class GroupPart(NamedTuple):
+    """Part of a report on the people, or on the simulated participants."""
 
     group: Group
     sections: Sequence[Section]
@@ -36,7 +36,7 @@ class Part(NamedTuple):
 
 def study_html(
     summary: StudySummary,
-    parts: Sequence[Part],
+    parts: Sequence[GroupPart],
     *,
     about_paper: Section,
     left_out: Section | None,
@@ -99,7 +99,7 @@ class _StudyPage(ReportPage):
         return html.replace("</h2>", f"{self.suffix}</h2>", 1)
 
 
-def _lead(summary: StudySummary, parts: Sequence[Part]) -> str:
+def _lead(summary: StudySummary, parts: Sequence[GroupPart]) -> str:
     who = [people(_count(part.group), simulated=part.group.simulated) for part in parts]
     apart = (
         " People and simulated participants are analyzed apart, people first."
@@ -131,7 +131,7 @@ def _count(group: Group) -> int:
     return len(who)
 
 
-def _facts(summary: StudySummary, parts: Sequence[Part]) -> dict[str, Cell]:
+def _facts(summary: StudySummary, parts: Sequence[GroupPart]) -> dict[str, Cell]:
     facts: dict[str, Cell] = {}
     for part in parts:
         kind = "simulated" if part.group.simulated else "people"
@@ -154,13 +154,13 @@ def _answers(group: Group, *, several: bool) -> str:
         *picking_answer(group.picking, simulated=group.simulated),
     ]
     tag = ReportPage(group.simulated).suffix
-    whose = ""
+    who = ""
     if several:
-        whose = ": simulated participants" if group.simulated else ": people"
-    parts = [f'<section class="answers"><h2>Answers{whose}{tag}</h2>']
-    for question, said in questions:
+        who = ": simulated participants" if group.simulated else ": people"
+    parts = [f'<section class="answers"><h2>Answers{who}{tag}</h2>']
+    for question, sentences in questions:
         parts.append(f"<h3>{inline(question)}</h3>")
-        parts += [f"<p>{inline(sentence)}</p>" for sentence in said]
+        parts += [f"<p>{inline(sentence)}</p>" for sentence in sentences]
     if group.simulated:
         parts.append(
             "<p>These are answers about a model of people, not about people.</p>"

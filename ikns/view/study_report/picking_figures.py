@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 
 from ikns.experiments.study.summary import PickingSummary
 from ikns.view.study_report.drawing import (
-    looks,
+    condition_styles,
     outside_legend,
     scatter_places,
     study_figure,
 )
-from ikns.view.style import GREY, INK, PALE, house_style
+from ikns.view.style import GREY, INK, PALE, figure_style
 
 __all__ = ["picking_figure"]
 
@@ -21,7 +21,7 @@ _APART = 0.36
 
 def picking_figure(found: PickingSummary) -> Figure:
     """Share of success with intervals, and every trial's time, by object."""
-    style, trials = looks(found.conditions), found.trials()
+    style, trials = condition_styles(found.conditions), found.trials()
     objects = [*found.objects, ""]
     places = np.arange(len(objects), dtype=float)
     places[-1] += 0.4  # all of them, a little apart
@@ -29,13 +29,13 @@ def picking_figure(found: PickingSummary) -> Figure:
         np.arange(len(found.conditions)) - (len(found.conditions) - 1) / 2
     )
     cells = {(cell.condition, cell.object): cell for cell in found.cells}
-    with house_style():
+    with figure_style():
         figure = study_figure(
             "Success and time by object", simulated=found.simulated, height=5.2
         )
         upper, lower = figure.subplots(2, 1, sharex=True)
         for condition, offset in zip(found.conditions, offsets, strict=True):
-            look = style[condition]
+            own = style[condition]
             for place, name in zip(places, objects, strict=True):
                 cell = cells[condition, name]
                 if not cell.trials:
@@ -45,8 +45,8 @@ def picking_figure(found: PickingSummary) -> Figure:
                     place + offset,
                     share,
                     [[share - 100 * cell.low], [100 * cell.high - share]],
-                    fmt=look.mark,
-                    color=look.color,
+                    fmt=own.mark,
+                    color=own.color,
                     ms=4.5,
                     capsize=2,
                     lw=0.9,
@@ -65,8 +65,8 @@ def picking_figure(found: PickingSummary) -> Figure:
                 good = trials["success"][rows]
                 time = np.where(good, trials["time"][rows], trials["limit"][rows])
                 x = place + offset + scatter_places(len(time), width=0.26)
-                dot = {"color": look.color, "ms": 3.2, "alpha": 0.75}
-                lower.plot(x[good], time[good], look.mark, mew=0, **dot)
+                dot = {"color": own.color, "ms": 3.2, "alpha": 0.75}
+                lower.plot(x[good], time[good], own.mark, mew=0, **dot)
                 lower.plot(x[~good], time[~good], "x", mew=1.0, **dot)
         upper.set_ylabel("trials that succeeded (%)")
         upper.set_ylim(-4, 104)

@@ -92,7 +92,7 @@ def _comparison(compared: PickComparison, pictures: list[Picture]) -> Section:
         text.append("Fewer than two pairs without a failure: no sign test.")
     if compared.equivalence is None:
         text.append(NO_MARGIN)
-    beside = [
+    others = [
         ("success", found.success),
         ("time", found.time),
         ("time, over participants", found.ranks),
@@ -103,7 +103,7 @@ def _comparison(compared: PickComparison, pictures: list[Picture]) -> Section:
         text,
         pictures,
         [
-            tests_table([found.paper], beside),
+            tests_table([found.paper], others),
             *([effects_table(found.effects)] if found.effects else []),
         ],
     )
@@ -186,5 +186,5 @@ def _by_object(found: PickingSummary) -> Iterator[tuple[str, list[ObjectResult]]
 
 
 def _whole(text: str) -> str:
-    """Text that stays on one line."""
+    """Return text that is not broken over lines."""
     return text.replace(" ", "\u00a0")

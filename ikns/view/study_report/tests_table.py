@@ -1,4 +1,4 @@
-"""Tests as a table: whose they are, what they say."""
+"""Tests and effect sizes as tables."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from ikns.view.parts import Cell, Table
 __all__ = ["effects_table", "tests_table"]
 
 
-def tests_table(paper: Sequence[Any], beside: Sequence[tuple[str, Any]]) -> Table:
-    """Sentences of all tests, the paper's first and labelled so.
+def tests_table(paper: Sequence[Any], others: Sequence[tuple[str, Any]]) -> Table:
+    """Return the sentences of all tests, the paper's first.
 
     Parameters
     ----------
     paper : sequence of result or None
         Of :mod:`ikns.statistics`, with a ``sentence()``.
-    beside : sequence of (name, result or None)
+    others : sequence of (name, result or None)
     """
     rows: list[list[Cell]] = [
         ["the paper's own", each.sentence()] for each in paper if each is not None
     ]
-    rows += [[name, each.sentence()] for name, each in beside if each is not None]
+    rows += [[name, each.sentence()] for name, each in others if each is not None]
     return Table(["test", "what it says"], rows, "Tests, each with its n.")
 
 
 def effects_table(effects: Sequence[Effect]) -> Table:
-    """Effect sizes with intervals."""
+    """Return effect sizes with intervals."""
     return Table(
         ["effect", "unit", "value", "95 % from", "to", "n participants", "interval by"],
         [

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from ikns.experiments.study.summary import TrackingSummary
 from ikns.experiments.study.summary.means import subject_means
 from ikns.view.study_report.drawing import (
-    looks,
+    condition_styles,
     outside_legend,
     scatter_places,
     study_figure,
 )
-from ikns.view.style import GREY, INK, PALE, house_style
+from ikns.view.style import GREY, INK, PALE, figure_style
 
 __all__ = ["error_figure", "rmse_figure", "trace_figure"]
 
@@ -25,8 +25,8 @@ _MANY = 40
 
 def trace_figure(found: TrackingSummary) -> Figure:
     """Target and trace of the median trial, conditions by trajectories."""
-    style = looks(found.conditions)
-    with house_style():
+    style = condition_styles(found.conditions)
+    with figure_style():
         figure, panels = _grid(found, "Target and trace of the median trial", 1.9)
         for condition, trajectory, axes in panels:
             median = found.median_trial(condition, trajectory)
@@ -52,8 +52,8 @@ def trace_figure(found: TrackingSummary) -> Figure:
 
 def error_figure(found: TrackingSummary) -> Figure:
     """Error over time across participants: mean, and the band of 80 % of them."""
-    style = looks(found.conditions)
-    with house_style():
+    style = condition_styles(found.conditions)
+    with figure_style():
         figure, panels = _grid(found, "Error over time across participants", 1.8)
         for condition, trajectory, axes in panels:
             axes.axhline(0, color=GREY, lw=0.7)
@@ -113,10 +113,10 @@ def _grid(
 
 def rmse_figure(found: TrackingSummary) -> Figure:
     """RMSE by trajectory and condition: a dot a participant, lines join the same."""
-    trials, style = found.trials(), looks(found.conditions)
+    trials, style = found.trials(), condition_styles(found.conditions)
     levels = [*found.trajectories, ""] if found.trajectories else [""]
     cells = {(c.condition, c.level): c.over for c in found.rmse}
-    with house_style():
+    with figure_style():
         figure = study_figure(
             "RMSE by trajectory and condition",
             simulated=found.simulated,
@@ -136,13 +136,13 @@ def rmse_figure(found: TrackingSummary) -> Figure:
             for k, (condition, mean) in enumerate(
                 zip(found.conditions, means, strict=True)
             ):
-                look = style[condition]
+                own = style[condition]
                 values = [mean.get(who, np.nan) for who in people]
                 axes.plot(
                     k + shift,
                     values,
-                    look.mark,
-                    color=look.color,
+                    own.mark,
+                    color=own.color,
                     ms=3.6,
                     mew=0,
                     alpha=faint,
@@ -154,7 +154,7 @@ def rmse_figure(found: TrackingSummary) -> Figure:
                     k + 0.3,
                     over.mean,
                     half,
-                    fmt=look.mark,
+                    fmt=own.mark,
                     color=INK,
                     ms=5,
                     capsize=3,

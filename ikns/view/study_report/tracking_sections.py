@@ -131,7 +131,7 @@ def _comparison(
     found = compared.analysis
     if found is None:
         return Section(title, [compared.why])
-    beside = [
+    others = [
         ("over participants", found.subjects),
         ("over participants", found.ranks),
         ("mixed model", found.model),
@@ -157,14 +157,14 @@ def _comparison(
         text,
         pictures,
         [
-            tests_table(found.paper, beside),
+            tests_table(found.paper, others),
             effects_table(found.effects),
         ],
     )
 
 
 def _rmse_table(found: TrackingSummary) -> Table:
-    """Mean and spread by cell, beside what the paper prints of its people."""
+    """Mean and spread by condition and trajectory, next to the paper's."""
     printed = {
         (condition, trajectory): value
         for condition, values in (("ikns", PAPER.ikns), ("gamepad", PAPER.gamepad))
@@ -236,23 +236,23 @@ def _with_spread(mean: float, deviation: float, decimals: int) -> str:
 
 
 def _learning(found: TrackingSummary) -> list[str]:
-    said = []
-    told = set()
+    sentences = []
+    named = set()
     for compared in found.comparisons:
         for name, curves in (
             {} if compared.analysis is None else compared.analysis.learning
         ).items():
-            if name not in told:
-                said.append(f"{name}: {curves.sentence()}")
-                told.add(name)
+            if name not in named:
+                sentences.append(f"{name}: {curves.sentence()}")
+                named.add(name)
         model = None if compared.analysis is None else compared.analysis.model
         if model is not None and model.trial is not None:
-            said.append(
+            sentences.append(
                 f"Mixed model of {' and '.join(compared.names)}: RMSE changes by "
                 f"{model.trial.estimate:+.3f} of 100 a trial "
                 f"({p_text(model.trial.p)})."
             )
-    return said or [
+    return sentences or [
         "No learning curve was fitted: that needs at least 6 trials of every "
         "participant in a condition, and two participants with both conditions."
     ]

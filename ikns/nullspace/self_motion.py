@@ -1,6 +1,6 @@
-"""Postures to draw: one at a PCA point, ghosts along Z, and the sweep of the elbow.
+"""Postures at a PCA point of a map: along its direction Z, and with the hand held.
 
-Joint angles alone, (18,) or (N, 18) rad, everything seen from the thorax.
+Postures are joint angles alone, (18,) or (N, 18) rad; hands are seen from the thorax.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ __all__ = ["posture_at_point", "postures_along", "self_motion", "visited_posture
 
 Array = NDArray[np.float64]
 
-#: What an arm at rest on a table in front would take, rad.
-_AT_EASE = {
+#: An arm resting on a table in front, rad.
+_REST = {
     "shoulder_abduction": 0.35,
     "shoulder_flexion": 0.45,
     "shoulder_rotation": 0.35,
     "elbow_flexion": 1.4,
 }
-#: The hand counts as held within this, m and rad: invisible, and far above rounding.
-HELD = 1e-9
-#: A step along the self-motion, rad: drawn 120 times in a full turn of one joint.
+#: The hand counts as held within this, m and rad: far above rounding, far below what
+#: anyone could see.
+HOLD_TOLERANCE = 1e-9
+#: Step along the self-motion, rad: some 120 in a full turn of one joint.
 _STEP = 0.05
 #: Newton steps allowed: from an error of `_STEP`^2 each squares it, so 3 or 4 do.
 _CORRECTIONS = 12
@@ -44,8 +45,8 @@ def posture_at_point(
 ) -> Array:
     """Posture near rest with the hand at a PCA point, in the middle of its range.
 
-    A subject folder says where the hand was and between which ends ``Z @ q`` moved, but
-    not the postures. Of all postures with the hand there and ``Z @ q`` halfway, this is
+    A subject folder holds the hand positions and the range of ``Z @ q``, but not the
+    postures. Of all postures with the hand at the point and ``Z @ q`` halfway, this is
     (to first order at each step) the nearest to `start`.
 
     Parameters
@@ -57,14 +58,14 @@ def posture_at_point(
     point : int
         Row of ``learned.centers_``.
     start : (25,) or (18,) array, optional
-        Default: arms at ease, elbows bent.
+        Default: arms at rest, elbows bent.
 
     Returns
     -------
     (18,) array
         As near to the point as joint limits allow.
     """
-    rest = _at_ease(skeleton) if start is None else _angles(skeleton, start)
+    rest = _rest_posture(skeleton) if start is None else _angles(skeleton, start)
     columns = _columns(skeleton, chain)
     sides = [SIDES.index(side) for side in chain_sides(chain)]
     z, center = learned.directions_[point], learned.centers_[point]
@@ -89,13 +90,13 @@ def posture_at_point(
 def visited_posture(
     skeleton: Skeleton, learned: NullSpaceMap, chain: str, point: int
 ) -> Array | None:
-    """Mean posture at a PCA point, (18,) rad; None for a map that does not know it.
+    """Mean posture at a PCA point, (18,) rad; None for a map that was not fitted.
 
-    Only a map that was fitted does, not one from a file.
+    A map from a file does not hold postures.
     """
     if not hasattr(learned, "cluster_means_"):
         return None
-    q = _at_ease(skeleton)
+    q = _rest_posture(skeleton)
     q[_columns(skeleton, chain)] = learned.cluster_means_[point]
     return q
 
@@ -108,7 +109,7 @@ def postures_along(
     q: Array,
     c: Array,
 ) -> Array:
-    """Postures straight along Z through `q`, where the point's own signal is `c`.
+    """Postures straight along Z through `q` at which the point's control signal is `c`.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ def postures_along(
     Returns
     -------
     (N, 18) array
-        ``q + s Z``; with a Z that is not quite a null direction the hand strays.
+        ``q + s Z``; the hand moves as far as Z is not a null direction.
     """
     columns = _columns(skeleton, chain)
     z = learned.directions_[point, 0]
@@ -137,33 +138,32 @@ def postures_along(
 def self_motion(
     skeleton: Skeleton, learned: NullSpaceMap, chain: str, point: int, q: Array
 ) -> Array:
-    """Postures through `q` that hold the hands' pose: the elbow swivels.
+    """Self-motion through `q`: postures that hold the pose of the hands.
 
-    Each step goes along the Jacobian's null space (what of Z lies in it, where it has
-    several dimensions) and is then corrected until the hand is back.
+    Each step goes along the Jacobian's null space (along the projection of Z, where it
+    has several dimensions) and is then corrected by Newton's method.
 
     Parameters
     ----------
     skeleton, learned, chain, point
-        As :func:`posture_at_point` takes them; Z gives the sense, m and M the ends.
+        As :func:`posture_at_point` takes them; Z sets the direction, m and M the ends.
     q : (18,) array
         Posture to start from, rad.
 
     Returns
     -------
     (N, 18) array
-        From the end where ``Z @ q`` is m to that where it is M, or where a joint limit
-        or a straight arm stops it; `q` is one of them, and the only one where nothing
-        can move.
+        From ``Z @ q = m`` to ``Z @ q = M``, or to where a joint limit or a straight arm
+        stops it. `q` is one of them, and the only one if nothing can move.
     """
     z = learned.directions_[point, 0]
     ends = learned.lower_[point, 0], learned.upper_[point, 0]
-    back = _swept(skeleton, chain, q, -z, -ends[0])
-    on = _swept(skeleton, chain, q, z, ends[1])
-    return np.array([*back[::-1], q, *on])
+    before = _sweep(skeleton, chain, q, -z, -ends[0])
+    after = _sweep(skeleton, chain, q, z, ends[1])
+    return np.array([*before[::-1], q, *after])
 
 
-def _swept(
+def _sweep(
     skeleton: Skeleton, chain: str, q: Array, z: Array, end: float
 ) -> list[Array]:
     """Postures after `q` while ``z @ q`` rises to `end`."""
@@ -177,7 +177,7 @@ def _swept(
         left = end - float(z @ here[columns])
         tangent = null_projector(_jacobian(skeleton, chain, here)) @ heading
         length = float(np.linalg.norm(tangent))
-        # 1e-6: nothing of the direction is left in the null space.
+        # 1e-6: the direction has no part in the null space.
         if left <= 0 or length < 1e-6:
             break
         heading = tangent / length
@@ -185,7 +185,7 @@ def _swept(
         step = min(_STEP, left / rate) if rate > 1e-3 else _STEP
         following = here.copy()
         following[columns] += step * heading
-        corrected = _held(skeleton, chain, following, target)
+        corrected = _corrected(skeleton, chain, following, target)
         if (
             corrected is None
             or not ((corrected[columns] >= low) & (corrected[columns] <= high)).all()
@@ -197,22 +197,22 @@ def _swept(
     return found
 
 
-def _held(
+def _corrected(
     skeleton: Skeleton, chain: str, q: Array, target: tuple[Array, Array]
 ) -> Array | None:
     """Posture near `q` with the hands at their target, or None where Newton fails."""
     columns = _columns(skeleton, chain)
     q = q.copy()
     for _ in range(_CORRECTIONS):
-        error = _off(_hands(skeleton, chain, q), target)
-        if np.abs(error).max() < HELD:
+        error = _pose_error(_hands(skeleton, chain, q), target)
+        if np.abs(error).max() < HOLD_TOLERANCE:
             return q
         q[columns] += np.linalg.pinv(_jacobian(skeleton, chain, q)) @ error
     return None
 
 
-def _off(hands: tuple[Array, Array], target: tuple[Array, Array]) -> Array:
-    """Way to the target, (6 sides,): m, then rotation vector in rad, side by side."""
+def _pose_error(hands: tuple[Array, Array], target: tuple[Array, Array]) -> Array:
+    """Error to the target, (6 sides,): m, then a rotation vector in rad, by side."""
     turn = target[1] @ np.swapaxes(hands[1], -1, -2)
     rotation = Rotation.from_matrix(turn).as_rotvec()
     return np.concatenate([target[0] - hands[0], rotation], axis=1).ravel()
@@ -236,6 +236,6 @@ def _angles(skeleton: Skeleton, q: ArrayLike) -> Array:
     return np.array(q, dtype=np.float64)[-len(skeleton.joint_names) :]
 
 
-def _at_ease(skeleton: Skeleton) -> Array:
-    named = {f"{side}_{joint}": x for side in SIDES for joint, x in _AT_EASE.items()}
+def _rest_posture(skeleton: Skeleton) -> Array:
+    named = {f"{side}_{joint}": x for side in SIDES for joint, x in _REST.items()}
     return np.array([named.get(joint, 0.0) for joint in skeleton.joint_names])
