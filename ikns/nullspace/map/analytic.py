@@ -13,7 +13,7 @@ from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map.assembly import assemble
 from ikns.nullspace.map.checks import at, checked_settings
 from ikns.nullspace.map.estimator import NullSpaceMap
-from ikns.nullspace.map.interpolator import between
+from ikns.nullspace.map.interpolator import make_interpolator
 from ikns.nullspace.map.samples import null_space_samples, still_mask
 from ikns.numerics.subspace import mean_null_direction
 
@@ -65,7 +65,8 @@ def analytic_map(
         map to use its samples. Default as in
         :func:`ikns.nullspace.clustering.nearest_center`.
     **parameters
-        Of :class:`NullSpaceMap`: `n_dof`, `quantiles`, `outside`, `reference`.
+        Of :class:`NullSpaceMap`: `n_dof`, `quantiles`, `outside`, `interpolation`,
+        `reference`.
 
     Returns
     -------
@@ -102,7 +103,7 @@ def analytic_map(
         [np.ones(settings.n_dof)] * len(places),
         [q[r] for r in rows],
         settings=settings,
-        edges=between(places, made.outside).edges,
+        edges=make_interpolator(places, made.outside).edges,
     )
     counts = np.array([r.size for r in rows])
     return NullSpaceMap.from_arrays(places, *arrays, counts=counts, **parameters)
