@@ -16,6 +16,7 @@ import time
 
 import numpy as np
 import scipy
+from paper.reexamined import paper_reexamined
 from scipy.stats import binomtest
 
 from ikns.statistics import (
@@ -27,14 +28,13 @@ from ikns.statistics import (
     hodges_lehmann,
     mixed_model,
     pair_trials,
-    paper_reexamined,
     pooled_t,
     sample_size,
     signed_rank,
     subject_means_t,
     within_subject_anova,
 )
-from ikns.statistics.printed_spread import subject_spread_limit
+from ikns.statistics.paper import subject_spread_limit
 
 SUBJECTS, TRAJECTORIES, REPEATS = 10, ("T1", "T2", "T3"), 3
 SKILL, TRIAL = 0.8, 0.9  # standard deviations of RMSE, as the paper's are about 1

@@ -300,9 +300,13 @@ def test_results_are_the_callers_own():
     assert control.c[0] == pytest.approx(0.2)
 
 
-@given(arrays(float, 3, elements=st.floats(-3, 3)), st.sampled_from([8, 3]))
-def test_the_local_map_is_the_map(x, n):
-    learned = varied_map(5, n_dof=2, points=CORNERS[:n])
+@given(
+    arrays(float, 3, elements=st.floats(-3, 3)),
+    st.sampled_from([8, 3]),
+    st.sampled_from(["natural", "laplace", "nearest"]),
+)
+def test_the_local_map_is_the_map(x, n, interpolation):
+    learned = varied_map(5, n_dof=2, points=CORNERS[:n], interpolation=interpolation)
     Z, low, width = LocalMap(learned)(x)
     lower, upper = learned.range(x)
     # The same sums of 8 products in another order.

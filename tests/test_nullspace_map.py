@@ -9,6 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import ortho_group
+from sklearn.base import clone
+from voronoi_oracle import laplace_weights, sibson_weights
 
 from ikns.nullspace.map import NullSpaceMap
 
@@ -231,6 +233,25 @@ def test_outside_the_hull_each_mode_does_what_it_says(planted):
     path = np.linspace(PLACES.mean(axis=0), away, 4001)
     steps = np.abs(np.diff(modes["project"].control_signal(q[0], path)))
     assert steps.max() < 0.05
+
+
+@pytest.mark.parametrize("interpolation", ["natural", "laplace", "nearest"])
+def test_the_interpolation_changes_the_weights_alone(planted, interpolation):
+    x, q, _, _, learned = planted
+    other = clone(learned).set_params(interpolation=interpolation).fit(x, q)
+    for name in ("centers_", "directions_", "lower_", "upper_", "labels_"):
+        np.testing.assert_array_equal(getattr(other, name), getattr(learned, name))
+    place = PLACES.mean(axis=0) + [0.02, -0.03, 0.01]
+    weights = other.interpolator_.weights(place)
+    if interpolation == "nearest":
+        nearest = np.linalg.norm(learned.centers_ - place, axis=1).argmin()
+        assert weights.tolist() == np.eye(len(weights))[nearest].tolist()
+        assert not other.inside(place)  # no volume belongs to it
+        return
+    exact = sibson_weights if interpolation == "natural" else laplace_weights
+    # As in test_interpolation.
+    expected = [float(w) for w in exact(learned.centers_, place)]
+    np.testing.assert_allclose(weights, expected, atol=1e-12)
 
 
 def test_missing_values_give_nan_and_touch_nothing_else(planted):

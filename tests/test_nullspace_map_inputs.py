@@ -93,6 +93,7 @@ def test_points_that_overlap_are_said():
         ({"min_samples": 0}, "min_samples"),
         ({"domain": "torque"}, "domain"),
         ({"outside": "guess"}, "outside"),
+        ({"interpolation": "cubic"}, "interpolation"),
         ({"radius": -1.0}, "radius"),
         ({"n_points": 0}, "at least one point"),
         ({"reference": [1.0, 0.0]}, "reference of shape"),
@@ -199,6 +200,7 @@ def test_a_good_recording_warns_of_nothing():
         ({"directions": np.full((8, 3), np.nan)}, "finite"),
         ({"lower": np.full(8, 2.0)}, "lower <= upper"),
         ({"centers": PLACES * [1, 1, 0]}, "points"),
+        ({"interpolation": "cubic"}, "interpolation as one of .* found 'cubic'"),
     ],
 )
 def test_arrays_that_are_no_map_are_refused(change, words):

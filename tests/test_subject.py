@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from ikns.calibration.subject import FILES, Subject
 from ikns.errors import FileError, IknsError, InvalidInput
+from ikns.nullspace.map import NullSpaceMap
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +67,47 @@ def test_saving_what_was_loaded_changes_nothing(folder: Path, tmp_path: Path) ->
     for name in ("skeleton.urdf", "map.json", "calibration.json"):
         assert again[name] == first[name]
     assert sorted(again) == sorted(FILES)
+
+
+@pytest.mark.parametrize("interpolation", ["natural", "laplace", "nearest"])
+def test_the_interpolation_of_the_map_is_kept(
+    tmp_path: Path, interpolation: str
+) -> None:
+    made = small_person.subject()
+    learned = made.null_space_map
+    other = NullSpaceMap.from_arrays(
+        learned.centers_,
+        learned.directions_,
+        learned.lower_,
+        learned.upper_,
+        counts=learned.counts_,
+        interpolation=interpolation,
+    )
+    other.radius_ = learned.radius_
+    dataclasses.replace(made, null_space_map=other).save(tmp_path / "person")
+    loaded = Subject.load(tmp_path / "person").null_space_map
+    assert loaded.interpolation == interpolation
+    x = learned.centers_.mean(axis=0)
+    np.testing.assert_array_equal(
+        loaded.interpolator_.weights(x), other.interpolator_.weights(x)
+    )
+
+
+def test_a_folder_that_does_not_name_the_interpolation_has_natural_neighbors(
+    folder: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(folder, tmp_path / "older")
+    path = tmp_path / "older" / "map.json"
+    table = json.loads(path.read_text())
+    assert table.pop("interpolation") == "natural"
+    path.write_text(json.dumps(table))
+    loaded = Subject.load(tmp_path / "older").null_space_map
+    whole = Subject.load(folder).null_space_map
+    x = whole.centers_.mean(axis=0)
+    assert loaded.interpolation == "natural"
+    np.testing.assert_array_equal(
+        loaded.interpolator_.weights(x), whole.interpolator_.weights(x)
+    )
 
 
 def test_still_samples_stay_within_a_twentieth_of_a_millimeter(folder: Path) -> None:
@@ -173,6 +215,8 @@ def test_an_unknown_version_is_refused(
         {"points": [{}]},
         {"points": 3},
         {"outside": "sideways"},
+        {"interpolation": "cubic"},
+        {"interpolation": None},
         {"radius_m": "wide"},
         {"radius_m": None},
     ],

@@ -45,6 +45,7 @@ def calibrate(
     variance: float = 0.8,
     radius: float | None = None,
     outside: Literal["nearest", "project", "nan"] = "nearest",
+    interpolation: Literal["natural", "laplace", "nearest"] = "natural",
     min_static: float = 1.0,
     min_still: float = 0.5,
     progress: Callable[[str, int, int], None] | None = None,
@@ -65,7 +66,7 @@ def calibrate(
     chain : str
         Joints of the task, see :data:`ikns.body.chains.CHAINS`. All others are
         extrinsic: how much they moved is reported.
-    n_points, n_dof, variance, radius, outside
+    n_points, n_dof, variance, radius, outside, interpolation
         Of :class:`NullSpaceMap`; radius in m.
     max_hand_speed : float
         Gate on the hand, m/s.
@@ -127,6 +128,7 @@ def calibrate(
         variance=variance,
         radius=radius,
         outside=outside,
+        interpolation=interpolation,
         reference=elbow_reference(skeleton, posture.mean(axis=0), chain, n_dof=n_dof),
         # With fewer samples than joints some joints could not show.
         min_samples=max(enough, len(chain_joints(chain)) + 1),

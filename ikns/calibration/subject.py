@@ -145,6 +145,8 @@ class Subject:
                 ),
                 counts=[int(point["samples"]) for point in points],
                 outside=table["outside"],
+                # Folders from before there was a choice do not say it.
+                interpolation=table.get("interpolation", "natural"),
             )
             learned.radius_ = float(table["radius_m"])
             if all("mean_rad" in point for point in points):
@@ -174,6 +176,7 @@ class Subject:
             "chain": self.chain,
             "joints": list(chain_joints(self.chain)),
             "outside": learned.outside,
+            "interpolation": learned.interpolation,
             "radius_m": learned.radius_,
             "points": [
                 {

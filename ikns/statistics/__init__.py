@@ -4,8 +4,8 @@
 with a ``sentence()`` in plain words, which never takes a difference that was not found
 for equality. `pairs` is what paired tests take; `paired_tests` repeats the paper;
 `equivalence`, `effects`, `mixed_model`, `within_subject_anova`, `success`, `times` and
-`learning` stand beside it; `power` and `sample_size` say how many participants;
-`published` examines the paper's printed numbers. scipy and statsmodels compute.
+`learning` stand beside it; `power` and `sample_size` say how many participants. scipy
+and statsmodels compute.
 """
 
 from ikns.statistics.analysis import (
@@ -37,7 +37,6 @@ from ikns.statistics.paired_tests import (
 )
 from ikns.statistics.pairs import Pairs, pair_arrays, pair_trials
 from ikns.statistics.power import Design, Power, Spread, simulated_power
-from ikns.statistics.published import Finding, paper_reexamined
 from ikns.statistics.sample_size import SampleSize, sample_size
 from ikns.statistics.success import SuccessTest, success_pairs, success_test
 from ikns.statistics.times import TimeTest, restricted_mean, time_test
@@ -48,7 +47,6 @@ __all__ = [
     "Design",
     "Effect",
     "Equivalence",
-    "Finding",
     "LearningCurve",
     "LearningCurves",
     "MixedModel",
@@ -78,7 +76,6 @@ __all__ = [
     "normality",
     "pair_arrays",
     "pair_trials",
-    "paper_reexamined",
     "pooled_t",
     "restricted_mean",
     "sample_size",

@@ -17,9 +17,8 @@ from scipy import stats
 
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.statistics.pairs import Pairs, pair_trials
+from ikns.statistics.paper import SUBJECTS, TIME, subject_spread_limit
 from ikns.statistics.power import Spread
-from ikns.statistics.printed import PAPER
-from ikns.statistics.printed_spread import subject_spread_limit
 from ikns.statistics.table import Table, column, labels, numbers
 
 __all__ = ["AssumedSpread", "paper_spread", "pilot_spread"]
@@ -76,7 +75,7 @@ def paper_spread(experiment: Literal["tracking", "picking"]) -> AssumedSpread:
             "open being differences between subjects"
         )
     elif experiment == "picking":
-        most = PAPER.time_ikns[1].value + PAPER.time_ring[1].value
+        most = sum(float(deviation) for _, deviation in TIME.values())
         source = (
             "the paper's printed deviations of times added up, as if all of them were "
             "differences between subjects and who is slow with one condition were "
@@ -86,7 +85,7 @@ def paper_spread(experiment: Literal["tracking", "picking"]) -> AssumedSpread:
         raise InvalidInput(
             f"expected the experiment 'tracking' or 'picking', found {experiment!r}."
         )
-    return AssumedSpread(Spread(most), source, most, subjects=PAPER.subjects)
+    return AssumedSpread(Spread(most), source, most, subjects=SUBJECTS)
 
 
 def pilot_spread(

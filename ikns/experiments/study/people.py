@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 
 import numpy as np
@@ -11,17 +10,14 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
 from ikns.experiments.study.design import Parameters
-from ikns.nullspace.interpolation import NaturalNeighborInterpolator
-from ikns.nullspace.map import NullSpaceMap
-from ikns.nullspace.map.interpolator import NearestPoint
 from ikns.recording.recording import Recording
 from ikns.simulation.operator import Participant, draw_participant
 from ikns.simulation.protocol import Protocol
 
 __all__ = ["recalibrated", "study_participant"]
 
-#: Parameters of the calibration, which do not change the recordings.
-_OF_CALIBRATION = ("max_hand_speed", "layout", "outside")
+#: Parameters that change what is made of the recordings, not the recordings.
+_OF_CALIBRATION = ("max_hand_speed", "layout", "outside", "interpolation")
 
 
 def study_participant(number: int, *, seed: int, parameters: Parameters) -> Participant:
@@ -61,18 +57,9 @@ def recalibrated(person: Participant, parameters: Parameters) -> Participant:
         When the calibration fails.
     """
     usual = Parameters()
-    if any(getattr(parameters, k) != getattr(usual, k) for k in _OF_CALIBRATION):
-        subject = _calibrated(person.protocol, parameters)
-        person = dataclasses.replace(person, subject=subject)
-    if parameters.interpolation != "natural":
-        learned = _with_interpolation(
-            person.subject.null_space_map,
-            parameters.interpolation,
-            outside=parameters.outside,
-        )
-        subject = dataclasses.replace(person.subject, null_space_map=learned)
-        person = dataclasses.replace(person, subject=subject)
-    return person
+    if all(getattr(parameters, k) == getattr(usual, k) for k in _OF_CALIBRATION):
+        return person
+    return dataclasses.replace(person, subject=_calibrated(person.protocol, parameters))
 
 
 def _calibrated(protocol: Protocol, parameters: Parameters) -> Subject:
@@ -89,6 +76,7 @@ def _calibrated(protocol: Protocol, parameters: Parameters) -> Subject:
         n_points=len(points),
         max_hand_speed=parameters.max_hand_speed,
         outside=parameters.outside,  # type: ignore[arg-type]
+        interpolation=parameters.interpolation,  # type: ignore[arg-type]
     )
 
 
@@ -102,20 +90,3 @@ def _at_point(protocol: Protocol, point: int) -> Recording:
         whole.labels,
         f"{whole.source}, point {point + 1}",
     )
-
-
-def _with_interpolation(
-    learned: NullSpaceMap, method: str, *, outside: str
-) -> NullSpaceMap:
-    """Return the map with another interpolation between its points."""
-    changed = copy.copy(learned)
-    changed.interpolator_ = (
-        NearestPoint(learned.centers_)
-        if method == "nearest"
-        else NaturalNeighborInterpolator(
-            learned.centers_,
-            outside=outside,  # type: ignore[arg-type]
-            method=method,  # type: ignore[arg-type]
-        )
-    )
-    return changed

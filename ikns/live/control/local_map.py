@@ -41,7 +41,10 @@ class LocalMap:
         self._natural: NaturalNeighborInterpolator | None = None
         if isinstance(made.interpolator_, NaturalNeighborInterpolator):
             self._natural = NaturalNeighborInterpolator(
-                made.centers_, self._values, outside=made.outside
+                made.centers_,
+                self._values,
+                outside=made.outside,
+                method=made.interpolator_.method,
             )
 
     def __call__(self, x: Array) -> tuple[Array, Array, Array]:

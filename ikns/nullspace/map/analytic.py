@@ -65,7 +65,8 @@ def analytic_map(
         map to use its samples. Default as in
         :func:`ikns.nullspace.clustering.nearest_center`.
     **parameters
-        Of :class:`NullSpaceMap`: `n_dof`, `quantiles`, `outside`, `reference`.
+        Of :class:`NullSpaceMap`: `n_dof`, `quantiles`, `outside`, `interpolation`,
+        `reference`.
 
     Returns
     -------

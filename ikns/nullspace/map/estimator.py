@@ -31,7 +31,7 @@ from ikns.nullspace.map.checks import (
     usable_points,
     warn_of_components,
 )
-from ikns.nullspace.map.interpolator import make_interpolator
+from ikns.nullspace.map.interpolator import Interpolation, make_interpolator
 from ikns.numerics.subspace import principal_components
 
 __all__ = ["NullSpaceMap"]
@@ -79,6 +79,10 @@ class NullSpaceMap(BaseEstimator):
     reference : (n,) or (d, n) array, optional
         What rises with c, as a gradient over the joints: its product with the sum of
         all Z is made positive, row by row. Default: that sum's largest entry is.
+    interpolation : {"natural", "laplace", "nearest"}
+        Weights between the points: natural neighbors by volume (the paper's), natural
+        neighbors by area (Laplace), or all the weight to the nearest point. Signs
+        agree between natural neighbors with all three.
     min_samples : int, optional
         Points with fewer samples are left out, with a warning. Default: a tenth of an
         equal share, N / (10 n_points); half a second of 5 s at each point.
@@ -133,6 +137,7 @@ class NullSpaceMap(BaseEstimator):
         quantiles: tuple[float, float] = (0.0, 1.0),
         max_iter: int = 300,
         reference: ArrayLike | None = None,
+        interpolation: Interpolation = "natural",
         min_samples: int | None = None,
     ) -> None:
         self.n_points = n_points
@@ -144,6 +149,7 @@ class NullSpaceMap(BaseEstimator):
         self.quantiles = quantiles
         self.max_iter = max_iter
         self.reference = reference
+        self.interpolation = interpolation
         self.min_samples = min_samples
 
     def __sklearn_tags__(self) -> Any:
@@ -186,7 +192,7 @@ class NullSpaceMap(BaseEstimator):
         ).fit(x)
         used = usable_points(found, settings.min_samples)
         centers = found.cluster_centers_[used]
-        interpolator = make_interpolator(centers, self.outside)
+        interpolator = make_interpolator(centers, self.outside, self.interpolation)
         rows = [np.flatnonzero(found.labels_ == k) for k in used]
 
         parts = [principal_components(moves[r], centered=centered) for r in rows]
@@ -244,15 +250,15 @@ class NullSpaceMap(BaseEstimator):
         Raises
         ------
         InvalidInput, NotEnoughData
-            When shapes disagree, values are not finite, a range is negative, or 4 or
-            more points in space lie in a plane.
+            When shapes disagree, values are not finite, a range is negative, the
+            interpolation is unknown, or 4 or more points in space lie in a plane.
         """
         places, z, m, M = checked_map(centers, directions, lower, upper)
         made = cls(**{**parameters, "n_points": len(places), "n_dof": z.shape[1]})
         made.n_features_in_ = places.shape[1]
         made.centers_, made.directions_, made.lower_, made.upper_ = places, z, m, M
         made.counts_ = np.full(len(places), counts, dtype=np.int64)
-        made.interpolator_ = make_interpolator(places, made.outside)
+        made.interpolator_ = make_interpolator(places, made.outside, made.interpolation)
         return made
 
     def control_signal(self, q: ArrayLike, x: ArrayLike) -> Any:

@@ -1,7 +1,7 @@
-"""Between the points: natural neighbors, or the nearest point where those mean nothing.
+"""Between the points: natural neighbors, or the nearest point.
 
 Natural neighbors need a volume. One to three points, or points that are not in space,
-have none.
+have none, and the nearest point's values hold.
 """
 
 from __future__ import annotations
@@ -12,25 +12,54 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.errors import InvalidInput
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
-__all__ = ["NearestPoint", "make_interpolator"]
+__all__ = ["Interpolation", "NearestPoint", "make_interpolator"]
+
+Interpolation = Literal["natural", "laplace", "nearest"]
+
+_METHODS: dict[str, Literal["sibson", "laplace"]] = {
+    "natural": "sibson",
+    "laplace": "laplace",
+}
 
 
 def make_interpolator(
-    points: NDArray[np.float64], outside: Literal["nearest", "project", "nan"]
+    points: NDArray[np.float64],
+    outside: Literal["nearest", "project", "nan"],
+    interpolation: Interpolation = "natural",
 ) -> NaturalNeighborInterpolator | NearestPoint:
     """Interpolator between points (P, d): natural neighbors from 4 points in space on.
 
+    Parameters
+    ----------
+    points : (P, d) array
+    outside, interpolation : str
+        Of :class:`ikns.NullSpaceMap`.
+
     Raises
     ------
+    InvalidInput
+        For an unknown interpolation.
     NotEnoughData
         When 4 or more points in space lie in a plane.
     """
-    if points.shape[1] == 3 and len(points) >= 4:
-        return NaturalNeighborInterpolator(points, outside=outside)
-    return NearestPoint(points)
+    known = (*_METHODS, "nearest")
+    if interpolation not in known:
+        raise InvalidInput(
+            f"expected interpolation as one of {known}, found '{interpolation}'."
+        )
+    if interpolation == "nearest" or not _in_space(points):
+        return NearestPoint(points)
+    return NaturalNeighborInterpolator(
+        points, outside=outside, method=_METHODS[interpolation]
+    )
+
+
+def _in_space(points: NDArray[np.float64]) -> bool:
+    return points.shape[1] == 3 and len(points) >= 4
 
 
 class NearestPoint:
@@ -46,14 +75,21 @@ class NearestPoint:
     Attributes
     ----------
     points : (P, d) array
-    edges : (P (P - 1) / 2, 2) integer array
-        All pairs of points.
     """
 
     def __init__(self, points: ArrayLike) -> None:
         self.points = np.asarray(points, dtype=np.float64)
+
+    @property
+    def edges(self) -> NDArray[np.int64]:
+        """Pairs of neighbors, (E, 2): of 4 points and more in space natural ones.
+
+        Of others all pairs.
+        """
+        if _in_space(self.points):
+            return NaturalNeighborInterpolator(self.points).edges
         pairs = list(itertools.combinations(range(len(self.points)), 2))
-        self.edges = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
     def weights(self, x: ArrayLike) -> NDArray[np.float64]:
         """Weights at queries (..., d), (..., P); NaN where a query is not finite."""

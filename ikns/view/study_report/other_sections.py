@@ -1,4 +1,4 @@
-"""Sections on attempts, variations, methods, the paper, and what is left out."""
+"""Sections on attempts, variations, methods, and what is left out."""
 
 from __future__ import annotations
 
@@ -13,14 +13,12 @@ from ikns.experiments.study.summary import (
 )
 from ikns.experiments.study.summary.answers import people
 from ikns.experiments.study.summary.methods import methods, setting_text
-from ikns.statistics import paper_reexamined
 from ikns.view.parts import Cell, Section, Table
 
 __all__ = [
     "done_section",
     "left_out_section",
     "methods_section",
-    "paper_section",
     "variation_section",
 ]
 
@@ -169,28 +167,6 @@ def methods_section(group: Group) -> Section:
             "Written from what the visits and the study file hold; to be pasted and "
             "shortened.",
             *methods(group),
-        ],
-    )
-
-
-def paper_section() -> Section:
-    """Examine the paper from nothing but what it prints."""
-    return Section(
-        "The paper's own figures, examined again",
-        [
-            "No raw data of the paper are published. This asks what its printed "
-            "numbers (arXiv 2012.03600) imply together, within their rounding; it is "
-            "about the paper's participants, not about those of this study."
-        ],
-        tables=[
-            Table(
-                ["the paper says", "verdict", "what its numbers imply"],
-                [
-                    [finding.claim, finding.verdict, finding.implies]
-                    for finding in paper_reexamined()
-                ],
-                "Claims of the paper.",
-            )
         ],
     )
 

@@ -38,7 +38,6 @@ def study_html(
     summary: StudySummary,
     parts: Sequence[GroupPart],
     *,
-    about_paper: Section,
     left_out: Section | None,
     next_steps: Sequence[NextStep],
 ) -> str:
@@ -76,7 +75,6 @@ def study_html(
             body.append(page.section(cannot))
         body += [page.section(section) for section in part.sections]
     page.of(simulated=False)
-    body.append(page.section(about_paper))
     if left_out is not None:
         body.append(page.section(left_out))
     body += [steps_html(next_steps), "</main>"]

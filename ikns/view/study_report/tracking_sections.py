@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from ikns.experiments.study.summary import TrackingComparison, TrackingSummary
 from ikns.experiments.study.summary.answers import people, worded
 from ikns.experiments.study.summary.tracking import UNITS
-from ikns.statistics.printed import PAPER
+from ikns.statistics.paper import RMSE, TRAJECTORIES
 from ikns.statistics.wording import p_text
 from ikns.view.parts import Cell, Picture, Section, Table
 from ikns.view.study_report.learning_figure import learning_figure
@@ -167,8 +167,8 @@ def _rmse_table(found: TrackingSummary) -> Table:
     """Mean and spread by condition and trajectory, next to the paper's."""
     printed = {
         (condition, trajectory): value
-        for condition, values in (("ikns", PAPER.ikns), ("gamepad", PAPER.gamepad))
-        for trajectory, value in zip(PAPER.trajectories, values, strict=True)
+        for condition, values in RMSE.items()
+        for trajectory, value in zip(TRAJECTORIES, values, strict=True)
     }
     rows: list[list[Cell]] = []
     for cell in found.rmse:
@@ -183,7 +183,7 @@ def _rmse_table(found: TrackingSummary) -> Table:
                 cell.over.high,
                 cell.over.subjects,
                 cell.trials,
-                "" if of is None else f"{of[0].text}\u00a0±\u00a0{of[1].text}",
+                "" if of is None else f"{of[0]}\u00a0±\u00a0{of[1]}",
             ]
         )
     return Table(

@@ -17,7 +17,6 @@ from ikns.view.study_report.other_sections import (
     done_section,
     left_out_section,
     methods_section,
-    paper_section,
     variation_section,
 )
 from ikns.view.study_report.page import GroupPart, study_html
@@ -74,7 +73,6 @@ def study_page(summary: StudySummary) -> tuple[str, list[tuple[str, ReportFigure
     page = study_html(
         summary,
         parts,
-        about_paper=paper_section(),
         left_out=left_out_section(summary),
         next_steps=_next_steps(summary),
     )

@@ -13,7 +13,6 @@ from ikns.experiments.study.summary.methods import methods
 from ikns.experiments.study.summary.picking import PickingSummary
 from ikns.experiments.study.summary.study import Group, StudySummary
 from ikns.experiments.study.summary.tracking import TrackingSummary
-from ikns.statistics import paper_reexamined
 
 __all__ = ["error_csv", "numbers", "trials_csv"]
 
@@ -29,7 +28,6 @@ def numbers(summary: StudySummary) -> dict[str, Any]:
             for each in summary.left_out
         ],
         "groups": [_group(group) for group in summary.groups],
-        "paper": [dataclasses.asdict(finding) for finding in paper_reexamined()],
     }
 
 

@@ -6,10 +6,10 @@ import math
 
 from scipy import stats
 
-from ikns.statistics.finding import Finding
 from ikns.statistics.library import statsmodels
-from ikns.statistics.printed import PAPER
 from ikns.statistics.wording import number
+from paper.finding import Finding
+from paper.printed import PAPER
 
 __all__ = ["examine_participants", "examine_picking"]
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ikns.statistics.paper import POOLED_P, RMSE, SUBJECTS, TIME, TRAJECTORIES
+
 __all__ = ["PAPER", "Printed"]
 
 
@@ -44,31 +46,28 @@ class Printed:
         return self.value + self.half
 
 
+def _pair(texts: tuple[str, str]) -> tuple[Printed, Printed]:
+    """Mean and standard deviation."""
+    return Printed(texts[0]), Printed(texts[1])
+
+
 @dataclass(frozen=True)
 class _Paper:
-    subjects: int = 10
+    subjects: int = SUBJECTS
     youngest: int = 22
     oldest: int = 57
     age: tuple[Printed, Printed] = (Printed("35"), Printed("4.5"))
-    trajectories: tuple[str, ...] = ("T1", "T2", "T3")
+    trajectories: tuple[str, ...] = TRAJECTORIES
     # RMSE, mean and standard deviation, of a control signal of 0 to 100
-    ikns: tuple[tuple[Printed, Printed], ...] = (
-        (Printed("3.35"), Printed("0.83")),
-        (Printed("5.43"), Printed("0.92")),
-        (Printed("4.50"), Printed("1.54")),
-    )
-    gamepad: tuple[tuple[Printed, Printed], ...] = (
-        (Printed("4.13"), Printed("0.76")),
-        (Printed("4.98"), Printed("1.33")),
-        (Printed("4.15"), Printed("1.10")),
-    )
+    ikns: tuple[tuple[Printed, Printed], ...] = tuple(map(_pair, RMSE["ikns"]))
+    gamepad: tuple[tuple[Printed, Printed], ...] = tuple(map(_pair, RMSE["gamepad"]))
     t: Printed = Printed("0.27")
     degrees: int = 29
-    p: Printed = Printed("0.979")
+    p: Printed = Printed(POOLED_P)
     absolute_error_below: Printed = Printed("4.5")
     # Pick and place: s, mean and standard deviation
-    time_ikns: tuple[Printed, Printed] = (Printed("8.94"), Printed("3.26"))
-    time_ring: tuple[Printed, Printed] = (Printed("6.34"), Printed("0.71"))
+    time_ikns: tuple[Printed, Printed] = _pair(TIME["ikns"])
+    time_ring: tuple[Printed, Printed] = _pair(TIME["ring"])
     time_median: Printed = Printed("1.44")
     time_p: Printed = Printed("0.01")
     time_limit: float = 20.0

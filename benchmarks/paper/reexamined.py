@@ -6,9 +6,9 @@ their rounding. Everything is computed from `printed.PAPER`; nothing is typed in
 
 from __future__ import annotations
 
-from ikns.statistics.finding import Finding
-from ikns.statistics.published_picking import examine_participants, examine_picking
-from ikns.statistics.published_tracking import examine_tracking
+from paper.finding import Finding
+from paper.picking import examine_participants, examine_picking
+from paper.tracking import examine_tracking
 
 __all__ = ["Finding", "paper_reexamined"]
 

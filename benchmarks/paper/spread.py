@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from ikns.statistics.printed import PAPER
+from paper.printed import PAPER
 
 __all__ = [
     "MARGINS",
     "difference_range",
     "spread_range",
     "standard_error",
-    "subject_spread_limit",
     "tost_p",
 ]
 
@@ -40,9 +39,9 @@ def difference_range() -> tuple[float, float, float]:
     return float(d.mean()), float(d.mean() - rounding), float(d.mean() + rounding)
 
 
-def _between(rounding: float) -> float:
+def _between() -> float:
     """Sum of squares of differences that the trajectories' means alone make, least."""
-    d, _ = _means()
+    d, rounding = _means()
     deviations = np.abs(d - d.mean())
     # Rounding moves a mean by at most this, and its deviation by 4/3 of that.
     least = np.maximum(deviations - 4 / 3 * rounding, 0.0)
@@ -56,10 +55,9 @@ def spread_range() -> tuple[float, float]:
     condition is little with the other in every subject, so that deviations add up
     (rounded figures taken at their upper ends).
     """
-    _, rounding = _means()
+    d, rounding = _means()
     n, k = PAPER.subjects, len(PAPER.trajectories)
-    low = _between(rounding) / (n * k - 1)
-    d, _ = _means()
+    low = _between() / (n * k - 1)
     within = [
         (n - 1) * (a[1].high + b[1].high) ** 2
         for a, b in zip(PAPER.ikns, PAPER.gamepad, strict=True)
@@ -76,17 +74,6 @@ def standard_error() -> tuple[float, float]:
     best = abs(d) / float(stats.t.isf(PAPER.p.value / 2, df))
     worst = max(abs(low), abs(high)) / float(stats.t.isf(PAPER.p.high / 2, df))
     return best, min(worst, spread_range()[1] / math.sqrt(df + 1))
-
-
-def subject_spread_limit() -> float:
-    """Largest standard deviation of the subjects' mean differences, given the p.
-
-    What the trajectories' means do not take of the sum of squares belongs to the
-    subjects at most.
-    """
-    n, k = PAPER.subjects, len(PAPER.trajectories)
-    total = PAPER.degrees * standard_error()[0] ** 2 * (PAPER.degrees + 1)
-    return math.sqrt((total - _between(0.0)) / (k * (n - 1)))
 
 
 def tost_p(margin: float, difference: float, error: float, degrees: int) -> float:

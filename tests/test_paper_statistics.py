@@ -1,21 +1,22 @@
-"""What the paper prints, examined by other means than the package uses."""
+"""What the paper prints, examined by other means than the benchmark uses."""
 
 import math
+import sys
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import optimize, special, stats
 from statsmodels.stats.weightstats import ttost_paired
 
-from ikns.statistics import Finding, paper_reexamined
-from ikns.statistics.printed import PAPER
-from ikns.statistics.printed_spread import (
-    difference_range,
-    spread_range,
-    standard_error,
-    subject_spread_limit,
-)
+from ikns.statistics.assumed_spread import paper_spread
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from paper.finding import Finding
+from paper.printed import PAPER, Printed
+from paper.reexamined import paper_reexamined
+from paper.spread import difference_range, spread_range, standard_error
 
 FINDINGS = paper_reexamined()
 
@@ -34,6 +35,13 @@ def thirty(mean: float, deviation: float) -> np.ndarray:
     """Thirty differences with exactly this mean and standard deviation."""
     x = np.random.default_rng(0).normal(size=30)
     return mean + deviation * (x - x.mean()) / x.std(ddof=1)
+
+
+def test_a_printed_number_is_what_rounds_to_it() -> None:
+    for text, low, high in (("0.979", 0.9785, 0.9795), ("22", 21.5, 22.5)):
+        number = Printed(text)
+        assert number.value == float(text)
+        assert (number.low, number.high) == pytest.approx((low, high), rel=1e-15)
 
 
 def test_every_claim_has_a_verdict_and_a_sentence() -> None:
@@ -108,13 +116,11 @@ def test_equivalence_of_data_with_the_printed_moments() -> None:
     assert ttost_paired(x, 0 * x, -smallest, smallest)[0] == pytest.approx(0.05)
 
 
-def test_subjects_can_spread_as_much_as_the_sum_of_squares_leaves() -> None:
-    means = np.array([-0.78, 0.45, 0.35])
-    subject = np.random.default_rng(2).normal(size=10)
-    subject = (subject - subject.mean()) / subject.std(ddof=1) * subject_spread_limit()
-    # All that is not the trajectories' is the subjects': the printed p again.
-    d = means[:, None] + subject
-    assert stats.ttest_1samp(d.ravel(), 0).pvalue == pytest.approx(0.979, abs=1e-9)
+def test_subjects_spread_at_most_as_a_plan_takes_them_to() -> None:
+    values = finding("the same, over persons").values
+    assert values["spread"] == paper_spread("tracking").deviation
+    # No more than the pooled differences can spread at all.
+    assert values["spread"] < spread_range()[1]
 
 
 def test_trajectories_are_the_t_tests_of_data_with_their_moments() -> None:

@@ -7,18 +7,18 @@ import math
 import numpy as np
 from scipy import stats
 
-from ikns.statistics.finding import Finding
 from ikns.statistics.library import statsmodels
-from ikns.statistics.printed import PAPER
-from ikns.statistics.printed_spread import (
+from ikns.statistics.paper import subject_spread_limit
+from ikns.statistics.wording import p_text
+from paper.finding import Finding
+from paper.printed import PAPER
+from paper.spread import (
     MARGINS,
     difference_range,
     spread_range,
     standard_error,
-    subject_spread_limit,
     tost_p,
 )
-from ikns.statistics.wording import p_text
 
 __all__ = ["examine_tracking"]
 

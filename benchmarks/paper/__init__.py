@@ -1,0 +1,1 @@
+"""What `paper_statistics.py` is made of."""
