@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -39,14 +40,12 @@ def control(
     It is the map's own; `ikns run --source replay:FILE` also smooths it and leaves out
     frames that do not count.
     """
-    from ikns.calibration import track_chain
-
     refuse_overwriting(out, force=force)
     calibrated = ikns.Subject.load(subject)
     frames = ikns.read(recording)
     with progress() as report:
-        motion = track_chain(
-            calibrated.skeleton, frames, calibrated.chain, progress=report
+        motion = ikns.MarkerIK(calibrated.skeleton).track(
+            frames, chain=calibrated.chain, progress=partial(report, recording.name)
         )
     result = write_control(out, calibrated, motion, mode=mode)
     show(

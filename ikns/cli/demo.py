@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -43,7 +44,6 @@ def demo(
     result comes. Its motion follows the Jacobian's null space, which the method never
     sees.
     """
-    from ikns.calibration import track_chain
     from ikns.calibration.subject import FILES
     from ikns.view.demo_report import still_samples, write_demo_report
     from ikns.view.scene import recording_scene, scene_html
@@ -70,7 +70,9 @@ def demo(
         subject = dataclasses.replace(subject, report=about)
         subject.save(folder / "subject")
         motion = subject.motions[0]
-        reaching = track_chain(subject.skeleton, free, subject.chain, progress=report)
+        reaching = ikns.MarkerIK(subject.skeleton).track(
+            free, chain=subject.chain, progress=partial(report, "free.c3d")
+        )
         control = write_control(folder / "control.csv", subject, reaching)
         rows, warned = comparison_rows(subject, motion, source="points.c3d")
 

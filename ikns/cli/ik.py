@@ -31,7 +31,11 @@ def ik(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write joint angles (deg), the pose of the thorax and residuals per frame."""
+    """Write joint angles (deg), the pose of the thorax and residuals per frame.
+
+    Cells of a joint are empty in frames in which a segment next to it is out of sight,
+    cells of the thorax in frames that do not show it.
+    """
     import numpy as np
 
     refuse_overwriting(out, force=force)
@@ -55,7 +59,7 @@ def ik(
             [
                 motion.time,
                 degrees,
-                motion.q[:, : len(_THORAX)],
+                motion.thorax_in_world,
                 motion.residual,
                 motion.converged,
             ]
@@ -63,7 +67,8 @@ def ik(
     )
     median = finite_median(motion.residual)
     converged = int(motion.converged.sum())
-    span = np.ptp(degrees, axis=0)
+    lowest, highest = np.fmin.reduce(degrees), np.fmax.reduce(degrees)
+    span = highest - lowest
     show(
         {
             "recording": recording,
@@ -81,12 +86,16 @@ def ik(
             "Joint angles",
             {"joint": "s", "lowest deg": ".1f", "highest deg": ".1f", "note": "s"},
             [
-                [name, low, high, "held: no marker shows it" * (name in motion.held)]
+                [
+                    name,
+                    low,
+                    high,
+                    "held: no marker shows it"
+                    if name in motion.held
+                    else "never in sight" * bool(np.isnan(low)),
+                ]
                 for name, low, high in zip(
-                    motion.joint_names,
-                    degrees.min(axis=0).tolist(),
-                    degrees.max(axis=0).tolist(),
-                    strict=True,
+                    motion.joint_names, lowest.tolist(), highest.tolist(), strict=True
                 )
             ],
         ),

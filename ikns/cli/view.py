@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -50,8 +51,6 @@ def view(
 
     With a recording the page plays it, beside what the map says.
     """
-    from ikns.calibration import track_chain
-
     refuse_overwriting(out, force=force)
     if png is not None:
         refuse_overwriting(png, force=force)
@@ -76,7 +75,11 @@ def view(
         )
     else:
         with progress() as report:
-            motion = track_chain(person.skeleton, frames, person.chain, progress=report)
+            motion = ikns.MarkerIK(person.skeleton).track(
+                frames,
+                chain=person.chain,
+                progress=partial(report, Path(frames.source).name),
+            )
         scene = recording_scene(
             person.skeleton,
             learned,
