@@ -23,7 +23,7 @@ import sklearn
 
 import ikns
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import calibrate, track_chain
+from ikns.calibration import calibrate
 from ikns.calibration.scaling import scale
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import NullSpaceMap, null_space_samples
@@ -45,10 +45,8 @@ def round_of_steps(folder: Path) -> dict[str, float]:
     mark("read two C3D files")
     skeleton, _ = scale(Skeleton.load(), static)
     mark("scale the body")
-    MarkerIK(skeleton).track(points)
+    motion = MarkerIK(skeleton).track(points, chain="right_arm")
     mark("track the markers")
-    motion = track_chain(skeleton, points, "right_arm")
-    start = time.perf_counter()
     x, q = null_space_samples(motion, "right_arm")
     NullSpaceMap(10).fit(x, q)
     mark("fit the map")

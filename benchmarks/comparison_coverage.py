@@ -49,7 +49,8 @@ from ikns.analysis.compare import (
 from ikns.analysis.compare.leak import hand_turns, slopes
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import calibrate, track_chain
+from ikns.calibration import calibrate
+from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
 from ikns.simulation.arm import Arm
@@ -251,7 +252,7 @@ def reported(
     found = compare_motion(
         learned, subject.skeleton, subject.motions[0], resamples=resamples, seed=seed
     )
-    reaching = track_chain(subject.skeleton, run.free.recording, CHAIN)
+    reaching = MarkerIK(subject.skeleton).track(run.free.recording, chain=CHAIN)
     across = motion_crosstalk(learned, reaching, resamples=resamples, seed=seed)
     return found, across, learned, Arm(person.skeleton, SIDE), run.places
 

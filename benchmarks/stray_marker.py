@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ikns import MarkerIK, Skeleton, read, scale
-from ikns.calibration import calibrate, in_sight, sight_needs
+from ikns.calibration import calibrate, sight_needs
 from ikns.calibration.subject import Subject
 from ikns.live.control import ControlFrame, FrameSolver
 from ikns.live.control.settings import ControlSettings
@@ -81,7 +81,7 @@ def strayed(seed: int, draws: int) -> Strayed:
     subject, recording = person(seed)
     skeleton, chain = subject.skeleton, subject.chain
     seen = skeleton.marker_set.pick(recording.labels, recording.markers)
-    shown = np.all(list(in_sight(skeleton, recording, chain).values()), axis=0)
+    shown = MarkerIK(skeleton).track(recording).in_sight(chain)
     segments = {
         column: f"{link.replace('_', ' ')}, {len(columns)}"
         for link, (columns, _) in sight_needs(skeleton, chain).items()

@@ -9,7 +9,7 @@ import small_person
 
 from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import calibrate, elbow_reference, in_sight, track_chain
+from ikns.calibration import calibrate, elbow_reference
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
 from ikns.nullspace.map import still_mask
 from ikns.recording.files import read
@@ -197,34 +197,6 @@ def test_with_two_arms_and_two_degrees_of_freedom_each_elbow_has_its_own() -> No
         right + left, elbow_reference(skeleton, q, "both_arms")[0]
     )
     assert elbow_reference(skeleton, q, "right_arm", n_dof=7) is None
-
-
-def test_a_limb_is_in_sight_with_one_marker_and_the_thorax_with_three() -> None:
-    skeleton, run = small_person.subject().skeleton, small_person.protocol()
-    recording = small_person.cut(run.points.recording, 0, 5)
-    labels = list(recording.labels)
-    markers = np.ones_like(recording.markers)
-    markers[1, [labels.index("C7")]] = np.nan
-    markers[2, [labels.index(name) for name in ("C7", "T10")]] = np.nan
-    markers[3, [labels.index(name) for name in ("RWRA", "RWRB")]] = np.nan
-    markers[4, [labels.index(name) for name in ("RWRA", "RWRB", "RFRM")]] = np.nan
-    shown = in_sight(
-        skeleton, Recording(recording.time, markers, labels, "five"), "right_arm"
-    )
-    assert not any(link.startswith("left") for link in shown)
-    assert shown["thorax"].tolist() == [True, True, False, True, True]
-    assert shown["right_forearm"].tolist() == [True, True, True, True, False]
-
-
-def test_a_hidden_hand_is_not_a_still_hand() -> None:
-    skeleton, run = small_person.subject().skeleton, small_person.protocol()
-    recording = small_person.cut(run.points.recording, 0, 60)
-    markers = recording.markers.copy()
-    arm = [i for i, name in enumerate(recording.labels) if name[0] == "R"]
-    markers[20:40, arm] = np.nan
-    hidden = Recording(recording.time, markers, recording.labels, "hidden")
-    motion = track_chain(skeleton, hidden, "right_arm")
-    assert not still_mask(motion, "right_arm")[20:40].any()
 
 
 def test_a_recording_without_a_segment_is_refused_by_name() -> None:

@@ -8,7 +8,6 @@ import pytest
 from command_line import check_refused, read_csv
 
 import ikns
-from ikns.calibration import track_chain
 from ikns.cli import main
 from ikns.live.control import RateControl
 
@@ -26,7 +25,7 @@ def test_rate_mode_writes_what_the_library_makes(
     result = json.loads(capsys.readouterr().out)
     found = read_csv(out)
     person = ikns.Subject.load(files / "person")
-    motion = track_chain(person.skeleton, ikns.read(files / "free.c3d"), person.chain)
+    motion = ikns.MarkerIK(person.skeleton).track(ikns.read(files / "free.c3d"))
     control = RateControl(person.null_space_map, person.skeleton, person.chain)
     expected = control.track(motion)
     # The file has 9 digits.

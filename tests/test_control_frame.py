@@ -6,7 +6,7 @@ from scipy.spatial.distance import pdist
 
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import in_sight, sight_needs
+from ikns.calibration import sight_needs
 from ikns.errors import InvalidInput
 from ikns.live.control import FrameSolver
 from ikns.motion.marker_ik import MarkerIK
@@ -90,7 +90,7 @@ def test_a_frame_is_its_steps_one_by_one(skeleton, chain, settings):
     )
     needs = [columns for columns, _ in sight_needs(skeleton, chain).values()]
     chain_markers = np.concatenate(needs)
-    shown = np.all(list(in_sight(skeleton, recording, chain).values()), axis=0)
+    shown = MarkerIK(skeleton).track(recording).in_sight(chain)
     assert shown.any()
     inside, worn = 0, skeleton.markers_in_world(poses[0])
     steps = one_by_one(skeleton, learned, chain, frames)

@@ -20,7 +20,7 @@ from ikns.body.skeleton.tree import joint_tree
 from ikns.calibration.scaling import scale
 from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
 from ikns.motion.marker_ik.kernel import tree_paths
-from ikns.motion.marker_ik.pose import Frames
+from ikns.motion.marker_ik.pose import SolvedFrames
 from ikns.numerics.rigid import rigid_transform
 from ikns.recording.files import read
 
@@ -373,7 +373,7 @@ def test_a_recording_is_its_frames_one_by_one(skeleton):
         pose = solver.solve(seen, before)
         poses.append(pose)
         before = pose.q
-    batch = Frames.empty(30, 25)
+    batch = SolvedFrames.empty(30, 25)
     batch.put(0, poses[0])
     solver.solver.solve_many(np.array(frames), 1, 30, 1, batch)
     np.testing.assert_array_equal(batch.q, [pose.q for pose in poses])

@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import track_chain
 from ikns.errors import InvalidInput, NotEnoughData
+from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
@@ -53,7 +53,7 @@ def recording() -> Recording:
 
 @cache
 def motion() -> Motion:
-    return track_chain(small_person.subject().skeleton, recording(), CHAIN)
+    return MarkerIK(small_person.subject().skeleton).track(recording())
 
 
 @cache
@@ -246,7 +246,7 @@ def test_the_camera_sees_the_hand_wherever_it_goes() -> None:
 def test_a_real_recording_plays(data: Path, name: str, marker_set: str) -> None:
     body = Skeleton.load(marker_set=marker_set)
     trial = read(data / name)
-    tracked = track_chain(body, trial, CHAIN)
+    tracked = MarkerIK(body).track(trial)
     learned = small_person.subject().null_space_map
     made = recording_scene(body, learned, CHAIN, tracked, trial, simulated=False)
     assert 25 < 1 / np.median(np.diff(made.times)) < 40

@@ -18,9 +18,9 @@ from ikns.analysis.ucm import (
 )
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import track_chain
 from ikns.calibration.scaling import scale
 from ikns.errors import InvalidInput, NotEnoughData
+from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import still_mask
 from ikns.recording.files import read
@@ -144,7 +144,7 @@ def test_a_real_reach_lasts_as_long_as_its_authors_say(name: str, data: Path) ->
     folder = data / "ue_adl" / name
     static = read(folder / f"{name}_static.csv")
     skeleton, _ = scale(Skeleton.load(), static, marker_set="ue_adl", min_duration=0.3)
-    motion = track_chain(skeleton, read(folder / f"{name}FR1.csv"), "right_arm")
+    motion = MarkerIK(skeleton).track(read(folder / f"{name}FR1.csv"))
     cut = movement(motion.time, motion.hand_speed("right_arm"))
     with (folder / f"{name}FR1angles.csv").open() as file:
         frames = sum(1 for _ in file) - 1

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.calibration import track_chain
+from ikns.motion.marker_ik import MarkerIK
 from ikns.view.scene import (
     LiveView,
     Scene,
@@ -158,7 +158,7 @@ def test_a_recording_plays_with_our_controls_and_with_meshcats(
 ) -> None:
     person, body = small_person.subject(), small_person.subject().skeleton
     recording = small_person.cut(small_person.protocol().points.recording, 0, 60)
-    motion = track_chain(body, recording, CHAIN)
+    motion = MarkerIK(body).track(recording)
     scene = recording_scene(
         body, person.null_space_map, CHAIN, motion, recording, simulated=True
     )

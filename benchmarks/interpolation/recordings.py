@@ -13,8 +13,8 @@ from scipy.spatial.distance import cdist
 
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate, elbow_reference
-from ikns.calibration.sight import track_chain
 from ikns.errors import NotEnoughData
+from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap, null_space_samples, still_mask
 from ikns.simulation import Trial, Unsteadiness, simulate_protocol
@@ -118,7 +118,7 @@ def record(
     return Recorded(
         skeleton=found.skeleton,
         motion=found.motions[0],
-        test_motion=track_chain(found.skeleton, tests.recording, CHAIN),
+        test_motion=MarkerIK(found.skeleton).track(tests.recording, chain=CHAIN),
         points=points,
         tests=tests,
         visits=_visits(who, points),

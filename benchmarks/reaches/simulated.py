@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import calibrate, track_chain
+from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
+from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.simulation import (
     Protocol,
@@ -251,5 +252,5 @@ def _carried_out(
         rate=RATE,
         rng=rng,
     )
-    motion = track_chain(subject.skeleton, trial.recording, CHAIN)
+    motion = MarkerIK(subject.skeleton).track(trial.recording, chain=CHAIN)
     return Session(motion, meant, plan.point >= 0, trial.swivel)

@@ -14,7 +14,6 @@ from ikns.analysis.ucm import (
 )
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import track_chain
 from ikns.calibration.scaling import scale
 from ikns.errors import NotEnoughData
 from ikns.motion.marker_ik import MarkerIK
@@ -123,7 +122,7 @@ def real_people(folder: Path, *, quick: bool, seed: int) -> tuple[list[dict], st
                 continue
             recording = read(folder / name / f"{name}{task}{side[0].upper()}1.csv")
             chain = f"{side}_arm"
-            motion = track_chain(skeleton, recording, chain)
+            motion = MarkerIK(skeleton).track(recording, chain=chain)
             try:
                 across_trials(skeleton, [motion], chain=chain)
             except NotEnoughData as error:

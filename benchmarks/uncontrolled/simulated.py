@@ -15,8 +15,8 @@ from ikns.analysis.ucm import (
 )
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import track_chain
 from ikns.calibration.scaling import scale
+from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
 from ikns.simulation.arm import Arm
@@ -124,7 +124,8 @@ class Reaches:
             )
             time_s = np.arange(len(q)) / self.rate
             truth.append(true_motion(self.arm.skeleton, time_s, q))
-            found.append(track_chain(self.measured, trial.recording, "right_arm"))
+            solver = MarkerIK(self.measured)
+            found.append(solver.track(trial.recording, chain="right_arm"))
         return truth, found
 
     def true_split(self, truth: list[Motion]) -> VarianceSplit:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -20,9 +21,10 @@ from ikns.calibration.report import (
     static_report,
 )
 from ikns.calibration.scaling import ScalingReport, scale
-from ikns.calibration.sight import marker_fault, track_chain
+from ikns.calibration.sight import marker_fault
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData, naming
+from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.recording.recording import Recording
 
@@ -104,8 +106,9 @@ def calibrate(
         skeleton, scaling = scale(
             body, static, marker_set=marker_set, min_duration=min_static
         )
+    solver = MarkerIK(skeleton)
     motions = tuple(
-        track_chain(skeleton, recording, chain, progress=progress)
+        solver.track(recording, chain=chain, progress=_named(progress, recording))
         for recording in explorations
     )
     gates = [
@@ -167,6 +170,13 @@ def calibrate(
     step = len(x) // _SHOWN + 1
     shown = np.column_stack([x, learned.labels_ + 1.0])[::step]
     return Subject(skeleton, learned, chain, report, motions, shown)
+
+
+def _named(
+    progress: Callable[[str, int, int], None] | None, recording: Recording
+) -> Callable[[int, int], None] | None:
+    """Report progress under the name of a recording."""
+    return None if progress is None else partial(progress, Path(recording.source).name)
 
 
 def _left_out(

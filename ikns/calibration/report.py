@@ -87,18 +87,21 @@ def extrinsic_report(
 ) -> dict[str, Any]:
     """How far what is outside the chain moved while the hand was still.
 
-    The width that holds 90 % of the samples, for the exploration that moved it most.
+    The width that holds 90 % of the samples, for the exploration that moved it most;
+    None for a joint that was never seen meanwhile.
     """
-    spans = []
+    span = np.full(skeleton.nv, np.nan)
     for motion, gate in pairs:
         if gate.any():
             poses = motion.q[gate]
             moved = np.stack([skeleton.difference(poses[0], pose) for pose in poses])
-            low, high = np.percentile(moved, [5, 95], axis=0)
-            spans.append(high - low)
-    span = np.max(spans, axis=0)
+            moved[:, 6:][~motion.known[gate]] = np.nan
+            seen = np.isfinite(moved).any(axis=0)
+            low, high = np.nanpercentile(moved[:, seen], [5, 95], axis=0)
+            span[seen] = np.fmax(span[seen], high - low)
     own = chain_joints(chain)
-    angles = zip(skeleton.joint_names, np.degrees(span[6:]).tolist(), strict=True)
+    widths = [None if np.isnan(width) else float(width) for width in np.degrees(span)]
+    angles = zip(skeleton.joint_names, widths[6:], strict=True)
     return {
         "thorax_translation_m": float(np.linalg.norm(span[:3])),
         "thorax_rotation_deg": float(np.degrees(np.linalg.norm(span[3:6]))),

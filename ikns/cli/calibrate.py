@@ -215,7 +215,8 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
     """Return tables and sentences on the quality of a calibration."""
     static, extrinsic = report["static"], report["extrinsic"]
     least = report["settings"]["min_samples"]
-    moved = sorted(extrinsic["joints_deg"].items(), key=lambda item: -item[1])[:2]
+    seen = [item for item in extrinsic["joints_deg"].items() if item[1] is not None]
+    moved = sorted(seen, key=lambda item: -item[1])[:2]
     return [
         table(
             "Segments, joint to joint",
@@ -260,7 +261,8 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
         ),
         "Outside the chain, while the hand was still: thorax "
         f"{1000 * extrinsic['thorax_translation_m']:.0f} mm and "
-        f"{extrinsic['thorax_rotation_deg']:.0f} deg; most of all joints "
+        f"{extrinsic['thorax_rotation_deg']:.0f} deg"
+        + "; most of all joints " * bool(moved)
         + " and ".join(f"{name} {angle:.0f} deg" for name, angle in moved)
         + ".",
         *notes(report["warnings"]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -72,21 +73,21 @@ def compare(
     line along Z leads the hand; how far the null space bends; and crosstalk.
     """
     from ikns.analysis.compare import motion_crosstalk
-    from ikns.calibration import track_chain
     from ikns.calibration.simulated import is_simulated
 
     refuse_picture(figure, force=force)
     calibrated = ikns.Subject.load(subject)
     learned, own = calibrated.null_space_map, calibrated.chain
     with progress() as report:
-        motion = track_chain(
-            calibrated.skeleton, ikns.read(recording), own, progress=report
-        )
-        reaching = motion
-        if reaches is not None:
-            reaching = track_chain(
-                calibrated.skeleton, ikns.read(reaches), own, progress=report
+        solver = ikns.MarkerIK(calibrated.skeleton)
+        tracked = [
+            solver.track(
+                ikns.read(path), chain=own, progress=partial(report, path.name)
             )
+            for path in (recording, reaches)
+            if path is not None
+        ]
+    motion, reaching = tracked[0], tracked[-1]
     first: Literal["pose", "position"] = "position" if task == "position" else "pose"
     rows, warned = comparison_rows(
         calibrated, motion, source=str(recording), task=first

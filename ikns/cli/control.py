@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -33,15 +34,14 @@ def control(
     This is the map's own signal; `ikns run --source replay:FILE` also smooths it and
     rejects frames.
     """
-    from ikns.calibration import track_chain
     from ikns.live.control.recorded import control_table
 
     refuse_overwriting(out, force=force)
     calibrated = ikns.Subject.load(subject)
     frames = ikns.read(recording)
     with progress() as report:
-        motion = track_chain(
-            calibrated.skeleton, frames, calibrated.chain, progress=report
+        motion = ikns.MarkerIK(calibrated.skeleton).track(
+            frames, chain=calibrated.chain, progress=partial(report, recording.name)
         )
     found = control_table(calibrated, motion, mode=mode)
     write_csv(out, found.columns, found.rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +24,11 @@ def ik(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write joint angles (deg), the pose of the thorax and residuals per frame."""
+    """Write joint angles (deg), the pose of the thorax and residuals per frame.
+
+    Cells of a joint are empty in frames in which a segment next to it is out of sight,
+    cells of the thorax in frames that do not show it.
+    """
     from ikns.motion.table import motion_table
 
     refuse_overwriting(out, force=force)
@@ -44,10 +49,16 @@ def ik(
             "Joint angles",
             {"joint": "s", "lowest deg": ".1f", "highest deg": ".1f", "note": "s"},
             [
-                [name, low, high, "held: no marker shows it" * (name in motion.held)]
+                [name, low, high, _note(name, low, motion.held)]
                 for name, (low, high) in found.range_deg.items()
             ],
         ),
         f"Wrote {out}",
         as_json=as_json,
     )
+
+
+def _note(joint: str, lowest: float, held: tuple[str, ...]) -> str:
+    if joint in held:
+        return "held: no marker shows it"
+    return "never in sight" if math.isnan(lowest) else ""

@@ -256,7 +256,13 @@ def _result(
 
 
 def _draw(
-    path: Path, made: SamplingPlan, assumed: PilotSpread, *, aim: str, target: float, note: str
+    path: Path,
+    made: SamplingPlan,
+    assumed: PilotSpread,
+    *,
+    aim: str,
+    target: float,
+    note: str,
 ) -> None:
     from ikns.view.power import power_figure
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -53,7 +54,6 @@ def ucm(
     Several recordings: variance over repetitions at each normalized time. One: variance
     over the still samples at each PCA point.
     """
-    from ikns.calibration import track_chain
     from ikns.calibration.simulated import is_simulated
 
     refuse_picture(figure, force=force)
@@ -63,10 +63,13 @@ def ucm(
             f"{len(recordings)} names of fewer files."
         )
     calibrated = ikns.Subject.load(subject)
+    solver = ikns.MarkerIK(calibrated.skeleton)
     with progress() as report:
         motions = [
-            track_chain(
-                calibrated.skeleton, ikns.read(path), calibrated.chain, progress=report
+            solver.track(
+                ikns.read(path),
+                chain=calibrated.chain,
+                progress=partial(report, path.name),
             )
             for path in recordings
         ]

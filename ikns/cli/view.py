@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,7 +47,6 @@ def view(
 
     With a recording the page plays it, together with the map.
     """
-    from ikns.calibration import track_chain
     from ikns.calibration.simulated import is_simulated
 
     refuse_overwriting(out, force=force)
@@ -73,7 +73,11 @@ def view(
         )
     else:
         with progress() as report:
-            motion = track_chain(person.skeleton, frames, person.chain, progress=report)
+            motion = ikns.MarkerIK(person.skeleton).track(
+                frames,
+                chain=person.chain,
+                progress=partial(report, Path(frames.source).name),
+            )
         scene = recording_scene(
             person.skeleton,
             learned,

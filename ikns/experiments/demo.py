@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ikns.calibration import calibrate, track_chain
+from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
 from ikns.calibration.swivel_check import SwivelSamples, swivel_samples
 from ikns.live.control.recorded import ControlTable, control_table
+from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
@@ -87,7 +89,9 @@ def run_demo(
     report = subject.report | {"simulated": True}
     subject = dataclasses.replace(subject, report=report)
     subject.save(folder / "subject")
-    reaching = track_chain(subject.skeleton, free, subject.chain, progress=progress)
+    reaching = MarkerIK(subject.skeleton).track(
+        free, chain=subject.chain, progress=partial(progress, "free.c3d")
+    )
     control = control_table(subject, reaching)
 
     still = swivel_samples(subject, protocol.points.swivel)

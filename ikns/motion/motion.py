@@ -1,20 +1,26 @@
-"""A motion: joints and hands over time."""
+"""A motion: joints and hands over time, and what of them was seen."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 
-__all__ = ["Motion"]
+__all__ = ["Motion", "all_seen"]
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Joints and hands over time.
+    """Joints and hands over time, NaN where they were not seen.
+
+    `q` alone has a number in every frame, so that there is a posture to draw and to
+    compute with: what was not seen stays there where it was. Everything else is NaN
+    where it is not known: an angle and its velocity by `known`, the pose of the thorax
+    by `seen` of the thorax, a hand while the thorax or a segment of its arm is out of
+    sight.
 
     Parameters
     ----------
@@ -41,7 +47,15 @@ class Motion:
     converged : (T,) boolean array
         Whether the solver met its tolerance.
     held : tuple of str
-        Joints that the markers could not observe; they stayed at their prior.
+        Joints that the markers cannot observe; they stayed at their prior. Their angle
+        is that prior, and NaN where a segment next to the joint was not seen.
+    segments : tuple of S str
+        Links that carry markers, and the thorax.
+    seen : (T, S) boolean array
+        Whether each was in sight. By default there are none, and all was seen.
+    known : (T, J) boolean array
+        Whether the frame shows each joint, in the order of `joint_names`; the rule is
+        that of :func:`ikns.motion.marker_ik.visibility.visible_segments`.
     """
 
     time: NDArray[np.float64]
@@ -55,40 +69,101 @@ class Motion:
     iterations: NDArray[np.int64]
     converged: NDArray[np.bool_]
     held: tuple[str, ...] = ()
+    segments: tuple[str, ...] = ()
+    seen: NDArray[np.bool_] = field(default_factory=lambda: np.ones((1, 0), bool))
+    known: NDArray[np.bool_] = field(default_factory=lambda: np.ones((1, 1), bool))
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
-        for field in fields(self):
-            value = getattr(self, field.name)
+        """Hide what was not seen, and freeze the arrays."""
+        n, joints = len(self.time), len(self.joint_names)
+        seen = np.broadcast_to(self.seen, (n, len(self.segments)))
+        known = np.broadcast_to(self.known, (n, joints))
+        object.__setattr__(self, "seen", seen)
+        object.__setattr__(self, "known", known)
+        thorax = np.repeat(
+            all_seen(self.segments, seen)[:, None], self.v.shape[1] - joints, axis=1
+        )
+        arms = np.stack([all_seen(self.segments, seen, side) for side in SIDES], axis=1)
+        for name, shown in (
+            ("v", np.hstack([thorax, known])),
+            ("hand_in_thorax", arms),
+            ("hand_rotation_in_thorax", arms),
+            ("hand_velocity_in_thorax", arms),
+        ):
+            if not shown.all():
+                hidden = np.array(getattr(self, name), dtype=np.float64)
+                hidden[~shown] = np.nan
+                object.__setattr__(self, name, hidden)
+        for one in fields(self):
+            value = getattr(self, one.name)
             if isinstance(value, np.ndarray):
                 frozen = value.view()
                 frozen.flags.writeable = False
-                object.__setattr__(self, field.name, frozen)
+                object.__setattr__(self, one.name, frozen)
 
     @property
     def angles(self) -> NDArray[np.float64]:
-        """Joint angles, (T, len(joint_names)) radians."""
-        return self.q[:, -len(self.joint_names) :]
+        """Joint angles, (T, len(joint_names)) radians; NaN where not known."""
+        return np.where(self.known, self.q[:, -len(self.joint_names) :], np.nan)
+
+    @property
+    def thorax_in_world(self) -> NDArray[np.float64]:
+        """Pose of the thorax, (T, 7) m and a quaternion; NaN where it was not seen."""
+        pose = self.q[:, : -len(self.joint_names)]
+        return np.where(all_seen(self.segments, self.seen)[:, None], pose, np.nan)
+
+    def in_sight(self, chain: str) -> NDArray[np.bool_]:
+        """Whether the thorax and every segment of a chain were seen, (T,)."""
+        return all_seen(self.segments, self.seen, *chain_sides(chain))
+
+    def never_seen(self, chain: str) -> tuple[str, ...]:
+        """Segments of a chain, or the thorax, that no frame shows."""
+        own = ("thorax", *chain_sides(chain))
+        return tuple(
+            link
+            for link, seen in zip(self.segments, self.seen.T, strict=True)
+            if link.startswith(own) and not seen.any()
+        )
 
     def chain_angles(self, chain: str) -> NDArray[np.float64]:
-        """Joint angles of a chain, (T, n) radians in chain order."""
-        return self.angles[:, self._columns(chain)]
+        """Joint angles of a chain, (T, n) radians in chain order; NaN out of sight."""
+        return self._while_in_sight(chain, self.angles)
 
     def chain_velocities(self, chain: str) -> NDArray[np.float64]:
-        """Joint velocities of a chain, (T, n) rad/s in chain order."""
-        return self.v[:, -len(self.joint_names) :][:, self._columns(chain)]
+        """Joint velocities of a chain, (T, n) rad/s, likewise."""
+        return self._while_in_sight(chain, self.v[:, -len(self.joint_names) :])
 
     def task_position(self, chain: str) -> NDArray[np.float64]:
-        """Where the task happens: the hand, or the midpoint of both, (T, 3) m."""
+        """Where the task happens: the hand, or the midpoint of both, (T, 3) m.
+
+        NaN while the chain is out of sight.
+        """
         return self.hand_in_thorax[:, self._sides(chain)].mean(axis=1)
 
     def hand_speed(self, chain: str) -> NDArray[np.float64]:
-        """Speed of the chain's fastest hand relative to the thorax, (T,) m/s."""
+        """Speed of the chain's fastest hand relative to the thorax, (T,) m/s.
+
+        NaN while the chain is out of sight.
+        """
         velocity = self.hand_velocity_in_thorax[:, self._sides(chain)]
         return np.linalg.norm(velocity, axis=2).max(axis=1)
 
-    def _columns(self, chain: str) -> list[int]:
-        return [self.joint_names.index(name) for name in chain_joints(chain)]
+    def _while_in_sight(
+        self, chain: str, values: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        columns = [self.joint_names.index(name) for name in chain_joints(chain)]
+        return np.where(self.in_sight(chain)[:, None], values[:, columns], np.nan)
 
     def _sides(self, chain: str) -> list[int]:
         return [SIDES.index(side) for side in chain_sides(chain)]
+
+
+def all_seen(
+    segments: tuple[str, ...], seen: NDArray[np.bool_], *sides: str
+) -> NDArray[np.bool_]:
+    """Whether the thorax and every segment of these arms were seen, (T,).
+
+    Arguments are those of :class:`Motion`, and names of :data:`ikns.body.chains.SIDES`.
+    """
+    own = [link.startswith(("thorax", *sides)) for link in segments]
+    return np.asarray(seen[:, own].all(axis=1))

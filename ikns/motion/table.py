@@ -24,8 +24,9 @@ class MotionTable(NamedTuple):
         ``time_s``; ``<joint>_deg``; ``thorax_<part>``, m and a unit quaternion in the
         world; ``residual_m``; ``converged``, 0 or 1.
     rows : (T, len(columns)) array
+        NaN where a joint, or the thorax, was not seen.
     range_deg : dict
-        Lowest and highest angle of every joint, deg.
+        Lowest and highest angle of every joint, deg; NaN for one never seen.
     summary : dict
         Counts of frames, median residual (m) and held joints, ready for JSON.
     """
@@ -56,13 +57,15 @@ def motion_table(motion: Motion) -> MotionTable:
         [
             motion.time,
             degrees,
-            motion.q[:, : len(_THORAX)],
+            motion.thorax_in_world,
             motion.residual,
             motion.converged,
         ]
     )
-    span = np.ptp(degrees, axis=0)
-    ends = zip(degrees.min(axis=0).tolist(), degrees.max(axis=0).tolist(), strict=True)
+    # NaN only for a joint that no frame shows.
+    lowest, highest = np.fmin.reduce(degrees), np.fmax.reduce(degrees)
+    span = highest - lowest
+    ends = zip(lowest.tolist(), highest.tolist(), strict=True)
     summary = {
         "frames": len(motion.time),
         "frames_converged": int(motion.converged.sum()),

@@ -10,10 +10,18 @@ __all__ = ["slope"]
 
 #: Width of the fit: voluntary motion of the arm stays below about 5 Hz, s.
 WINDOW = 0.2
+#: Most variance of a slope next to a gap, over that at the end of a recording, where
+#: the whole window lies on one side. Twice leaves out the 2 samples next to a long gap,
+#: of a window of 21, and keeps those around a short one.
+_MOST_VARIANCE = 2.0
+#: Samples that are worked on at a time, which bounds the memory.
+_BATCH = 2048
 
 
 def slope(
-    values: NDArray[np.float64], time: NDArray[np.float64]
+    values: NDArray[np.float64],
+    time: NDArray[np.float64],
+    known: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Time derivative by a moving parabola (Savitzky and Golay 1964).
 
@@ -23,12 +31,15 @@ def slope(
         Any quantity.
     time : (T,) array
         Seconds, evenly spaced.
+    known : (T, ...) boolean array, optional
+        Which values count, of the shape of `values`. Default: all.
 
     Returns
     -------
     (T, ...) array
-        Slope of the parabola fitted over ``WINDOW`` around each sample; zero for a
-        single sample.
+        Slope of the parabola fitted over ``WINDOW`` around each sample, to the known
+        values there. NaN where the value is unknown, where too few others are known,
+        and for a single sample.
 
     Examples
     --------
@@ -38,12 +49,72 @@ def slope(
     np.float64(3.0)
     """
     if len(time) < 2:
-        return np.zeros_like(values)
+        return np.full_like(values, np.nan)
     step = float(time[-1] - time[0]) / (len(time) - 1)
     window = 2 * round(WINDOW / step / 2) + 1
     window = min(window, len(time) - 1 + len(time) % 2)
+    if known is None or known.all():
+        known = None
+    else:
+        values = np.where(known, values, 0.0)
     if window < 5:
-        return np.asarray(np.gradient(values, step, axis=0))
-    return np.asarray(
+        found = np.asarray(np.gradient(values, step, axis=0))
+        if known is not None:
+            around = known.astype(np.float64)
+            around[1:] *= known[:-1]
+            around[:-1] *= known[1:]
+            found[around == 0] = np.nan
+        return found
+    found = np.asarray(
         savgol_filter(values, window, polyorder=2, deriv=1, delta=step, axis=0)
     )
+    if known is None:
+        return found
+    columns, rows = found.reshape(len(time), -1), values.reshape(len(time), -1)
+    masks = known.reshape(columns.shape).T
+    alike: dict[bytes, list[int]] = {}
+    for column, mask in enumerate(masks):
+        alike.setdefault(mask.tobytes(), []).append(column)
+    for own in alike.values():
+        _mend(columns, rows, masks[own[0]], own, window, step)
+    return columns.reshape(values.shape)
+
+
+def _mend(
+    found: NDArray[np.float64],
+    values: NDArray[np.float64],
+    known: NDArray[np.bool_],
+    columns: list[int],
+    window: int,
+    step: float,
+) -> None:
+    """Write the slopes of columns again where the window has unknown samples."""
+    found.T[columns] = np.where(known, found.T[columns], np.nan)
+    half = window // 2
+    first = np.clip(np.arange(len(known)) - half, 0, len(known) - window)
+    before = np.r_[0, np.cumsum(~known)]
+    touched = np.flatnonzero(known & (before[first + window] > before[first]))
+    end = np.arange(window) / half
+    _, worst = _weights(end[None], np.ones((1, window), dtype=bool))
+    for batch in np.split(touched, range(_BATCH, len(touched), _BATCH)):
+        at = first[batch, None] + np.arange(window)
+        weights, variance = _weights((at - batch[:, None]) / half, known[at])
+        fitted = np.einsum("bw,bwc->bc", weights, values[at][..., columns])
+        fitted /= half * step
+        fitted[~(variance <= _MOST_VARIANCE * worst)] = np.nan
+        found[batch[:, None], columns] = fitted
+
+
+def _weights(
+    x: NDArray[np.float64], known: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of values at x (N, w) in the slope at 0 of their parabola, and its variance.
+
+    Of values with a variance of 1; NaN where fewer than three are known.
+    """
+    powers = np.stack([known, known * x, known * x * x], axis=-1)
+    normal = np.einsum("bwi,bwj->bij", powers, powers)
+    normal[np.count_nonzero(known, axis=1) < 3] = np.nan
+    inverse = np.linalg.inv(normal)
+    weights: NDArray[np.float64] = np.einsum("bwi,bi->bw", powers, inverse[:, 1])
+    return weights, inverse[:, 1, 1]

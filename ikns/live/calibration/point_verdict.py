@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ikns.analysis.compare.leak import slopes
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import elbow_reference, track_chain
+from ikns.calibration import elbow_reference
 from ikns.errors import IknsError
 from ikns.live.calibration.measures import (
     median,
@@ -22,6 +22,7 @@ from ikns.live.calibration.measures import (
     tracking_fault,
 )
 from ikns.live.calibration.verdict import ONE_PLACE, Verdict
+from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.recording.recording import Recording
 
@@ -71,7 +72,7 @@ def judge_point(
         "missing_percent": missing_percent(recording, skeleton),
     }
     try:
-        motion = track_chain(skeleton, recording, chain)
+        motion = MarkerIK(skeleton).track(recording, chain=chain)
     except IknsError as error:
         return Verdict(False, False, str(error), values)
     gate = still_mask(motion, chain, max_hand_speed=max_hand_speed)

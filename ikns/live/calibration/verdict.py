@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import track_chain
 from ikns.calibration.scaling import scale
 from ikns.errors import IknsError
 from ikns.live.calibration.measures import (
@@ -27,6 +26,7 @@ from ikns.live.calibration.measures import (
     percent,
     tracking_fault,
 )
+from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.clustering import minimum_bounding_box
 from ikns.recording.recording import Recording
 
@@ -173,7 +173,7 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
         "missing_percent": missing_percent(recording, skeleton),
     }
     try:
-        motion = track_chain(skeleton, recording, chain)
+        motion = MarkerIK(skeleton).track(recording, chain=chain)
     except IknsError as error:
         return Verdict(False, False, str(error), values)
     places = motion.task_position(chain)

@@ -19,8 +19,8 @@ from ikns.motion.marker_ik.pose import (
     PRIOR,
     PRIOR_FROM_SCRATCH,
     STEP_TOLERANCE,
-    Frames,
     Pose,
+    SolvedFrames,
     starting_poses,
 )
 
@@ -103,12 +103,12 @@ class KernelSolver:
         Iterations of -1 stand for an infinite marker, an infinite residual for a pose
         before that is not finite.
         """
-        frames = Frames.empty(1, len(self._neutral))
+        frames = SolvedFrames.empty(1, len(self._neutral))
         self._solve(markers[None], 0, 1, 1, q, frames)
         return frames.pose(0)
 
     def solve_many(
-        self, markers: Array, first: int, last: int, way: int, frames: Frames
+        self, markers: Array, first: int, last: int, way: int, frames: SolvedFrames
     ) -> None:
         """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
 
@@ -123,7 +123,7 @@ class KernelSolver:
         last: int,
         way: int,
         before: Array | None,
-        frames: Frames,
+        frames: SolvedFrames,
     ) -> None:
         start = self._neutral if before is None else before
         span = (first, last, way)

@@ -18,8 +18,8 @@ __all__ = [
     "PRIOR",
     "PRIOR_FROM_SCRATCH",
     "STEP_TOLERANCE",
-    "Frames",
     "Pose",
+    "SolvedFrames",
     "starting_poses",
 ]
 
@@ -75,7 +75,7 @@ class Pose:
     converged: bool
 
 
-class Frames(NamedTuple):
+class SolvedFrames(NamedTuple):
     """Solved frames, (T, nq) and (T,) arrays; see :class:`Pose`."""
 
     q: Array

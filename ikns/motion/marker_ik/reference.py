@@ -18,8 +18,8 @@ from ikns.motion.marker_ik.pose import (
     LOST,
     PRIOR,
     PRIOR_FROM_SCRATCH,
-    Frames,
     Pose,
+    SolvedFrames,
     starting_poses,
 )
 from ikns.numerics.rigid import rigid_transform
@@ -68,7 +68,7 @@ class ReferenceSolver:
         return pose
 
     def solve_many(
-        self, markers: Array, first: int, last: int, way: int, frames: Frames
+        self, markers: Array, first: int, last: int, way: int, frames: SolvedFrames
     ) -> None:
         """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
 

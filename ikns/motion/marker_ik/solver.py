@@ -6,7 +6,8 @@ Each frame minimizes, over the configuration q,
     + (PRIOR |q - q_before|)^2                        weak pull to the pose before
     + (LIMIT max(0, lower - q, q - upper))^2          soft joint limits
 
-A marker that was not seen weighs nothing; what no marker shows stays where it was.
+A marker that was not seen weighs nothing. What no marker shows stays where it was, so
+that there is a pose in every frame; the motion says what of it is known.
 """
 
 from __future__ import annotations
@@ -16,12 +17,23 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
-from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
 from ikns.motion.marker_ik.kernel import KernelSolver
-from ikns.motion.marker_ik.pose import MAX_ITERATIONS, STEP_TOLERANCE, Frames, Pose
+from ikns.motion.marker_ik.pose import (
+    MAX_ITERATIONS,
+    STEP_TOLERANCE,
+    Pose,
+    SolvedFrames,
+)
 from ikns.motion.marker_ik.reference import ReferenceSolver
-from ikns.motion.motion import Motion
+from ikns.motion.marker_ik.visibility import (
+    Visibility,
+    require_sight,
+    visible_segments,
+)
+from ikns.motion.motion import Motion, all_seen
 from ikns.numerics.derivative import slope
 from ikns.recording.recording import Recording
 
@@ -114,6 +126,7 @@ class MarkerIK:
         self,
         recording: Recording,
         *,
+        chain: str | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Motion:
         """Solve a whole recording.
@@ -122,13 +135,26 @@ class MarkerIK:
         ----------
         recording : Recording
             Any recording that holds at least three of the skeleton's markers.
+        chain : str, optional
+            What the recording is meant to show, see :data:`ikns.body.chains.CHAINS`.
+            Without it an arm that is never in sight is just unknown in every frame.
         progress : callable, optional
-            Called with (frames done, frames in all).
+            Called with (frames done, frames in total).
+
+        Returns
+        -------
+        Motion
+            NaN where a frame does not show a joint or a hand, by the rule of
+            :func:`ikns.motion.marker_ik.visibility.visible_segments`; `q` alone is a
+            pose in every frame.
 
         Raises
         ------
         MarkerMismatch
-            When fewer than three of the skeleton's markers are in the recording.
+            When fewer than three of the skeleton's markers are in the recording, or a
+            segment of `chain`, or the thorax, is never in sight.
+        NotEnoughData
+            When `chain` is asked for and there are fewer than two frames.
         """
         marker_set = self.skeleton.marker_set
         known = (marker_set.columns(recording.labels) >= 0) & self._tracked
@@ -142,11 +168,15 @@ class MarkerIK:
             marker_set.pick(recording.labels, recording.markers), dtype=np.float64
         )
         n = len(markers)
+        visibility = visible_segments(self.skeleton, markers)
+        if chain is not None:
+            with naming(recording.source):
+                self._require(chain, visibility)
         # Start where most markers are seen, then go both ways.
         visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
         start = int(np.argmax(visible))
         first = self.solve(markers[start])
-        frames = Frames.empty(n, len(first.q))
+        frames = SolvedFrames.empty(n, len(first.q))
         frames.put(start, first)
         done = 1
         for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
@@ -156,25 +186,44 @@ class MarkerIK:
                 done += abs(stop - at)
                 if progress is not None:
                     progress(done, n)
-        return self._motion(recording.time, frames)
+        return self._motion(recording.time, frames, visibility)
 
-    def _motion(self, time: Array, frames: Frames) -> Motion:
+    def _require(self, chain: str, visibility: Visibility) -> None:
+        """Refuse what does not show a chain."""
+        if len(visibility.seen) < 2:
+            raise NotEnoughData(
+                "expected at least 2 frames, as one shows no speed, found "
+                f"{len(visibility.seen)}."
+            )
+        require_sight(self.skeleton, visibility, chain)
+
+    def _motion(
+        self, time: Array, frames: SolvedFrames, visibility: Visibility
+    ) -> Motion:
         """Add hands, and velocities by :func:`ikns.numerics.derivative.slope`."""
         skeleton, q = self.skeleton, frames.q
+        segments, seen, known = visibility
         position, rotation = skeleton.hands_in_thorax(q)
         steps = np.zeros((len(q), skeleton.nv))
         for i in range(1, len(q)):
             steps[i] = skeleton.difference(q[i - 1], q[i])
+        # What stays where it was, as nothing shows it, has no velocity of its own.
+        root = np.tile(all_seen(segments, seen)[:, None], skeleton.nv - known.shape[1])
+        arms = np.stack([all_seen(segments, seen, side) for side in SIDES], axis=1)
+        shown = np.broadcast_to(arms[..., None], position.shape)
         return Motion(
             time=np.array(time),
             q=q,
-            v=slope(np.cumsum(steps, axis=0), time),
+            v=slope(np.cumsum(steps, axis=0), time, np.hstack([root, known])),
             joint_names=skeleton.joint_names,
             hand_in_thorax=position,
             hand_rotation_in_thorax=rotation,
-            hand_velocity_in_thorax=slope(position, time),
+            hand_velocity_in_thorax=slope(position, time, shown),
             residual=frames.residual,
             iterations=frames.iterations,
             converged=frames.converged,
             held=self.held,
+            segments=segments,
+            seen=seen,
+            known=known,
         )

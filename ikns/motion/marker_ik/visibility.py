@@ -1,34 +1,153 @@
-"""Which frames show the segments that a chain is made of."""
+"""Which segments a frame shows, and which joints are known by that.
+
+A limb is in sight with one marker, as its joints tie it to the thorax; the thorax with
+three, or all of a set that has fewer. A chain is in sight when the thorax and every
+segment of its arms are, live and offline alike; then all their joints are known.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.body.chains import chain_sides
+from ikns.body.chains import SIDES, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import MarkerMismatch
-from ikns.recording.recording import Recording
+from ikns.motion.motion import all_seen
 
-__all__ = ["in_sight", "say_apart", "segment_pairs", "sight_needs"]
+__all__ = [
+    "Visibility",
+    "require_sight",
+    "say_apart",
+    "segment_pairs",
+    "sight_needs",
+    "visible_segments",
+]
 
-#: Markers that fix the thorax, to which all else is relative. A limb needs fewer: its
-#: joints tie it to the thorax.
-_FIX = 3
+#: Markers that determine a segment by themselves.
+_ENOUGH = 3
+
+
+class Visibility(NamedTuple):
+    """What the markers of T frames show.
+
+    Parameters
+    ----------
+    segments : tuple of S str
+        Links that carry markers, and the thorax.
+    seen : (T, S) boolean array
+        Whether each is in sight.
+    known : (T, J) boolean array
+        Whether each joint angle is known.
+    """
+
+    segments: tuple[str, ...]
+    seen: NDArray[np.bool_]
+    known: NDArray[np.bool_]
+
+
+class _Segment(NamedTuple):
+    """A segment with markers, and what lies between it and the one before.
+
+    Parameters
+    ----------
+    columns : list of int
+        Its markers, without those that weigh nothing.
+    need : int
+        How many must be seen.
+    before : str
+        The next such segment on the way to the thorax; empty for the thorax.
+    joints : list of int
+        Joints between the two.
+    free : int
+        How many of these are not held.
+    """
+
+    columns: list[int]
+    need: int
+    before: str
+    joints: list[int]
+    free: int
 
 
 def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], int]]:
     """By link of a chain, and the thorax: its markers, and how many must be seen."""
-    columns: dict[str, list[int]] = {}
-    for column, marker in enumerate(skeleton.marker_set.markers):
-        if marker.link.startswith(("thorax", *chain_sides(chain))):
-            columns.setdefault(marker.link, []).append(column)
     return {
-        link: (own, min(_FIX, len(own)) if link == "thorax" else 1)
-        for link, own in columns.items()
+        link: (segment.columns, segment.need)
+        for link, segment in _segments(skeleton).items()
+        if link.startswith(("thorax", *chain_sides(chain)))
     }
+
+
+def visible_segments(skeleton: Skeleton, markers: NDArray[np.float64]) -> Visibility:
+    """Say which segments are in sight, and which joints are known.
+
+    While an arm is in sight from the thorax to the hand, all its joints are known.
+    While it is not, a joint is known when the segments on both its sides are in sight
+    and determined: by three markers of their own, or by the joints that tie them to a
+    determined segment. One marker shows two such joints, as it keeps its distance from
+    the last of them; the third of an upper arm takes another marker, or one on the
+    forearm.
+
+    A held joint is known by the same rule: its angle is the one at which it is held,
+    and unknown while a segment next to it is out of sight.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    markers : (T, M, 3) array
+        Positions (m) in the order of the skeleton's marker set; NaN where not seen.
+    """
+    finite = np.asarray(np.isfinite(markers).all(axis=2))
+    segments, n = _segments(skeleton), len(markers)
+    count = {
+        link: finite[:, segment.columns].sum(axis=1)
+        for link, segment in segments.items()
+    }
+    seen = {link: count[link] >= segment.need for link, segment in segments.items()}
+    determined = {"thorax": seen["thorax"]}
+    known: NDArray[np.bool_] = np.zeros((n, len(skeleton.joint_names)), dtype=bool)
+    for link, (_, _, before, joints, free) in segments.items():
+        if link == "thorax":
+            continue
+        # Markers show three numbers each; what they have left over shows one more.
+        spare = np.zeros(n, dtype=bool)
+        for other, after in segments.items():
+            if after.before == link:
+                spare |= 3 * count[other] > after.free
+        tied = determined[before] & (2 * count[link] + spare >= free)
+        determined[link] = seen[link] & (tied | (count[link] >= _ENOUGH))
+        known.T[joints] = determined[before] & determined[link]
+    names, shown = tuple(segments), np.stack(list(seen.values()), axis=1)
+    for side in SIDES:
+        own = [joint.startswith(side) for joint in skeleton.joint_names]
+        known.T[own] |= all_seen(names, shown, side)
+    return Visibility(names, shown, known)
+
+
+def require_sight(skeleton: Skeleton, visibility: Visibility, chain: str) -> None:
+    """Refuse a recording that never shows a segment of a chain, or the thorax.
+
+    Raises
+    ------
+    MarkerMismatch
+        With the markers that would show it.
+    """
+    worn = skeleton.marker_set
+    for link, (own, need) in sight_needs(skeleton, chain).items():
+        if not own:
+            raise MarkerMismatch(
+                f"expected a marker on the segment {link}, found none in {worn.name}."
+            )
+        if not visibility.seen[:, visibility.segments.index(link)].any():
+            raise MarkerMismatch(
+                f"the segment {link} is never in sight; expected at least {need} of "
+                f"{', '.join(worn.labels[i] for i in own)} of {worn.name} in a frame."
+            )
 
 
 def segment_pairs(
@@ -61,33 +180,37 @@ def say_apart(skeleton: Skeleton, pair: NDArray[np.int64], change: float) -> str
     return f"{first} and {second} are {abs(1000 * change):.0f} mm {side}"
 
 
-def in_sight(
-    skeleton: Skeleton, recording: Recording, chain: str
-) -> dict[str, NDArray[np.bool_]]:
-    """Say in which frames each segment of a chain, and the thorax, is in sight.
+def _segments(skeleton: Skeleton) -> dict[str, _Segment]:
+    """Links that carry markers, the thorax first, each after those before it.
 
-    A limb is with one marker, the thorax with three, or all of a set that has fewer.
-
-    Returns
-    -------
-    dict of (T,) boolean array
-        By link, of those that carry markers.
-
-    Raises
-    ------
-    MarkerMismatch
-        When a segment never is; with the markers that would show it.
+    A hand without markers is there too unless its joints are held: it is never in
+    sight, and neither is its arm.
     """
-    worn = skeleton.marker_set
-    markers = worn.pick(recording.labels, recording.markers)
-    seen = np.all(np.isfinite(markers), axis=2)
-    shown = {}
-    for link, (own, need) in sight_needs(skeleton, chain).items():
-        shown[link] = np.count_nonzero(seen[:, own], axis=1) >= need
-        if not shown[link].any():
-            raise MarkerMismatch(
-                f"{recording.source}: the segment {link} is never in sight; expected "
-                f"at least {need} of {', '.join(worn.labels[i] for i in own)} of "
-                f"{worn.name} in a frame."
-            )
-    return shown
+    worn, names = skeleton.marker_set, skeleton.joint_names
+    held = {names.index(joint) for joint in worn.held}
+    columns: dict[str, list[int]] = {"thorax": []}
+    for column, marker in enumerate(worn.markers):
+        if not marker.static_only and marker.weight > 0:
+            columns.setdefault(marker.link, []).append(column)
+    for side in SIDES:
+        joints, _ = _way(skeleton, f"{side}_hand", columns)
+        bare = not any(link.startswith(side) for link in columns)
+        if bare or set(joints) - held:
+            columns.setdefault(f"{side}_hand", [])
+    segments: dict[str, _Segment] = {}
+    for link in sorted(columns, key=lambda link: skeleton.tree_link(link)[0]):
+        own = columns[link]
+        joints, before = _way(skeleton, link, segments)
+        need = max(1, min(_ENOUGH, len(own))) if link == "thorax" else 1
+        segments[link] = _Segment(own, need, before, joints, len(set(joints) - held))
+    return segments
+
+
+def _way(skeleton: Skeleton, link: str, others: Iterable[str]) -> tuple[list[int], str]:
+    """Joints between a link and the next of others towards the thorax; and that."""
+    carried = {skeleton.tree_link(other)[0]: other for other in others}
+    joints, at = [], skeleton.tree_link(link)[0]
+    while at > 0 and at not in carried:
+        joints.append(at - 1)
+        at = int(skeleton.tree.parent[at])
+    return joints, carried.get(at, "")

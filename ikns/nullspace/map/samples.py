@@ -71,7 +71,7 @@ def null_space_samples(
     chain : str
         See :data:`ikns.body.chains.CHAINS`.
     max_hand_speed, min_duration : float
-        See :func:`still`, m/s and s.
+        See :func:`still_mask`, m/s and s.
 
     Returns
     -------
@@ -93,6 +93,8 @@ def null_space_samples(
         speed = speed[np.isfinite(speed)]
         slow = np.count_nonzero(speed < max_hand_speed)
         found = "none has a known hand speed"
+        if lost := motion.never_seen(chain):
+            found = f"none shows it: {lost[0]} is never in sight"
         if slow:
             found = f"the {slow} slower ones are too short a rest or miss joints"
         elif speed.size:
