@@ -32,10 +32,11 @@ PEOPLE, LIFTS = ("ADL001", "ADL005"), (1, 2, 3)
 def best_shift(mine: np.ndarray, theirs: np.ndarray) -> tuple[float, int]:
     """Highest correlation over all onsets, and the onset (frames)."""
     n = len(theirs)
-    rows = [
-        (float(np.corrcoef(mine[k : k + n], theirs)[0, 1]), k)
-        for k in range(len(mine) - n + 1)
-    ]
+    rows = []
+    for k in range(len(mine) - n + 1):
+        seen = np.isfinite(mine[k : k + n])
+        both = mine[k : k + n][seen], theirs[seen]
+        rows.append((float(np.corrcoef(*both)[0, 1]), k))
     return max(rows)
 
 

@@ -81,3 +81,17 @@ def test_mirrored_poses_have_the_same_angles_on_both_sides(skeleton):
         assert angles[f"left_{name}"] == pytest.approx(
             angles[f"right_{name}"], abs=1e-9
         )
+
+
+def test_what_depends_on_an_unknown_joint_is_unknown(skeleton):
+    angles = np.tile(skeleton.neutral()[7:] + 0.2, (3, 1))
+    names = skeleton.joint_names
+    angles[1, names.index("right_wrist_flexion")] = np.nan
+    angles[2, names.index("right_elbow_flexion")] = np.nan
+    found = isb_angles(skeleton, angles)
+    lost = {
+        1: {"right_wrist_flexion"},
+        2: {"right_elbow_flexion", "right_carrying_angle", "right_pronation"},
+    }
+    for name, values in found.items():
+        assert np.isnan(values).tolist() == [False, name in lost[1], name in lost[2]]

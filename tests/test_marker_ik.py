@@ -10,7 +10,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.scaling import scale
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
-from ikns.numerics.rigid import rigid_transform
+from ikns.numerics.rigid import pose_steps, rigid_transform
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
 
@@ -277,3 +277,17 @@ def test_rigid_transform_finds_the_planted_motion():
     # Rounding of a 3 x 3 decomposition.
     np.testing.assert_allclose(rotation, turn, atol=1e-12)
     np.testing.assert_allclose(translation, shift, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-4, 1e-2, 1.0])
+def test_steps_between_poses_are_those_of_the_skeleton(skeleton, size):
+    rng = np.random.default_rng(0)
+    q = [everyday(skeleton, np.zeros(18), rng.normal(0, 2, 6))]
+    for _ in range(20):
+        step = np.zeros(skeleton.nv)
+        step[:6] = size * rng.normal(size=6)
+        q.append(skeleton.integrate(q[-1], step))
+    expected = [skeleton.difference(*pair)[:6] for pair in zip(q, q[1:], strict=False)]
+    # Rounding of places of some 2 m and of quaternions, 1e-15; a thousand times that as
+    # Pinocchio takes the logarithm of a matrix, which is worse conditioned.
+    np.testing.assert_allclose(pose_steps(np.array(q)[:, :7]), expected, atol=1e-12)

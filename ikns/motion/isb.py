@@ -27,8 +27,9 @@ def isb_angles(
     ----------
     skeleton : Skeleton
         The body.
-    q : (T, nq) array
-        Configurations.
+    q : (T, nq) or (T, J) array
+        Configurations, or joint angles alone. `Motion.angles` are NaN where a joint was
+        not seen, and so is then what depends on it; `Motion.q` never is.
 
     Returns
     -------
@@ -57,9 +58,14 @@ def isb_angles(
         ]
         if side == "left":
             links = [_MIRROR @ rotations @ _MIRROR for rotations in links]
-        upper_arm, forearm = (Rotation.from_matrix(rotations) for rotations in links)
+        known = [np.isfinite(matrix.sum(axis=(1, 2))) for matrix in links]
+        upper_arm, forearm = (
+            Rotation.from_matrix(np.where(k[:, None, None], rotations, np.eye(3)))
+            for k, rotations in zip(known, links, strict=True)
+        )
         shoulder = _yxy(upper_arm)
         elbow = (upper_arm.inv() * forearm).as_euler("ZXY")
+        shoulder[~known[0]], elbow[~known[1]] = np.nan, np.nan
         own = {
             "plane_of_elevation": shoulder[:, 0],
             "elevation": -shoulder[:, 1],

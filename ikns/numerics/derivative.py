@@ -112,9 +112,14 @@ def _weights(
 
     Of values with a variance of 1; NaN where fewer than three are known.
     """
-    powers = np.stack([known, known * x, known * x * x], axis=-1)
-    normal = np.einsum("bwi,bwj->bij", powers, powers)
-    normal[np.count_nonzero(known, axis=1) < 3] = np.nan
-    inverse = np.linalg.inv(normal)
-    weights: NDArray[np.float64] = np.einsum("bwi,bi->bw", powers, inverse[:, 1])
-    return weights, inverse[:, 1, 1]
+    one = known.astype(np.float64)
+    moved = one * x
+    square = moved * x
+    s0, s1, s2 = one.sum(axis=1), moved.sum(axis=1), square.sum(axis=1)
+    s3, s4 = (square * x).sum(axis=1), (square * square).sum(axis=1)
+    # The middle row of the inverse of the normal equations' matrix.
+    row = s2 * s3 - s1 * s4, s0 * s4 - s2 * s2, s1 * s2 - s0 * s3
+    determinant = s1 * row[0] + s2 * row[1] + s3 * row[2]
+    determinant[s0 < 3] = np.nan
+    a, b, c = (entry / determinant for entry in row)
+    return a[:, None] * one + b[:, None] * moved + c[:, None] * square, b

@@ -1,11 +1,12 @@
-"""The rigid motion that carries points onto points."""
+"""Rigid motions: the one that carries points onto points, and steps between poses."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-__all__ = ["rigid_transform"]
+__all__ = ["pose_steps", "rigid_transform"]
 
 
 def rigid_transform(
@@ -29,3 +30,35 @@ def rigid_transform(
     flip = np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(vt)])
     rotation = u @ flip @ vt
     return rotation, b - rotation @ a
+
+
+def pose_steps(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the step from each pose to the next, as seen from the first of the two.
+
+    The logarithm of the motion between them, ``log(T_0^-1 T_1)``: with the rotation
+    vector w of an angle a and the shift p, its linear part is (Lynch and Park 2017,
+    Modern Robotics, eq. 3.92) ::
+
+        p - w x p / 2 + (1 - (a / 2) / tan(a / 2)) / a^2  w x (w x p)
+
+    Parameters
+    ----------
+    poses : (T, 7) array
+        Position (m) and unit quaternion x, y, z, w.
+
+    Returns
+    -------
+    (T - 1, 6) array
+        Linear (m) and angular (rad) part.
+    """
+    turns = Rotation.from_quat(poses[:, 3:])
+    back = turns[:-1].inv()
+    w = (back * turns[1:]).as_rotvec()
+    p = back.apply(np.diff(poses[:, :3], axis=0))
+    half = np.linalg.norm(w, axis=1, keepdims=True) / 2
+    # Below 1e-4 rad the next term of the series, a^2 / 720, is lost in rounding.
+    small = half < 5e-5
+    safe = np.where(small, 1.0, half)
+    factor = np.where(small, 1 / 12, (1 - safe / np.tan(safe)) / (4 * safe**2))
+    across = np.cross(w, p)
+    return np.hstack([p - across / 2 + factor * np.cross(w, across), w])

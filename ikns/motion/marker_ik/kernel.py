@@ -112,7 +112,7 @@ class KernelSolver:
     ) -> None:
         """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
 
-        Markers are (T, M, 3); each frame starts from the one beside it.
+        Markers are (T, M, 3); each frame starts from the one next to it.
         """
         self._solve(markers, first, last, way, frames.q[first - way], frames)
 

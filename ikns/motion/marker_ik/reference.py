@@ -72,7 +72,7 @@ class ReferenceSolver:
     ) -> None:
         """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
 
-        Markers are (T, M, 3); each frame starts from the one beside it.
+        Markers are (T, M, 3); each frame starts from the one next to it.
         """
         for i in range(first, last, way):
             frames.put(i, self.solve(markers[i], frames.q[i - way]))

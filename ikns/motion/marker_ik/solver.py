@@ -35,6 +35,7 @@ from ikns.motion.marker_ik.visibility import (
 )
 from ikns.motion.motion import Motion, all_seen
 from ikns.numerics.derivative import slope
+from ikns.numerics.rigid import pose_steps
 from ikns.recording.recording import Recording
 
 __all__ = ["MarkerIK"]
@@ -205,8 +206,7 @@ class MarkerIK:
         segments, seen, known = visibility
         position, rotation = skeleton.hands_in_thorax(q)
         steps = np.zeros((len(q), skeleton.nv))
-        for i in range(1, len(q)):
-            steps[i] = skeleton.difference(q[i - 1], q[i])
+        steps[1:] = np.hstack([pose_steps(q[:, :7]), np.diff(q[:, 7:], axis=0)])
         # What stays where it was, as nothing shows it, has no velocity of its own.
         root = np.tile(all_seen(segments, seen)[:, None], skeleton.nv - known.shape[1])
         arms = np.stack([all_seen(segments, seen, side) for side in SIDES], axis=1)
