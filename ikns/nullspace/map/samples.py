@@ -71,7 +71,7 @@ def null_space_samples(
     chain : str
         See :data:`ikns.body.chains.CHAINS`.
     max_hand_speed, min_duration : float
-        See :func:`still`, m/s and s.
+        See :func:`still_mask`, m/s and s.
 
     Returns
     -------
@@ -84,6 +84,16 @@ def null_space_samples(
     ------
     NotEnoughData
         When no sample passes.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> x, q = null_space_samples(run.points.truth)
+    >>> len(x) == len(q), q.shape[1]
+    (True, 7)
     """
     gate = still_mask(
         motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration
