@@ -5,7 +5,17 @@ from contextlib import contextmanager
 
 
 class IknsError(Exception):
-    """Root of every error that this package raises on purpose."""
+    """Root of every error that this package raises on purpose.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> try:
+    ...     ikns.read("walk.mp4")
+    ... except ikns.IknsError as error:
+    ...     print(error)
+    walk.mp4: expected a marker file that ends in .c3d, .trc, .csv, found .mp4.
+    """
 
 
 class FileError(IknsError, ValueError):

@@ -71,6 +71,12 @@ class MarkerSet:
         Joints that these markers cannot tell apart from others.
     source : str
         Where the layout is described.
+
+    Examples
+    --------
+    >>> worn = MarkerSet.load("oxford24").without_static()
+    >>> worn.columns(["ADL001:RSHO", "C7"])[:1], len(worn.markers)
+    (array([1]), 22)
     """
 
     name: str
@@ -80,11 +86,7 @@ class MarkerSet:
 
     @classmethod
     def load(cls, name_or_path: str | Path) -> MarkerSet:
-        """Read a marker set by its name (``oxford24``) or from a TOML file.
-
-        >>> len(MarkerSet.load("oxford24").markers)
-        24
-        """
+        """Read a marker set by its name (``oxford24``) or from a TOML file."""
         path = Path(name_or_path)
         if path.suffix != ".toml":
             path = urdf_folder() / "markers" / f"{name_or_path}.toml"

@@ -95,6 +95,16 @@ def calibrate(
         are fewer than 4 or in one plane.
     InvalidInput
         When a parameter is out of its range.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> subject = calibrate(run.static.recording, [run.points.recording])
+    >>> len(subject.null_space_map.centers_), subject.chain
+    (10, 'right_arm')
     """
     if not explorations:
         raise InvalidInput("expected at least one exploration recording, found none.")

@@ -100,6 +100,16 @@ def scale(
         When the trial is too short or the person moves in it.
     MarkerMismatch
         When no marker is known or a whole segment has none.
+
+    Examples
+    --------
+    >>> person = Skeleton.from_anthropometry(1.80, 75, "male")
+    >>> markers = np.tile(person.markers_in_world(person.neutral()), (100, 1, 1))
+    >>> static = Recording(np.arange(100) / 100, markers, person.marker_set.labels)
+    >>> skeleton, report = scale(Skeleton.load(), static)
+    >>> true = person.segment_lengths["right_forearm"]
+    >>> abs(report.lengths["right_forearm"] - true) < 0.005
+    True
     """
     dressed, target, duration = static_posture(
         generic, static, marker_set=marker_set, min_duration=min_duration

@@ -57,6 +57,19 @@ class Subject:
     samples : (N, 4) array, optional
         Still samples to draw: x, y, z of the hand, m in the thorax frame, and the PCA
         point that each counts to, from 1; 0 where it was discarded.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> from tempfile import TemporaryDirectory
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> subject = ikns.calibrate(run.static.recording, [run.points.recording])
+    >>> with TemporaryDirectory() as folder:
+    ...     subject.save(f"{folder}/subject")
+    ...     Subject.load(f"{folder}/subject").chain
+    'right_arm'
     """
 
     skeleton: Skeleton

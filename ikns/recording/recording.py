@@ -38,6 +38,13 @@ class Recording:
     InvalidInput
         When shapes disagree, labels repeat, time does not increase, or a position is
         infinite.
+
+    Examples
+    --------
+    >>> markers = np.zeros((3, 2, 3))
+    >>> recording = Recording([0.0, 0.01, 0.02], markers, ["RSHO", "LSHO"])
+    >>> recording.rate, recording.select(["LSHO"]).markers.shape
+    (100.0, (3, 1, 3))
     """
 
     time: NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -248,24 +248,16 @@ def analyze_picking(
     outcome = success_pairs(
         table, success=success, level=level, conditions=conditions, unequal=unequal
     )
-    timed = time_test(
-        table,
-        limit=limit,
-        time=time,
-        success=success,
-        level=level,
-        conditions=outcome.names,
-        unequal=unequal,
-    )
-    pairs = restricted_pairs(
-        table,
-        limit=limit,
-        time=time,
-        success=success,
-        level=level,
-        conditions=outcome.names,
-        unequal=unequal,
-    )
+    asked: dict[str, Any] = {
+        "limit": limit,
+        "time": time,
+        "success": success,
+        "level": level,
+        "conditions": outcome.names,
+        "unequal": unequal,
+    }
+    timed = time_test(table, **asked)
+    pairs = restricted_pairs(table, **asked)
     both = (outcome.first == 1) & (outcome.second == 1)
     try:
         means = pairs.subject_means()

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from ikns.errors import InvalidInput, NotEnoughData
 from ikns.statistics.library import statsmodels
-from ikns.statistics.table import Table, column, finite_values, labels, two_conditions
+from ikns.statistics.model_design import comparable_trials, fixed_effects
+from ikns.statistics.table import Table
 from ikns.statistics.wording import interval_text, number, p_text
 
 __all__ = ["Coefficient", "MixedModel", "mixed_model"]
@@ -52,7 +52,7 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class MixedModel:
-    """A fitted mixed model, or the news that none could be.
+    """A fitted mixed model, or the statement that none converged.
 
     Parameters
     ----------
@@ -155,101 +155,69 @@ def mixed_model(
         For fewer than 2 subjects, a level without trials of both conditions, a trial
         number that never changes, or values that do not vary.
     """
-    found, names = two_conditions(table, conditions)
-    used = np.isin(found, names)
-    y = finite_values(np.asarray(column(table, value))[used], value)
-    who, side = labels(table, "subject")[used], found[used]
-    place = np.full(len(y), "") if level is None else labels(table, level)[used]
-    people, places = np.unique(who), np.unique(place)
-    if len(people) < 2:
-        raise NotEnoughData(f"expected at least 2 subjects, found {len(people)}.")
-    for at in places:
-        for name in names:
-            if not np.any((place == at) & (side == name)):
-                raise NotEnoughData(
-                    f"expected trials of {name} at {level} {str(at)!r}, found none."
-                )
-    if np.ptp(y) <= 1e-12 * np.abs(y).max():
-        raise NotEnoughData(
-            f"expected values that vary, found {len(y)} times {y[0]:g}."
-        )
+    trials = comparable_trials(table, value, level, trial, conditions)
+    y, people = trials.y, np.unique(trials.subject)
+    extra, degrees = len(np.unique(trials.level)) - 1, len(people) - 1
     # Half and minus half: the intercept is then the middle, the slope the difference.
-    x = np.where(side == names[0], 0.5, -0.5)
-    # Each level against the mean of all, so the condition's is the mean over levels.
-    contrasts = np.column_stack(
-        [(place == at) * 1.0 - (place == places[-1]) for at in places[:-1]]
-        or [np.empty((len(y), 0))]
-    )
-    columns = [np.ones(len(y)), x, contrasts, contrasts * x[:, None]]
-    if trial is not None:
-        k = finite_values(np.asarray(column(table, trial))[used], trial)
-        if np.ptp(k) == 0:
-            raise InvalidInput(
-                f"expected a {trial} that changes, found {k[0]:g} in every row."
-            )
-        columns.append(k - k.mean())
-    design = np.column_stack(columns)
-    if len(y) <= design.shape[1] or np.linalg.matrix_rank(design) < design.shape[1]:
-        raise NotEnoughData(
-            f"expected trials that tell {design.shape[1]} effects apart, found {len(y)}"
-            " that do not."
-        )
+    x = np.where(trials.condition == trials.names[0], 0.5, -0.5)
+    design = fixed_effects(trials, x)
     scale = float(y.std(ddof=1))  # statsmodels stops by absolute sizes
-    fit, structure, why = _fit((y - y.mean()) / scale, design, x, who)
+    fit, structure, why = _fit((y - y.mean()) / scale, design, x, trials.subject)
     about = {
         "message": why,
         "trials": len(y),
         "subjects": len(people),
-        "names": names,
+        "names": trials.names,
         "quantity": value,
         "unit": unit,
         "level": level or "",
     }
-    extra = len(places) - 1
-    degrees = len(people) - 1
     if fit is None:
         nan = math.nan
         return MixedModel(
             None, nan, (extra, extra * degrees), None, nan, nan, nan, "none", **about
         )
-    covariance = np.asarray(fit.cov_params())[: design.shape[1], : design.shape[1]]
-    estimates = np.asarray(fit.fe_params)
-
-    def coefficient(index: int, df: int) -> Coefficient:
-        b, e = float(estimates[index]), float(np.sqrt(covariance[index, index]))
-        half = e * float(stats.t.ppf(0.975, df))
-        return Coefficient(
-            b * scale,
-            e * scale,
-            (b - half) * scale,
-            (b + half) * scale,
-            float(2 * stats.t.sf(abs(b) / e, df)),
-            df,
-        )
-
-    interaction = math.nan
-    if extra:
-        rows = slice(2 + extra, 2 + 2 * extra)
-        wald = estimates[rows] @ np.linalg.solve(
-            covariance[rows, rows], estimates[rows]
-        )
-        interaction = float(stats.f.sf(wald / extra, extra, extra * degrees))
     last = design.shape[1] - 1
     parts = np.sqrt(np.maximum(np.diag(np.atleast_2d(fit.cov_re)), 0.0)) * scale
     own = (0.0, parts[0]) if structure == _CONDITION else (*parts, 0.0)
     return MixedModel(
-        condition=coefficient(1, degrees),
-        interaction_p=interaction,
+        condition=_coefficient(fit, 1, degrees, scale),
+        interaction_p=_interaction_p(fit, extra, degrees),
         interaction_degrees=(extra, extra * degrees),
         trial=None
         if trial is None
-        else coefficient(last, max(len(y) - last - 1 - 2 * degrees, 1)),
+        else _coefficient(fit, last, max(len(y) - last - 1 - 2 * degrees, 1), scale),
         subject_deviation=float(own[0]),
         slope_deviation=float(own[1]),
         noise_deviation=math.sqrt(float(fit.scale)) * scale,
         structure=structure,
         **about,
     )
+
+
+def _coefficient(fit: Any, index: int, df: int, scale: float) -> Coefficient:
+    """Return a fixed effect, in the value's unit."""
+    b = float(np.asarray(fit.fe_params)[index])
+    e = float(np.sqrt(np.asarray(fit.cov_params())[index, index]))
+    half = e * float(stats.t.ppf(0.975, df))
+    return Coefficient(
+        b * scale,
+        e * scale,
+        (b - half) * scale,
+        (b + half) * scale,
+        float(2 * stats.t.sf(abs(b) / e, df)),
+        df,
+    )
+
+
+def _interaction_p(fit: Any, extra: int, degrees: int) -> float:
+    """Wald's F test that no condition x level effect differs from 0."""
+    if not extra:
+        return math.nan
+    rows = slice(2 + extra, 2 + 2 * extra)
+    b = np.asarray(fit.fe_params)[rows]
+    wald = b @ np.linalg.solve(np.asarray(fit.cov_params())[rows, rows], b)
+    return float(stats.f.sf(wald / extra, extra, extra * degrees))
 
 
 def _fit(y: Array, design: Array, x: Array, who: NDArray[np.str_]) -> Any:
@@ -261,7 +229,7 @@ def _fit(y: Array, design: Array, x: Array, who: NDArray[np.str_]) -> Any:
 
     def fitted(random: Array | None, keep: Any) -> Any:
         with warnings.catch_warnings():
-            # What they say is asked of the result below.
+            # Convergence is read from the result below.
             warnings.simplefilter("ignore")
             try:
                 fit = library.MixedLM(y, design, who, exog_re=random).fit(

@@ -58,6 +58,19 @@ def available_control(
     ------
     InvalidInput
         As :meth:`HeldHand.range`, or where the map has no range at this hand.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ikns import Skeleton
+    >>> skeleton = Skeleton.load()
+    >>> q = np.radians([0, 0, 30, 40, 0, 90, 0, 0, 0] * 2)
+    >>> [swivel] = skeleton.null_spaces(q, "right_arm")[0]
+    >>> right_hand, m = skeleton.hands_in_thorax(q)[0][0], swivel @ q[2:9] - 0.05
+    >>> learned = NullSpaceMap.from_arrays([right_hand], [swivel], [m], [m + 0.1])
+    >>> found = available_control(HeldHand(skeleton, "right_arm"), learned, q)
+    >>> round(found.now, 9), found.lower < 0, found.upper > 1
+    (0.5, True, True)
     """
     at = start_of(hand.chain, hand.held, q)
     place = at.positions.mean(axis=1)

@@ -135,6 +135,17 @@ def fit_lengths(
         When the static trial is too short, or fewer than 10 frames are usable.
     MarkerMismatch
         When a recording lacks markers.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> static, points = run.static.recording, run.points.recording
+    >>> skeleton, report = fit_lengths(Skeleton.load(), static, [points], n_frames=10)
+    >>> report.solved, report.frames
+    (True, 10)
     """
     if n_frames < MIN_FRAMES:
         raise InvalidInput(f"expected at least {MIN_FRAMES} frames, found {n_frames}.")

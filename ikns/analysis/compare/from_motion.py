@@ -84,6 +84,18 @@ def compare_motion(
         When the chains have different hands, or see :func:`compare_samples`.
     NotEnoughData
         When no point has enough still samples, or see :func:`compare_samples`.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> motion, body = run.points.truth, run.subject.skeleton
+    >>> learned = NullSpaceMap(10).fit(*ikns.null_space_samples(motion))
+    >>> found = compare_motion(learned, body, motion, resamples=0)
+    >>> bool(np.degrees(found.pooled["angle"][0]) < np.degrees(found.chance_angles[0]))
+    True
     """
     whole = chain if analyzed is None else analyzed
     _check_chains(learned, chain, whole)

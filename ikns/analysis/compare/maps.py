@@ -107,6 +107,18 @@ def compare(
         When the maps have different points or degrees of freedom.
     NotEnoughData
         When no sample passes the gate.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> motion, body = run.points.truth, run.subject.skeleton
+    >>> learned = NullSpaceMap(10).fit(*null_space_samples(motion))
+    >>> analytic = ikns.analytic_map(body, motion, learned.centers_)
+    >>> bool(np.degrees(compare(learned, analytic, motion).angles).max() < 15)
+    True
     """
     if learned.directions_.shape != analytic.directions_.shape or not np.allclose(
         learned.centers_, analytic.centers_

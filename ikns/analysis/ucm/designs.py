@@ -54,6 +54,21 @@ def across_trials(
     ------
     NotEnoughData
         When a motion never moves, motions are too few, or a joint is constant.
+
+    Examples
+    --------
+    Eight times the same reach, each joint off by a constant:
+
+    >>> import ikns
+    >>> from dataclasses import replace
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> motion, rng = run.points.truth, np.random.default_rng(0)
+    >>> offsets = np.hstack([np.zeros((8, 7)), 0.02 * rng.normal(size=(8, 18))])
+    >>> trials = [replace(motion, q=motion.q + offset) for offset in offsets]
+    >>> across_trials(run.subject.skeleton, trials).v_ucm.shape
+    (101,)
     """
     least = len(chain_joints(chain)) + 1 if min_trials is None else min_trials
     if len(motions) < least:
@@ -101,6 +116,19 @@ def within_trial(
         When `where` does not fit the motion.
     NotEnoughData
         When samples are too few or a joint is constant.
+
+    Examples
+    --------
+    The elbow swivels while the hand's pose is held at the first point:
+
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> motion, first = run.points.truth, run.points.point == 0
+    >>> split = within_trial(run.subject.skeleton, motion, first, task="pose")
+    >>> bool(split.v_ucm > 10 * split.v_ort)
+    True
     """
     chosen = np.asarray(where, dtype=bool)
     if chosen.shape != motion.time.shape:

@@ -94,6 +94,17 @@ def surrogate_test(
     ------
     InvalidInput
         When `n_surrogates` is below 1 or `by` is neither.
+
+    Examples
+    --------
+    Two joints that compensate each other, so that their sum is kept:
+
+    >>> from ikns.analysis.ucm import variance_split
+    >>> rng = np.random.default_rng(0)
+    >>> first = rng.normal(size=30)
+    >>> q = np.stack([first, 0.1 * rng.normal(size=30) - first], axis=1)
+    >>> surrogate_test(variance_split(q, [[1.0, 1.0]]), n_surrogates=99).p
+    np.float64(0.01)
     """
     if n_surrogates < 1 or by not in ("trials", "shift"):
         raise InvalidInput(

@@ -60,6 +60,13 @@ class Skeleton:
         When the URDF cannot be read or is not an upper body.
     MarkerMismatch
         When a marker sits on a link that the URDF does not have.
+
+    Examples
+    --------
+    >>> skeleton = Skeleton.load()
+    >>> q = skeleton.neutral()
+    >>> skeleton.markers_in_world(q).shape, skeleton.hands_in_thorax(q)[0].shape
+    ((24, 3), (2, 3))
     """
 
     def __init__(self, urdf: str, marker_set: MarkerSet) -> None:
@@ -76,11 +83,7 @@ class Skeleton:
     def load(
         cls, path: str | Path | None = None, *, marker_set: str | Path = "oxford24"
     ) -> Skeleton:
-        """Read a URDF file; without one, the generic upper body.
-
-        >>> len(Skeleton.load().joint_names)
-        18
-        """
+        """Read a URDF file; without one, the generic upper body."""
         file = urdf_folder() / "upper_body.urdf" if path is None else Path(path)
         return cls(read_urdf(file), MarkerSet.load(marker_set))
 

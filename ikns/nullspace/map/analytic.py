@@ -79,6 +79,18 @@ def analytic_map(
         When a parameter is out of its range.
     NotEnoughData
         When a center has no still sample, or the centers lie in a plane.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> motion, body = run.points.truth, run.subject.skeleton
+    >>> learned = NullSpaceMap(10).fit(*null_space_samples(motion))
+    >>> analytic = analytic_map(body, motion, learned.centers_)
+    >>> analytic.directions_.shape
+    (10, 1, 7)
     """
     places = np.asarray(centers, dtype=np.float64)
     if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():

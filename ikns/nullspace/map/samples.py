@@ -84,6 +84,16 @@ def null_space_samples(
     ------
     NotEnoughData
         When no sample passes.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
+    ... )
+    >>> x, q = null_space_samples(run.points.truth)
+    >>> len(x) == len(q), q.shape[1]
+    (True, 7)
     """
     gate = still_mask(
         motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration

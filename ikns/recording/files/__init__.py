@@ -41,6 +41,17 @@ def read(path: str | Path) -> Recording:
     ------
     FileError
         One sentence with the file, what was expected and what was found.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> place, unseen = [[0.1, 0.2, 0.3]], [[float("nan")] * 3]
+    >>> recording = Recording([0.0, 0.01], [place, unseen], ["RSHO"])
+    >>> with TemporaryDirectory() as folder:
+    ...     write_c3d(f"{folder}/shoulder.c3d", recording)
+    ...     found = read(f"{folder}/shoulder.c3d")
+    >>> found.labels, found.markers.round(6).tolist()
+    (('RSHO',), [[[0.1, 0.2, 0.3]], [[nan, nan, nan]]])
     """
     path = Path(path)
     reader = _READERS.get(path.suffix.lower())

@@ -49,6 +49,15 @@ def write_c3d(path: str | Path, recording: Recording, *, force: bool = False) ->
         When the file exists already, or cannot be written.
     InvalidInput
         When C3D cannot hold the recording.
+
+    Examples
+    --------
+    >>> recording = Recording([0.0, 0.01], [[[0.1, 0.2, 0.3]]] * 2, ["RSHO"])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "shoulder.c3d"
+    ...     write_c3d(path, recording)
+    ...     read_layout(path).texts("POINT:LABELS")
+    ['RSHO']
     """
     path = Path(path)
     if path.suffix.lower() != ".c3d":
