@@ -53,8 +53,8 @@ from ikns.calibration import calibrate
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
-from ikns.simulation.arm import Arm
-from ikns.simulation.movement import Plan, explore, join, reach, reach_samples
+from ikns.simulation.arm import ArmKinematics
+from ikns.simulation.movement import MovementPlan, explore, join, reach, reach_samples
 from ikns.simulation.places import (
     BOX_HIGH,
     BOX_LOW,
@@ -63,7 +63,7 @@ from ikns.simulation.places import (
     box_points,
     explored_places,
 )
-from ikns.simulation.protocol import _RESTING, _STATIC_SD, _pose
+from ikns.simulation.protocol_body import RESTING, STATIC_SD, both_arms
 from ikns.simulation.wander import tremor, wander
 from ikns.view.render import png
 from ikns.view.style import GREY, INK, RED, figure_style, new_figure
@@ -82,14 +82,14 @@ ROWS = (
 
 
 def habits(
-    arm: Arm, seed: int, positions_in_record: np.ndarray
+    arm: ArmKinematics, seed: int, positions_in_record: np.ndarray
 ) -> tuple[np.ndarray, list[Place], np.ndarray]:
     """Draw about a person what :func:`simulate_protocol` draws first."""
     of_person = np.random.default_rng(seed).spawn(6)[0]
     girdle_rest = of_person.normal(0.0, np.radians([3.0, 2.0]))
     of_person.uniform(-np.pi, np.pi)
-    of_person.normal(0.0, _STATIC_SD, len(arm.skeleton.joint_names))
-    sitting = _pose(arm.skeleton, _RESTING)
+    of_person.normal(0.0, STATIC_SD, len(arm.skeleton.joint_names))
+    sitting = both_arms(arm.skeleton, RESTING)
     positions = box_points([arm], sitting, n=POINTS, rng=of_person)
     np.testing.assert_array_equal(positions[0], positions_in_record)  # in step with it
     places = explored_places(
@@ -104,7 +104,10 @@ def habits(
 
 
 def random_places(
-    arm: Arm, sitting: np.ndarray, girdle_rest: np.ndarray, rng: np.random.Generator
+    arm: ArmKinematics,
+    sitting: np.ndarray,
+    girdle_rest: np.ndarray,
+    rng: np.random.Generator,
 ) -> list[Place]:
     """Draw places as :func:`ikns.simulation.places.random_place` does, all at a time.
 
@@ -153,7 +156,10 @@ def random_places(
 
 
 def carried_out(
-    arm: Arm, sitting: np.ndarray, plan: Plan, rng: np.random.Generator
+    arm: ArmKinematics,
+    sitting: np.ndarray,
+    plan: MovementPlan,
+    rng: np.random.Generator,
 ) -> np.ndarray:
     """Joint angles of the body as in the simulation, all samples at a time, (T, 18)."""
     n, u, body = len(plan.point), Unsteadiness(), arm.skeleton
@@ -184,7 +190,7 @@ def carried_out(
 
 def true_slopes(
     learned: NullSpaceMap,
-    arm: Arm,
+    arm: ArmKinematics,
     sitting: np.ndarray,
     place: Place,
     rng: np.random.Generator,
@@ -204,7 +210,7 @@ def true_slopes(
 
 def true_crosstalk(
     learned: NullSpaceMap,
-    arm: Arm,
+    arm: ArmKinematics,
     sitting: np.ndarray,
     girdle_rest: np.ndarray,
     rng: np.random.Generator,
@@ -225,7 +231,7 @@ def true_crosstalk(
 
 def reported(
     seed: int, resamples: int
-) -> tuple[NullSpaceComparison, Crosstalk, NullSpaceMap, Arm, np.ndarray]:
+) -> tuple[NullSpaceComparison, Crosstalk, NullSpaceMap, ArmKinematics, np.ndarray]:
     """Return what the recordings alone say about a virtual subject."""
     person = virtual_subject(seed)
     run = simulate_protocol(
@@ -254,7 +260,7 @@ def reported(
     )
     reaching = MarkerIK(subject.skeleton).track(run.free.recording, chain=CHAIN)
     across = motion_crosstalk(learned, reaching, resamples=resamples, seed=seed)
-    return found, across, learned, Arm(person.skeleton, SIDE), run.places
+    return found, across, learned, ArmKinematics(person.skeleton, SIDE), run.places
 
 
 def one_subject(seed: int, resamples: int) -> dict[str, list[list[float]]]:

@@ -45,9 +45,9 @@ PAPER = {"ikns": (8.94, 3.26, 88), "ring": (6.34, 0.71, 100)}
 PLANTED = (0.2, 0.4, 0.6)
 WAYS = {
     "finger": {},
-    "signal": {"sees": "signal"},
+    "signal": {"feedback": "signal"},
     "held while fast": {"settings": ControlSettings(hold_speed=0.2)},
-    **{f"planted {fall:g}": {"planted": fall} for fall in PLANTED},
+    **{f"planted {fall:g}": {"crosstalk": fall} for fall in PLANTED},
 }
 
 

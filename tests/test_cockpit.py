@@ -312,9 +312,7 @@ def test_a_trial_with_the_keyboard_and_the_panel(chromium: Any, tmp_path: Path) 
     assert np.isnan(record.c[10:]).all()  # when the clock jumped it was too old
 
 
-def test_a_page_that_closes_and_one_that_looks_on(
-    chromium: Any, tmp_path: Path
-) -> None:
+def test_a_page_that_closes_and_one_that_watches(chromium: Any, tmp_path: Path) -> None:
     with at_work(chromium, tmp_path / "v", ["mouse"], repeats=1) as visit:
         first, second = visit.participant(), visit.participant()
         assert first.is_hidden("#viewer")
@@ -342,9 +340,7 @@ def test_a_page_that_closes_and_one_that_looks_on(
         assert visit.conductor.shown["step"]["repeat"] == row["repeat"] + 1
 
 
-def test_a_gamepad_that_is_pulled_out_is_no_signal(
-    chromium: Any, tmp_path: Path
-) -> None:
+def test_an_unplugged_gamepad_gives_no_signal(chromium: Any, tmp_path: Path) -> None:
     with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1) as visit:
         page = visit.participant(script=GAMEPAD)
         visit.hears(0.0)

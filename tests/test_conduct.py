@@ -1,4 +1,4 @@
-"""The conductor: whatever is asked, in whatever order, nothing is lost."""
+"""The conductor: no attempt is lost, whatever the commands and their order."""
 
 import json
 import math
@@ -138,7 +138,7 @@ def test_what_is_shown_is_plain_data(tmp_path: Path) -> None:
             json.dumps([ask(at, 1.0, name), at.plan, at.curve])
 
 
-def test_a_trial_needs_a_signal_and_a_page_if_that_bears_it(tmp_path: Path) -> None:
+def test_a_trial_needs_a_signal_and_its_page(tmp_path: Path) -> None:
     at = conductor(tmp_path / "v")
     assert "page" in ask(at, 0.0, "begin")["message"]
     at.submit(Command("page_connected"))
@@ -151,7 +151,7 @@ def test_a_trial_needs_a_signal_and_a_page_if_that_bears_it(tmp_path: Path) -> N
     assert ask(at, 3.1, "begin")["state"] == "align"
 
 
-def test_a_page_that_goes_takes_its_trial_with_it(tmp_path: Path) -> None:
+def test_closing_the_page_aborts_its_trial(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
     ask(at, 0.1, "begin")
     shown = ask(at, 2.0, "page_disconnected")
@@ -164,7 +164,7 @@ def test_a_page_that_goes_takes_its_trial_with_it(tmp_path: Path) -> None:
     assert at.experiment.visit.current.key == row["key"]
 
 
-def test_a_trial_with_the_arm_goes_on_without_a_page(tmp_path: Path) -> None:
+def test_a_trial_with_the_arm_continues_without_a_page(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
     while at.condition != "ikns" or at.state == "rest":
         ask(at, 1.0, "skip")
@@ -180,7 +180,7 @@ def test_a_trial_with_the_arm_goes_on_without_a_page(tmp_path: Path) -> None:
     assert said.count("page left") == 1
 
 
-def test_rest_break_and_pause_hold_trials_up(tmp_path: Path) -> None:
+def test_no_trial_begins_in_a_rest_break_or_pause(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
     assert ask(at, 1.0, "pause")["state"] == "paused"
     assert "pause" in ask(at, 1.0, "begin")["message"]
@@ -199,7 +199,7 @@ def test_rest_break_and_pause_hold_trials_up(tmp_path: Path) -> None:
     assert at.update(42.1)["state"] == "waiting"
 
 
-def test_a_clock_that_was_stopped_waits_for_the_outcome(tmp_path: Path) -> None:
+def test_a_stopped_clock_waits_for_the_outcome(tmp_path: Path) -> None:
     at = start(tmp_path / "v", "picking")
     assert ask(at, 0.1, "begin")["state"] == "ready"
     assert "running" in ask(at, 0.2, "success")["message"] or at.state == "ready"
@@ -262,7 +262,7 @@ def test_an_emergency_stop_acts_at_once_and_stays(
     assert at.over
 
 
-# --- whatever is asked --------------------------------------------------------------
+# --- any commands ---------------------------------------------------------------
 
 ASKED = st.sampled_from(
     sorted(COMMANDS | PickingExperiment.commands)
@@ -300,7 +300,7 @@ def consistent(at: Conductor, folder: Path) -> list[dict[str, Any]]:
 
 @settings(max_examples=40)
 @given(st.sampled_from(sorted(FINAL)), st.lists(HAPPENS, max_size=14), st.data())
-def test_nothing_is_lost_whatever_is_asked(
+def test_no_attempt_is_lost_whatever_the_commands(
     experiment: str, happens: list[tuple[Any, Any]], data: st.DataObject
 ) -> None:
     with tempfile.TemporaryDirectory() as name:
@@ -334,7 +334,7 @@ def test_nothing_is_lost_whatever_is_asked(
         assert again.shown["trials_left"] == at.shown["trials_left"]
 
 
-def test_many_threads_may_ask(tmp_path: Path) -> None:
+def test_many_threads_may_submit_commands(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
 
     def press() -> None:
@@ -359,7 +359,7 @@ def test_many_threads_may_ask(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("key", _FIXED)
-def test_another_visit_does_not_go_on_with_this_one(tmp_path: Path, key: str) -> None:
+def test_another_visit_does_not_continue_this_one(tmp_path: Path, key: str) -> None:
     first = about("tracking")
     VisitLog(tmp_path / "v", first)
     other = {"experiment": "picking", "simulated": True, "design": {"rest": 1}}
@@ -376,7 +376,7 @@ def test_the_design_that_differs_is_named(tmp_path: Path) -> None:
         VisitLog(tmp_path / "v", changed)
 
 
-def test_what_cannot_be_written_waits_and_is_told(tmp_path: Path) -> None:
+def test_an_attempt_that_cannot_be_written_is_reported_and_kept(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
     file = tmp_path / "v" / "visit.json"
     away = file.rename(tmp_path / "away.json")
@@ -390,7 +390,7 @@ def test_what_cannot_be_written_waits_and_is_told(tmp_path: Path) -> None:
     assert len(consistent(at, tmp_path / "v")) == 2
 
 
-def test_a_folder_that_holds_something_else_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_with_other_files_is_not_changed(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(InvalidInput, match=r"mine\.txt"):
         VisitLog(tmp_path, about("tracking"))
@@ -401,9 +401,7 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path: Path) -> Non
 
 
 @given(st.floats(allow_nan=True), st.floats(0, 1))
-def test_a_held_signal_stays_within_bounds_and_grows_stale(
-    c: float, age: float
-) -> None:
+def test_a_held_signal_is_clipped_and_times_out(c: float, age: float) -> None:
     held = HeldInput(timeout=0.2)
     held.put(5.0, c)
     ((at, value),) = held.take(5.0 + age)
@@ -445,7 +443,7 @@ def test_a_virtual_operator_plays_a_trial(tmp_path: Path) -> None:
     assert figures.rmse < still / 2
 
 
-def test_a_virtual_operator_that_was_held_up_does_not_rush() -> None:
+def test_a_virtual_operator_does_not_make_up_for_lost_time() -> None:
     player = virtual(lambda: None)
     player.take(0.0)
     late = player.take(60.0)

@@ -17,7 +17,7 @@ from ikns.live.control.local_map import LocalMap
 from ikns.live.control.null_rate import garrote
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import null_space
-from ikns.simulation.arm import Arm, self_motion
+from ikns.simulation.arm import ArmKinematics, self_motion
 from ikns.simulation.trial import true_motion
 
 CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0
@@ -179,7 +179,7 @@ def test_on_a_straight_self_motion_both_modes_are_one():
 
 def curved(skeleton):
     """A self-motion of 50 deg of swivel, and the hand's place."""
-    arm = Arm(skeleton, "right")
+    arm = ArmKinematics(skeleton, "right")
     body = np.zeros(18)
     body[arm.columns] = np.radians([0, 0, 30, 35, -15, 80, 10, 0, 0])
     middle = arm.swivel(body)

@@ -14,7 +14,7 @@ from ikns.body.model_file import urdf_folder
 from ikns.errors import InvalidInput
 from ikns.experiments.picking import load_objects
 from ikns.simulation.grasp import Grasp, Solid, constant, finger_parts, grip_height
-from ikns.simulation.grasp.physics import Seen
+from ikns.simulation.grasp.physics import Observation
 from ikns.simulation.grasp.world import CLEAR, world_model
 
 RATE = 100.0
@@ -23,8 +23,10 @@ FINGER = urdf_folder() / "finger.urdf"
 G = 9.81
 
 
-def run(grasp: Grasp, seconds: float, flexion: float, *, rise: float = 0.0) -> Seen:
-    """Go on with the finger told one thing while the hand rises smoothly."""
+def run(
+    grasp: Grasp, seconds: float, flexion: float, *, rise: float = 0.0
+) -> Observation:
+    """Hold one command to the finger while the hand rises smoothly."""
     start = grasp.data.mocap_pos[0, 2] - grip_height(grasp.solid)
     n = round(seconds * grasp.rate)
     for k in range(n):
@@ -34,7 +36,7 @@ def run(grasp: Grasp, seconds: float, flexion: float, *, rise: float = 0.0) -> S
     return seen
 
 
-def lifted(solid: Solid, **model: float) -> tuple[Grasp, Seen]:
+def lifted(solid: Solid, **model: float) -> tuple[Grasp, Observation]:
     """Close on an object and lift it by a decimeter."""
     grasp = Grasp(solid, rate=RATE, **model)
     run(grasp, 1.5, 1.0)
@@ -250,7 +252,7 @@ def test_shapes_sides_and_rates_that_are_none_are_refused():
         Grasp(CAN, rate=60.0)
 
 
-def test_a_simulation_that_comes_apart_says_so(tmp_path, monkeypatch):
+def test_an_unstable_simulation_is_reported(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log where one is
     grasp = Grasp(CAN, rate=RATE)
     grasp.data.qvel[:3] = 1e12

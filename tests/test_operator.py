@@ -112,7 +112,7 @@ def test_a_still_target_is_reached_and_a_ramp_is_followed_at_the_distance_of_the
     assert done.target[-1] - done.c[-1] == pytest.approx(wanted, abs=1e-6)
 
 
-def test_remnant_has_the_size_and_the_color_asked_for():
+def test_remnant_has_the_stated_size_and_bandwidth():
     ability = replace(able, remnant=0.03)
     operator = Operator(ability, rate=50, seed=3, start=0.0, limits=FREE)
     still = track(operator, lambda t: 0 * t, Delay(0, rate=50), start=0, end=1000.0)
@@ -171,7 +171,7 @@ def test_who_looks_ahead_less_is_behind_by_as_much(seed, name):
 
 @given(st.integers(0, 10**6), st.sampled_from(sorted(CHARACTERS)), st.integers(0, 40))
 @settings(max_examples=10)
-def test_a_copyist_makes_no_error_but_the_delay_that_was_planted(seed, name, samples):
+def test_a_delayed_copy_has_no_error_but_its_delay(seed, name, samples):
     profile = draw_profile(name, seed)
     delay = samples / 50
     record = virtual_trial(DelayedCopy(delay, rate=50), Delay(0, rate=50), profile)
@@ -238,7 +238,7 @@ def test_a_cohort_lies_in_the_limits_and_keeps_its_phase_margin(condition):
     assert sample_abilities(3, seed=0, condition=condition) == cohort[:3]
 
 
-def test_a_person_keeps_the_place_with_another_device():
+def test_a_person_keeps_the_rank_with_another_device():
     elbow, stick = (
         np.array([p.remnant for p in sample_abilities(200, seed=4, condition=c)])
         for c in CONDITIONS
@@ -256,7 +256,7 @@ def test_the_phase_margin_is_where_the_loop_crosses_one():
     assert phase_margin(able, latency=0.03) == pytest.approx(margin, abs=1e-4)
 
 
-def test_practice_takes_noise_away_exponentially():
+def test_practice_reduces_noise_exponentially():
     person = typical()
     extra = [person.practised(k).remnant / person.remnant - 1 for k in (0, 6, 12)]
     assert extra == pytest.approx([0.3, 0.3 / np.e, 0.3 / np.e**2])

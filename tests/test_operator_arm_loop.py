@@ -150,7 +150,7 @@ def test_skin_moves_markers_with_the_posture(person):
     assert np.sqrt((off**2).sum(axis=2).mean()) == pytest.approx(5e-3, rel=0.6)
 
 
-def test_a_delay_planted_in_the_limb_is_recovered_through_the_whole_chain(person):
+def test_a_delay_of_the_limb_is_recovered_through_the_whole_chain(person):
     profile = draw_profile("T2", 4)
     found = []
     for delay in (0.0, 0.16):
@@ -218,7 +218,7 @@ def test_a_direct_trial_is_the_same_person_without_the_chain(person):
     assert direct.rmse == pytest.approx(whole.rmse, rel=0.4)
 
 
-def test_a_condition_that_no_virtual_operator_knows_is_refused(person):
+def test_a_condition_without_a_virtual_operator_is_refused(person):
     step = replace(schedule(0)[0], condition="mouse")
     with pytest.raises(InvalidInput, match="mouse"):
         virtual_step(person, step, draw_profile("T1", 0), practised=0)

@@ -48,7 +48,7 @@ def test_every_object_is_a_solid_that_a_hand_can_take():
             assert 0.050 <= min(thing.size_m) <= 0.100
 
 
-def test_the_catalogue_s_numbers_are_told_from_the_paper_s():
+def test_numbers_of_the_catalog_and_the_paper_are_distinguished():
     paper, ycb = load_objects("paper"), load_objects("ycb")
     differ = [code for code in OBJECT_IDS if paper[code] != ycb[code]]
     assert differ == [code for code in OBJECT_IDS if ycb[code].source == "ycb"] == ["A"]
@@ -93,7 +93,7 @@ def test_every_object_comes_once_in_every_block_of_every_condition(subject, desi
 
 
 @given(st.integers(0, 50), designs)
-def test_training_comes_first_and_meets_the_objects_alike(subject, design):
+def test_training_comes_first_and_uses_all_objects_equally(subject, design):
     steps = pick_schedule(subject, **design)
     kinds = [s.kind for s in steps]
     assert kinds.count("rest") == len(design["conditions"]) - 1
@@ -245,7 +245,7 @@ def test_at_the_limit_exactly_the_time_is_over(zero, limit):
 
 
 @given(zeros, st.lists(commands, max_size=12))
-def test_whatever_is_pressed_the_time_is_within_the_limit_and_an_end_is_an_end(
+def test_whatever_is_pressed_the_time_is_within_the_limit_and_the_end_is_final(
     zero, sequence
 ):
     trial, now, ended = PickTrial(STEP), zero, None
@@ -276,7 +276,7 @@ def test_whatever_is_pressed_the_time_is_within_the_limit_and_an_end_is_an_end(
             assert (ended.reason == "why not") == (view.state == "aborted")
 
 
-def test_a_clock_that_goes_back_or_says_nothing_changes_nothing():
+def test_a_clock_that_goes_back_or_is_nan_changes_nothing():
     trial = PickTrial(STEP)
     trial.start(100.0)
     assert trial.update(104.0).time == 4.0

@@ -125,7 +125,7 @@ def test_the_comment_is_kept_with_the_attempt():
     assert visit.attempts[0].record.comment == "touched the table"
 
 
-def test_skipping_a_trial_that_goes_on_keeps_what_it_had():
+def test_skipping_a_running_trial_keeps_its_record():
     visit = PickVisit(STEPS)
     visit.begin(0.0)
     visit.skip(3.0, "broken object")
@@ -137,7 +137,7 @@ def test_skipping_a_trial_that_goes_on_keeps_what_it_had():
 
 
 @given(st.integers(0, len(STEPS)))
-def test_a_visit_that_was_broken_off_goes_on_where_it_stopped(n):
+def test_an_interrupted_visit_continues_where_it_stopped(n):
     keys = [s.key for s in STEPS[:n] if s.kind != "rest"]
     visit = PickVisit(STEPS, [PickAttempt(key, "success") for key in keys])
     # A rest is over when something after it was done, not before.

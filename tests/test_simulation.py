@@ -28,7 +28,7 @@ from ikns.simulation import (
     virtual_subject,
     write_protocol,
 )
-from ikns.simulation.arm import Arm
+from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.movement import explore, reach
 from ikns.simulation.places import (
@@ -73,7 +73,7 @@ def hand(run: Protocol) -> tuple[np.ndarray, np.ndarray]:
     return truth.hand_in_thorax[:, side], truth.hand_rotation_in_thorax[:, side]
 
 
-def box(arm: Arm, *, n: int) -> list[Place]:
+def box(arm: ArmKinematics, *, n: int) -> list[Place]:
     """Return points of the protocol for one arm."""
     rng = np.random.default_rng(1)
     (positions,) = box_points([arm], np.zeros(18), n=n, rng=rng)
@@ -233,7 +233,7 @@ def test_swivel_agrees_with_the_skeleton(run: Protocol) -> None:
 def test_lifting_the_elbow_outwards_is_positive_swivel() -> None:
     skeleton = virtual_subject(1).skeleton
     for side in SIDES:
-        arm = Arm(skeleton, side)
+        arm = ArmKinematics(skeleton, side)
         posture = np.array([0, 0, 0.0, 0.6, 0, 1.4, 0, 0, 0])
         lifted = posture + [0, 0, 0.5, 0, 0, 0, 0, 0, 0]
         low, high = (arm.swivel(arm.put(np.zeros(18), p)) for p in (posture, lifted))
@@ -246,7 +246,7 @@ def test_lifting_the_elbow_outwards_is_positive_swivel() -> None:
 @pytest.mark.parametrize("side", SIDES)
 def test_points_stand_near_the_box_and_away_from_full_reach(side: str) -> None:
     skeleton = virtual_subject(8).skeleton
-    arm, lengths = Arm(skeleton, side), skeleton.segment_lengths
+    arm, lengths = ArmKinematics(skeleton, side), skeleton.segment_lengths
     places = box(arm, n=10)
     reach_m = sum(lengths[f"{side}_{s}"] for s in ("upper_arm", "forearm", "hand"))
     outward = np.array([1, 1, 1 if side == "right" else -1])
@@ -293,7 +293,7 @@ def test_two_arms_hold_an_object_while_each_elbow_moves_by_itself() -> None:
 
 
 def test_reaches_are_straight_with_minimum_jerk() -> None:
-    arm = Arm(virtual_subject(2).skeleton, "right")
+    arm = ArmKinematics(virtual_subject(2).skeleton, "right")
     start, end = box(arm, n=2)
     plan = reach(start, end, n=90)
     way = end.position - start.position
@@ -306,7 +306,7 @@ def test_reaches_are_straight_with_minimum_jerk() -> None:
 
 
 def test_exploring_uses_the_range_from_rest_to_rest() -> None:
-    arm = Arm(virtual_subject(2).skeleton, "right")
+    arm = ArmKinematics(virtual_subject(2).skeleton, "right")
     (place,) = box(arm, n=1)
     plan = explore(
         place, seconds=5.0, rate=100.0, rng=np.random.default_rng(3), index=7
@@ -411,7 +411,7 @@ def test_static_only_markers_are_worn_in_the_static_trial_only(run: Protocol) ->
 # --- random processes -----------------------------------------------------------------
 
 
-def test_wandering_has_the_stated_size_and_speed() -> None:
+def test_drift_has_the_stated_size_and_speed() -> None:
     rate, cutoff = 100.0, 0.3
     x = wander(np.random.default_rng(0), 200_000, 3, sd=2.0, cutoff=cutoff, rate=rate)
     # 2000 s hold about 2000 x 0.3 x 2 independent values per channel: 1.2 % for 3 of
@@ -421,7 +421,7 @@ def test_wandering_has_the_stated_size_and_speed() -> None:
     assert speed == pytest.approx(2 * np.pi * cutoff * 2.0, rel=0.06)
 
 
-def test_tremor_lives_between_8_and_12_hz() -> None:
+def test_tremor_is_between_8_and_12_hz() -> None:
     x = tremor(np.random.default_rng(0), 20_000, 1, sd=1.0, rate=100.0)[:, 0]
     power = np.abs(np.fft.rfft(x)) ** 2
     hertz = np.fft.rfftfreq(len(x), 0.01)
@@ -469,7 +469,7 @@ def test_written_files_read_back(run: Protocol, tmp_path: Path) -> None:
     assert truth["settings"]["soft_tissue"] == 0.0
 
 
-def test_files_that_exist_are_left_alone(run: Protocol, tmp_path: Path) -> None:
+def test_existing_files_are_not_replaced(run: Protocol, tmp_path: Path) -> None:
     (tmp_path / "points_truth.csv").write_text("mine")
     with pytest.raises(FileError, match="points_truth.csv"):
         write_protocol(tmp_path, run)
@@ -489,7 +489,7 @@ def test_wrong_settings_are_refused(wrong: dict[str, object]) -> None:
 
 
 def test_a_hand_out_of_reach_is_refused() -> None:
-    arm = Arm(virtual_subject(1).skeleton, "right")
+    arm = ArmKinematics(virtual_subject(1).skeleton, "right")
     with pytest.raises(InvalidInput, match="cannot be brought"):
         arm.to_pose(np.full(18, 0.1), np.array([3.0, 0.0, 0.0]), np.eye(3))
 

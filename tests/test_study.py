@@ -71,7 +71,7 @@ def test_what_the_example_leaves_out_has_the_value_written_there(
     assert (whole.tracking, whole.picking, whole.parameters) == tuple(designs.values())
 
 
-def test_an_example_replaces_nothing_unless_told_and_never_results(
+def test_an_example_replaces_files_only_if_forced_and_never_results(
     tmp_path: Path,
 ) -> None:
     path = init_study(tmp_path / "study")
@@ -220,7 +220,7 @@ def usual() -> Participant:
     return study_participant(0, seed=4, parameters=Parameters(**QUICK))
 
 
-def test_variations_see_the_same_people_and_luck(usual: Participant) -> None:
+def test_variations_have_the_same_people_and_noise(usual: Participant) -> None:
     gate = Parameters(**QUICK, max_hand_speed=0.1)
     other = study_participant(0, seed=4, parameters=gate)
     assert other.abilities == usual.abilities
@@ -319,7 +319,7 @@ def test_more_of_the_same_may_be_added(tables: dict, tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_results_mean_may_not_change(
+def test_the_meaning_of_results_may_not_change(
     tables: dict, sentence: str, tmp_path: Path
 ) -> None:
     # The second experiment and the variation are added later, and hold from then on.

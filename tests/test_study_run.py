@@ -88,7 +88,7 @@ def test_two_dask_workers_make_the_bits_of_one(done: Path, tmp_path: Path) -> No
     assert contents(study) == contents(done)
 
 
-def test_a_killed_run_goes_on_and_two_processes_make_the_bits_of_one(
+def test_a_killed_run_continues_and_two_processes_make_the_bits_of_one(
     done: Path, tmp_path: Path
 ) -> None:
     study = make(tmp_path / "killed")
@@ -137,7 +137,7 @@ def test_a_cohort_grows_without_doing_anything_twice(
         run_study(study, participants=4)
 
 
-def test_a_cell_is_what_the_participant_does(done: Path) -> None:
+def test_a_tracking_visit_equals_the_participant_s_own_trials(done: Path) -> None:
     study = read_study(done)
     assert study.tracking is not None
     visit = read_visit(done / "visits" / "sub-02_tracking", experiment="tracking")
@@ -165,7 +165,7 @@ def test_a_cell_is_what_the_participant_does(done: Path) -> None:
     assert about["subject"]["stature_m"] == person.protocol.subject.adult.stature_m
 
 
-def test_the_first_participant_leaves_what_was_learned(done: Path) -> None:
+def test_the_subject_of_the_first_participant_is_saved(done: Path) -> None:
     study = read_study(done)
     person = study_participant(0, seed=5, parameters=study.parameters)
     for experiment in ("tracking", "picking"):
@@ -177,7 +177,7 @@ def test_the_first_participant_leaves_what_was_learned(done: Path) -> None:
     assert not (done / "visits" / "sub-02_tracking" / "subject").exists()
 
 
-def test_a_picking_cell_is_what_the_participant_does(done: Path) -> None:
+def test_a_picking_visit_equals_the_participant_s_own_picks(done: Path) -> None:
     study = read_study(done)
     assert study.picking is not None
     visit = read_visit(done / "visits" / "sub-02_picking", experiment="picking")
@@ -190,7 +190,9 @@ def test_a_picking_cell_is_what_the_participant_does(done: Path) -> None:
     assert "mujoco" in visit.about["versions"]
 
 
-def test_who_cannot_be_calibrated_is_told_and_stops_nobody(tmp_path: Path) -> None:
+def test_a_failed_calibration_is_reported_and_does_not_end_the_run(
+    tmp_path: Path,
+) -> None:
     study = make(
         tmp_path / "strict",
         cohort={"participants": 1},
@@ -239,7 +241,7 @@ def test_a_study_of_people_and_a_damaged_one_are_not_run(tmp_path: Path) -> None
         run_study(tmp_path / "nowhere")
 
 
-def test_workers_that_are_none_or_die_are_told(
+def test_missing_and_dead_workers_are_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(InvalidInput, match="at least one process, found 0"):
@@ -247,7 +249,7 @@ def test_workers_that_are_none_or_die_are_told(
     assert list(workers.compute(abs, iter([-1, 2]), n_jobs=1)) == [1, 2]
     with pytest.raises(StreamError, match="a worker process died"):
         list(workers.compute(_die, [1], n_jobs=2))
-    monkeypatch.setattr(workers, "_PATIENCE", 0.2)
+    monkeypatch.setattr(workers, "_CONNECT_TIMEOUT", 0.2)
     study = make(tmp_path / "nobody")
     with pytest.raises(StreamError, match="tcp://127.0.0.1:9: no Dask scheduler"):
         run_study(study, scheduler="tcp://127.0.0.1:9")

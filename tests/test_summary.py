@@ -80,7 +80,7 @@ def test_a_still_operator_has_the_target_s_own_spread_in_the_report(tmp_path):
 
 
 @pytest.mark.parametrize("delay", [0.1, 0.26, 0.5])
-def test_a_planted_delay_comes_back_from_the_report_within_20_ms(tmp_path, delay):
+def test_a_known_delay_is_recovered_within_20_ms(tmp_path, delay):
     copied(tmp_path, 1, DelayedCopy(delay, rate=50), Delay(0, rate=50))
     found = group(tmp_path).tracking
     lag = cell(found.metrics["lag"], found.conditions[0]).over.mean
@@ -213,7 +213,7 @@ def test_what_does_not_count_is_counted_but_not_measured(tmp_path):
     assert found.unmeasured == ["01: gamepad/trial/T1/0"]
 
 
-def test_people_and_simulated_participants_are_never_added_up(tmp_path):
+def test_people_and_simulated_participants_are_never_pooled(tmp_path):
     for who in (1, 2):
         small.tracking(tmp_path, who, dict.fromkeys(BOTH, 1.0), simulated=False)
     for who in (3, 4, 5):
@@ -298,7 +298,7 @@ def test_visits_that_cannot_be_used_are_left_out_with_their_reason(tmp_path):
         summarize(tmp_path)
 
 
-def test_frames_that_do_not_follow_one_another_are_refused_with_their_visit(tmp_path):
+def test_a_visit_with_times_that_do_not_increase_is_excluded(tmp_path):
     good = small.attempt(1, "ikns", "T1", small.off_by(1))
     short = {**good, "c": good["c"][:-1]}
     back = {**good, "time": good["time"][::-1]}
@@ -446,7 +446,7 @@ def test_more_processes_give_the_same_numbers(tmp_path):
     assert one == two
 
 
-def test_what_is_kept_of_a_visit_does_not_grow_with_its_traces(tmp_path, monkeypatch):
+def test_memory_does_not_grow_with_the_traces(tmp_path, monkeypatch):
     """Twice the frames, the same size: 1000 participants need no more than numbers."""
     sizes = []
     for who, rate in ((1, 50.0), (2, 100.0)):
@@ -503,7 +503,7 @@ def test_running_error_refuses_another_length():
         RunningError(np.arange(3.0)).add(np.zeros(4))
 
 
-def test_cells_of_a_hand_made_table():
+def test_condition_means_of_a_hand_made_table():
     table = {
         "subject": np.array(["a", "a", "b"]),
         "condition": np.array(["x", "x", "x"]),
@@ -520,7 +520,7 @@ def test_cells_of_a_hand_made_table():
     assert np.isnan(means["y", "T1"])
 
 
-def test_what_visits_hold_is_believed_over_stored_metrics(tmp_path: Path):
+def test_metrics_come_from_attempts_and_not_from_stored_values(tmp_path: Path):
     """A metric that somebody wrote beside the attempts changes nothing."""
     folder = small.tracking(
         tmp_path, 1, dict.fromkeys(BOTH, 2.0), metrics={"rmse": 0.1}

@@ -12,7 +12,7 @@ from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput
 from ikns.nullspace.map import NullSpaceMap
-from ikns.simulation.arm import Arm, self_motion
+from ikns.simulation.arm import ArmKinematics, self_motion
 from ikns.symbolic import (
     HeldHand,
     available_control,
@@ -148,7 +148,7 @@ def test_every_posture_of_a_sweep_holds_the_hand_on_the_swivel_circle(
 def test_a_walk_that_stays_off_the_limits_lies_within_the_sweep(skeleton, limits_alone):
     q = angles(skeleton, POSTURES[0])
     found = limits_alone.sweep(q)
-    walked = self_motion(Arm(skeleton, "right"), q, lowest=-3.0, highest=3.0)
+    walked = self_motion(ArmKinematics(skeleton, "right"), q, lowest=-3.0, highest=3.0)
     every = np.tile(q, (2, 1))
     every[:, columns(skeleton)] = found.postures[[0, -1]]
     ends = np.sort(skeleton.swivel(every)[:, 0])
@@ -314,7 +314,7 @@ def test_the_best_of_random_postures_is_never_better(skeleton):
     direction = np.r_[0, 0, Z]
     found = hand.range(q, direction)
     # Girdle angles on a grid, the arm brought back and swung: all of the freedom.
-    arm, best = Arm(skeleton, "right"), [np.inf, -np.inf]
+    arm, best = ArmKinematics(skeleton, "right"), [np.inf, -np.inf]
     goal = skeleton.link_in_thorax(q, "right_knuckle")
     names = columns(skeleton, "right_arm_clavicle")
     for protraction in np.radians([-25, 0, 25]):

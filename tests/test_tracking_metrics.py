@@ -101,7 +101,7 @@ def test_signals_of_different_length_are_refused():
         lag(np.arange(5.0), np.arange(6.0), rate=100)
 
 
-def test_overshoot_is_what_was_planted_after_each_move():
+def test_overshoot_after_each_move_is_recovered():
     profile = Profile(
         "T1",
         0,

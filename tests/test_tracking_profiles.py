@@ -94,7 +94,7 @@ def test_a_williams_design_is_balanced_for_place_and_for_what_came_before(n):
     assert len(set(pairs.values())) <= 1
 
 
-def test_everybody_does_nine_trials_a_condition_and_meets_every_order_once():
+def test_each_subject_does_nine_trials_per_condition_in_every_order_once():
     for subject in range(12):
         steps = [s for s in schedule(subject) if s.kind == "trial"]
         assert len({s.key for s in steps}) == len(steps) == 18
@@ -124,7 +124,7 @@ def test_training_comes_first_and_shows_none_of_the_profiles_of_the_study():
     assert sum(s.seconds + 5 for s in steps[:10]) == 300
 
 
-def test_profiles_are_the_same_for_everybody():
+def test_profiles_are_the_same_for_all_subjects():
     def trials(subject):
         return {(s.profile, s.seed) for s in schedule(subject) if s.kind == "trial"}
 

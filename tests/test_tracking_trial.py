@@ -72,7 +72,7 @@ def test_neither_the_clock_s_zero_nor_its_rate_matters(zero, rate):
     assert len(record.time) == 30 * rate + 1
 
 
-def test_times_that_do_not_advance_are_not_written_down():
+def test_times_that_do_not_advance_are_not_recorded():
     trial = TrackingTrial(PROFILE)
     trial.start(10.0)
     for now in (10.0, 10.1, 10.1, 10.05, math.nan, 10.2):
@@ -81,7 +81,7 @@ def test_times_that_do_not_advance_are_not_written_down():
     assert trial.record.time == pytest.approx([-5, -4.9, -4.8])
 
 
-def test_a_trial_ends_without_frames_too():
+def test_a_trial_ends_without_samples_too():
     trial = TrackingTrial(PROFILE)
     trial.start(0.0)
     assert trial.update(29.9).state == "track"
@@ -150,7 +150,7 @@ def test_a_visit_goes_through_all_steps_in_order():
     assert list(visit.records()) == done
 
 
-def test_an_aborted_trial_comes_again_and_both_attempts_are_kept():
+def test_an_aborted_trial_is_repeated_and_both_attempts_are_kept():
     visit = Visit(STEPS)
     first = visit.current.key
     visit.begin(0.0).add_sample(0.5, 0.2)
@@ -164,7 +164,7 @@ def test_an_aborted_trial_comes_again_and_both_attempts_are_kept():
     assert visit.attempts[0].record.c.tolist() == [0.2]
 
 
-def test_a_step_can_be_skipped_and_taken_up_again():
+def test_a_step_can_be_skipped_and_repeated():
     visit = Visit(STEPS)
     first = visit.current.key
     visit.skip(0.0, "tired")
@@ -189,7 +189,7 @@ def test_a_repeated_trial_replaces_the_record_that_counts():
 
 
 @given(st.integers(0, len(STEPS)))
-def test_a_visit_that_was_broken_off_goes_on_where_it_stopped(n):
+def test_an_interrupted_visit_continues_where_it_stopped(n):
     keys = [s.key for s in STEPS[:n] if s.kind != "rest"]
     visit = Visit(STEPS, [Attempt(key, "done") for key in keys])
     # A rest is over when something after it was done, not before.

@@ -16,15 +16,15 @@ from ikns.simulation.grasp import (
     CarriedArm,
     Grasp,
     Habits,
+    Observation,
     Person,
-    Ring,
-    Seen,
+    RingInput,
     Solid,
     draw_habits,
-    hand_drift,
     hand_route,
     pick,
 )
+from ikns.simulation.movement import hand_drift
 from ikns.simulation.operator import Participant, sample_abilities, tracking_place
 
 RATE = 50.0
@@ -109,7 +109,7 @@ def test_crosstalk_drops_what_it_takes_below_the_contact(fall, outcome):
     def strays(want, place, seen):
         return want - fall * max(place, 0.0) if want else 0.0
 
-    # The can stops the finger at 0.89: planted crosstalk of 0.05 leaves it pressed, of
+    # The can stops the finger at 0.89: an added crosstalk of 0.05 leaves it pressed, of
     # 0.3 opens it on the way.
     assert go(strays, solid("D")).outcome == outcome
 
@@ -131,8 +131,8 @@ def test_what_is_too_heavy_is_dropped():
 
 
 def test_a_ring_waits_for_the_reaction_and_ramps():
-    ring = Ring(reaction=0.2, latency=0.1, rate=100.0)
-    seen = Seen(0.0, 0.0, np.zeros(3), np.zeros(3), 0.0, 0.0, 0.0, 0.0)
+    ring = RingInput(reaction=0.2, latency=0.1, rate=100.0)
+    seen = Observation(0.0, 0.0, np.zeros(3), np.zeros(3), 0.0, 0.0, 0.0, 0.0)
     told = [ring(1.0 if k >= 10 else 0.0, 0.0, seen) for k in range(120)]
     # Wanted at 0.1 s, pressed at 0.3 s, seen at 0.4 s, at 2 per second.
     assert told[40] == pytest.approx(0.02)
@@ -141,13 +141,13 @@ def test_a_ring_waits_for_the_reaction_and_ramps():
     assert told[100] == 1.0
 
 
-def test_the_person_does_one_thing_after_the_other():
+def test_the_person_goes_through_all_phases_in_order():
     person = Person(HABITS, down=0.5, across=0.5)
-    seen = Seen(0.0, 0.5, np.zeros(3), np.zeros(3), 0.0, 1.0, 1.0, 0.0)
+    seen = Observation(0.0, 0.5, np.zeros(3), np.zeros(3), 0.0, 1.0, 1.0, 0.0)
     did, places = [], []
     for k in range(400):
         person.step(k / 100, seen)
-        did.append(person.doing)
+        did.append(person.phase)
         places.append(person.place)
     order = ["opening", "reaching", "closing", "carrying", "placing", "releasing"]
     assert list(dict.fromkeys(did)) == order
@@ -167,7 +167,7 @@ def test_habits_are_the_person_s_own_and_within_limits():
     assert all(0.1 <= habits.squeeze <= 0.6 for habits in drawn)
 
 
-def test_the_hand_keeps_to_its_way_whatever_the_elbow_does(route):
+def test_the_hand_stays_on_its_route_whatever_the_elbow_does(route):
     off = []
     for s in (-1.0, -0.4, 0.0, 0.13, 0.5, 0.81, 1.0):
         for limb in (0.0, 0.37, 1.0):
@@ -179,7 +179,7 @@ def test_the_hand_keeps_to_its_way_whatever_the_elbow_does(route):
     assert max(off) < 3e-4
 
 
-def test_the_elbow_swivels_as_far_anywhere_on_the_way(route):
+def test_the_swivel_range_is_the_same_on_the_whole_route(route):
     wanted = np.array([0.1, 0.5, 0.9])
     for s in (-1.0, 0.0, 0.5, 1.0):
         swivel = [route.arm.swivel(route.posture(s, limb)) for limb in wanted]
@@ -198,7 +198,7 @@ def test_the_hand_turns_with_the_arm_and_only_about_the_vertical(route):
     assert abs(route.turn(1.0)) > 0.3
 
 
-def test_the_body_knows_nothing_of_the_map(person, route):
+def test_the_body_is_independent_of_the_map(person, route):
     learned = person.subject.null_space_map
     other = replace(
         person.subject,
@@ -209,7 +209,7 @@ def test_the_body_knows_nothing_of_the_map(person, route):
             learned.upper_,
         ),
     )
-    drift = hand_drift(10, rate=RATE, seed=0, steady=Unsteadiness())
+    drift = hand_drift(10, rate=RATE, seed=0, unsteadiness=Unsteadiness())
     markers = [
         CarriedArm(someone, route, drift, rate=RATE, seed=3).markers(0.3, 0.6)
         for someone in (person, replace(person, subject=other))
@@ -270,7 +270,7 @@ def test_a_button_knows_no_crosstalk(person):
     assert row["hold_share"] == 1.0
 
 
-def test_a_hand_that_holds_the_signal_while_it_travels_feels_no_crosstalk(person):
+def test_a_signal_held_while_the_hand_moves_has_no_crosstalk(person):
     step = PickStep("trial", "ikns", "F")
     held, _ = virtual_pick(
         person, step, practised=3, rate=RATE, settings=ControlSettings(hold_speed=0.15)
@@ -281,7 +281,7 @@ def test_a_hand_that_holds_the_signal_while_it_travels_feels_no_crosstalk(person
     assert np.ptp(told) == 0.0
 
 
-def test_what_nobody_can_do_is_refused(person):
+def test_impossible_picks_are_refused(person):
     for step, message in (
         (PickStep("trial", "gamepad", "A"), "ikns or ring"),
         (PickStep("rest"), "found a rest"),
@@ -292,4 +292,4 @@ def test_what_nobody_can_do_is_refused(person):
             virtual_pick_step(person, step, practised=0, rate=RATE)
     step = PickStep("trial", "ikns", "A")
     with pytest.raises(InvalidInput, match="finger or signal"):
-        virtual_pick_step(person, step, practised=0, rate=RATE, sees="nothing")
+        virtual_pick_step(person, step, practised=0, rate=RATE, feedback="nothing")

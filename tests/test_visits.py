@@ -147,7 +147,7 @@ def test_no_attempt_and_no_visit_is_overwritten(visit: Path) -> None:
     assert {p.name: p.read_bytes() for p in visit.iterdir()} == before
 
 
-def test_a_file_that_was_not_finished_is_no_file(visit: Path, tmp_path: Path) -> None:
+def test_unfinished_files_are_ignored(visit: Path, tmp_path: Path) -> None:
     append_attempt(visit, attempt_row(1))
     (visit / ".attempt-0002.parquet.99.part").write_bytes(b"PAR1 half")
     assert len(read_visit(visit).attempts) == 1

@@ -18,10 +18,10 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap, null_space_samples, still_mask
 from ikns.simulation import Trial, Unsteadiness, simulate_protocol
-from ikns.simulation.exercise import visit
-from ikns.simulation.movement import carry_out
+from ikns.simulation.exercise import explore_points
+from ikns.simulation.movement import execute_plan
 from ikns.simulation.places import Place
-from ikns.simulation.trial import film, place_in_room
+from ikns.simulation.trial import place_in_room, record_trial
 from ikns.simulation.wander import wander
 from interpolation.layouts import box_surface
 from interpolation.truth import CHAIN, Person, Visit, line_angle
@@ -199,12 +199,12 @@ def _filmed(
     rng: np.random.Generator,
 ) -> Trial:
     """Film the person at one place after the other."""
-    (plan,) = visit([places], seconds=seconds, rate=rate, rng=rng)
+    (plan,) = explore_points([places], seconds=seconds, rate=rate, rng=rng)
     n = len(plan.point)
     angles = who.body + wander(
         rng, n, len(who.body), sd=np.radians(0.3), cutoff=0.3, rate=rate
     )
-    angles = carry_out(who.arm, angles, plan, unsteadiness=hand, rate=rate, rng=rng)
+    angles = execute_plan(who.arm, angles, plan, unsteadiness=hand, rate=rate, rng=rng)
     q = place_in_room(
         angles,
         height=0.6 * who.subject.adult.stature_m,
@@ -213,7 +213,7 @@ def _filmed(
         rate=rate,
         rng=rng,
     )
-    return film(
+    return record_trial(
         [who.arm],
         q,
         name="points",

@@ -20,8 +20,14 @@ from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map.alignment import align
 from ikns.numerics.subspace import mean_null_direction, principal_components
 from ikns.simulation import Unsteadiness, VirtualSubject, virtual_subject
-from ikns.simulation.arm import Arm
-from ikns.simulation.movement import Plan, carry_out, explore, reach, reach_samples
+from ikns.simulation.arm import ArmKinematics
+from ikns.simulation.movement import (
+    MovementPlan,
+    execute_plan,
+    explore,
+    reach,
+    reach_samples,
+)
 from ikns.simulation.places import (
     BOX_HIGH,
     BOX_LOW,
@@ -100,7 +106,7 @@ class Person:
     ----------
     subject : VirtualSubject
         The true body.
-    arm : Arm
+    arm : ArmKinematics
     girdle_rest : (2,) array
         Clavicle angles with the arm hanging, rad.
     low, high : (3,) array
@@ -108,7 +114,7 @@ class Person:
     """
 
     subject: VirtualSubject
-    arm: Arm
+    arm: ArmKinematics
     girdle_rest: Array
     low: Array
     high: Array
@@ -231,9 +237,11 @@ class Person:
             found.append((x, q[:, self.arm.columns[2:]]))
         return found
 
-    def _carried_out(self, plan: Plan, rate: float, rng: np.random.Generator) -> Array:
+    def _carried_out(
+        self, plan: MovementPlan, rate: float, rng: np.random.Generator
+    ) -> Array:
         angles = np.repeat(self.body[None], len(plan.point), axis=0)
-        return carry_out(
+        return execute_plan(
             self.arm, angles, plan, unsteadiness=_STILL, rate=rate, rng=rng
         )
 
@@ -241,7 +249,7 @@ class Person:
 def person(seed: int) -> Person:
     """Draw a person; same seed, same person."""
     subject = virtual_subject(seed)
-    arm = Arm(subject.skeleton, "right")
+    arm = ArmKinematics(subject.skeleton, "right")
     rest = np.random.default_rng([seed, 1]).normal(0.0, _GIRDLE_SD)
     lengths = subject.skeleton.segment_lengths
     reached = sum(lengths[f"right_{part}"] for part in ("upper_arm", "forearm", "hand"))

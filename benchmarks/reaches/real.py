@@ -21,7 +21,7 @@ from ikns.nullspace.clustering import BoundingBoxKMeans
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import principal_components
 from ikns.recording.files import read
-from ikns.simulation.arm import Arm, self_motion
+from ikns.simulation.arm import ArmKinematics, self_motion
 
 #: Figures are of these two, whoever else is in the folder.
 PEOPLE = ("ADL001", "ADL005")
@@ -99,7 +99,7 @@ def real_arms(folder: Path, *, quick: bool) -> list[RealArm]:
 
 
 def _explored(skeleton: Skeleton, side: str, trials: dict[str, Motion]) -> NullSpaceMap:
-    arm, chain = Arm(skeleton, side), f"{side}_arm"
+    arm, chain = ArmKinematics(skeleton, side), f"{side}_arm"
     x = np.concatenate([motion.task_position(chain) for motion in trials.values()])
     angles = np.concatenate([motion.angles for motion in trials.values()])
     centers = BoundingBoxKMeans(10).fit(x).cluster_centers_

@@ -21,16 +21,16 @@ from ikns.simulation import (
     simulate_protocol,
     virtual_subject,
 )
-from ikns.simulation.arm import Arm, girdle, self_motion
+from ikns.simulation.arm import ArmKinematics, girdle, self_motion
 from ikns.simulation.movement import (
-    Plan,
-    carry_out,
+    MovementPlan,
+    execute_plan,
     join,
     reach,
     reach_samples,
 )
 from ikns.simulation.places import GIRDLE_FOLLOW, Place, comfortable_posture
-from ikns.simulation.trial import Trial, film, place_in_room
+from ikns.simulation.trial import Trial, place_in_room, record_trial
 from ikns.simulation.wander import minimum_jerk
 
 RATE = 50.0
@@ -100,7 +100,7 @@ def simulate(seed: int, *, quick: bool) -> Person:
         chain=CHAIN,
     )
     rng = np.random.default_rng([seed, 4])
-    arm = Arm(person.skeleton, "right")
+    arm = ArmKinematics(person.skeleton, "right")
     places = _places(run, arm, 5 if quick else 12, rng)
     n = 4 if quick else 17
     order = [places[i] for i in _wandering(len(places), n, rng)]
@@ -108,7 +108,7 @@ def simulate(seed: int, *, quick: bool) -> Person:
         (p.swivel - p.motion.swivel[0]) / np.ptp(p.motion.swivel) for p in order
     ]
 
-    def constant(values: list[float]) -> tuple[Plan, np.ndarray]:
+    def constant(values: list[float]) -> tuple[MovementPlan, np.ndarray]:
         return _go(order, values, hold=1.3)
 
     seconds = 12.0 if quick else 120.0
@@ -130,7 +130,9 @@ def simulate(seed: int, *, quick: bool) -> Person:
     )
 
 
-def _places(run: Protocol, arm: Arm, n: int, rng: np.random.Generator) -> list[Place]:
+def _places(
+    run: Protocol, arm: ArmKinematics, n: int, rng: np.random.Generator
+) -> list[Place]:
     """Find new places within the box, held as this person held the points."""
     truth, point = run.points.truth, run.points.point
     rows = [np.flatnonzero(point == k) for k in range(len(run.places))]
@@ -182,7 +184,7 @@ def _at(place: Place, c: np.ndarray) -> np.ndarray:
 
 def _go(
     places: list[Place], meant: np.ndarray | list[float], *, hold: float
-) -> tuple[Plan, np.ndarray]:
+) -> tuple[MovementPlan, np.ndarray]:
     """Visit places one after the other and mean c there: one value each, or a curve."""
     curve = meant if isinstance(meant, np.ndarray) else None
     parts, told, done = [], [], 0
@@ -201,7 +203,7 @@ def _go(
             way = reach(before, place, n=n)
             still = ~np.full(n, reaching)
             parts.append(
-                Plan(
+                MovementPlan(
                     (1 - share[:, None]) * _at(before, start)
                     + share[:, None] * _at(place, end),
                     way.position if reaching else np.tile(place.position, (n, 1)),
@@ -216,15 +218,15 @@ def _go(
 
 def _carried_out(
     run: Protocol,
-    arm: Arm,
+    arm: ArmKinematics,
     subject: Subject,
-    plan: Plan,
+    plan: MovementPlan,
     meant: np.ndarray,
     rng: np.random.Generator,
 ) -> Session:
     n = len(plan.point)
     sitting = run.points.truth.angles[0]
-    angles = carry_out(
+    angles = execute_plan(
         arm,
         np.tile(sitting, (n, 1)),
         plan,
@@ -240,7 +242,7 @@ def _carried_out(
         rate=RATE,
         rng=rng,
     )
-    trial: Trial = film(
+    trial: Trial = record_trial(
         [arm],
         q,
         name="reaches",

@@ -19,11 +19,11 @@ from ikns.calibration.scaling import scale
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
-from ikns.simulation.arm import Arm
+from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.artifacts import SoftTissue
-from ikns.simulation.movement import carry_out, reach
+from ikns.simulation.movement import execute_plan, reach
 from ikns.simulation.places import Place, explored_places
-from ikns.simulation.trial import film, place_in_room, true_motion
+from ikns.simulation.trial import place_in_room, record_trial, true_motion
 
 #: Spread of the elbow and of the hand over trials, rad and m per axis.
 SWIVEL_SD, HAND_SD, WIDE_HAND_SD = np.radians(8.0), 5e-3, 20e-3
@@ -43,7 +43,7 @@ class Reaches:
             virtual_subject(seed), seed=seed, n_points=4, quick=True, rate=rate
         )
         person = self.run.subject.skeleton
-        self.arm = Arm(person, "right")
+        self.arm = ArmKinematics(person, "right")
         self.measured, _ = scale(Skeleton.load(), self.run.static.recording)
         self.sitting = self.run.points.truth.angles[0]
         self.places = explored_places(
@@ -67,7 +67,7 @@ class Reaches:
             body = np.repeat(self.sitting[None], n, axis=0)
             still_hand = Unsteadiness(drift=0.0, tilt=0.0, tremor=0.0, tremor_tilt=0.0)
             trials.append(
-                carry_out(
+                execute_plan(
                     self.arm,
                     body,
                     plan,
@@ -110,7 +110,7 @@ class Reaches:
                 rate=self.rate,
                 rng=rng,
             )
-            trial = film(
+            trial = record_trial(
                 [self.arm],
                 q,
                 name="reach",

@@ -1,4 +1,4 @@
-"""Virtual subjects: simulated people with a known truth."""
+"""Virtual subjects: simulated people whose true motion is known."""
 
 from ikns.simulation.folder import write_protocol
 from ikns.simulation.movement import Unsteadiness

@@ -1,8 +1,8 @@
-"""One arm of a virtual subject: reach a hand pose, and swivel the elbow around it.
+"""One arm of a virtual subject: its inverse kinematics and self-motion.
 
-The self-motion comes from the Jacobian alone: its null direction is followed, and the
-hand pose is put back by Newton steps after every step of the way. Nothing here knows
-about directions that were learned from a recording.
+The self-motion comes from the Jacobian alone: each step follows the null direction, and
+Newton steps then restore the hand pose. Directions learned from a recording are not
+used.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.numerics.subspace import null_space
 
-__all__ = ["Arm", "SelfMotion", "self_motion"]
+__all__ = ["ArmKinematics", "SelfMotion", "self_motion"]
 
 Array = NDArray[np.float64]
 
-#: Hand pose error at which Newton stops, m and rad: a thousandth of the 0.1 mm that
-#: cameras resolve, far above rounding.
+#: Hand pose error at which Newton's method stops, m and rad: a thousandth of the 0.1 mm
+#: that cameras resolve, far above rounding.
 POSE_TOLERANCE = 1e-7
-#: A Newton step moves no joint further than this, rad.
+#: Largest change of a joint in a Newton step, rad.
 _LONGEST_STEP = 0.3
-#: Step along the self-motion, rad of joint-space length. A cubic through the steps then
-#: misses the curve by about stride^4 / 384 = 1e-8 rad.
+#: Step along the self-motion, rad of joint-space length. A cubic spline through the
+#: steps is then accurate to about stride^4 / 384 = 1e-8 rad.
 _STRIDE = 0.04
-#: The self-motion stays this far from every joint limit, rad: nobody holds a hand still
-#: with a joint at its stop.
+#: Distance of the self-motion from all joint limits, rad: people do not hold a hand
+#: still with a joint at its limit.
 _MARGIN = np.radians(5.0)
 
 
-class Arm:
+class ArmKinematics:
     """The kinematics of one arm, clavicle included.
 
     A *posture* is the arm's (9,) angles in the order of the chain ``*_arm_clavicle``;
@@ -45,14 +45,12 @@ class Arm:
     Parameters
     ----------
     skeleton : Skeleton
-        The body.
     side : {"right", "left"}
-        Which arm.
     """
 
     def __init__(self, skeleton: Skeleton, side: str) -> None:
         if side not in SIDES:
-            raise InvalidInput(f"side must be 'right' or 'left', not '{side}'.")
+            raise InvalidInput(f"expected a side of right or left, found '{side}'.")
         self.skeleton, self.side, self.chain = skeleton, side, f"{side}_arm"
         names = skeleton.joint_names
         self.columns = [names.index(j) for j in chain_joints(f"{side}_arm_clavicle")]
@@ -62,32 +60,32 @@ class Arm:
         self.outward = 1.0 if side == "right" else -1.0
 
     def put(self, angles: Array, posture: ArrayLike) -> Array:
-        """Return the body's joint angles with this arm in a posture."""
+        """Return joint angles of the body with this arm in a posture."""
         changed = np.array(angles)
         changed[self.columns] = posture
         return changed
 
     def hand(self, angles: Array) -> tuple[Array, Array]:
-        """Hand position (3,) m and orientation (3, 3) in the thorax frame."""
+        """Return hand position (3,) m and orientation (3, 3) in the thorax frame."""
         return self.skeleton.link_in_thorax(angles, f"{self.side}_knuckle")
 
     def shoulder(self, angles: Array) -> Array:
-        """Shoulder joint center in the thorax frame, (3,) m."""
+        """Return the shoulder joint center in the thorax frame, (3,) m."""
         return self.skeleton.link_in_thorax(angles, f"{self.side}_upper_arm")[0]
 
     def swivel(self, angles: Array) -> float:
-        """Elbow angle about the line from shoulder to wrist, rad.
+        """Return the elbow angle about the line from shoulder to wrist, rad.
 
-        Zero with the elbow straight below the line, positive where it is lifted
-        outwards; NaN for a straight arm.
+        Zero with the elbow below the line, positive where it is raised outwards; NaN
+        for a straight arm.
         """
         return float(self.skeleton.swivel(angles)[SIDES.index(self.side)])
 
     def to_pose(self, angles: Array, position: Array, rotation: Array) -> Array:
         """Return the posture nearest to `angles` that puts the hand at a pose.
 
-        Newton's method with minimum-norm steps of the seven arm joints, so that
-        self-motion and clavicle are left alone.
+        Newton's method with minimum-norm steps of the seven arm joints, which do not
+        move along the self-motion and leave the clavicle as it is.
 
         Parameters
         ----------
@@ -112,7 +110,7 @@ class Arm:
             if np.abs(error).max() < POSE_TOLERANCE:
                 return angles
             J = self.skeleton.chain_jacobian(angles, self.chain)
-            # Cholesky without the checks of ready-made solvers, for speed.
+            # Cholesky without the checks of SciPy's solvers, for speed.
             _, weights, failed = dposv(J @ J.T, error)
             if failed:
                 break
@@ -125,11 +123,11 @@ class Arm:
 
 
 def girdle(posture: Array, rest: Array, *, follow: float) -> Array:
-    """Clavicle angles that go with where the upper arm points, (2,) rad.
+    """Return the clavicle angles for a direction of the upper arm, (2,) rad.
 
     ``protraction = rest + follow * sin(flexion)``,
     ``elevation = rest + follow * (1 - cos(abduction) cos(flexion))``:
-    both are at rest with a hanging arm and turned by `follow` with the arm forward.
+    both are at rest with a hanging arm, and `follow` more with the arm forward.
 
     Parameters
     ----------
@@ -148,7 +146,7 @@ def girdle(posture: Array, rest: Array, *, follow: float) -> Array:
 
 @dataclass(frozen=True)
 class SelfMotion:
-    """Postures of one arm that share a hand pose.
+    """Postures of one arm with the same hand pose.
 
     Parameters
     ----------
@@ -162,45 +160,44 @@ class SelfMotion:
     postures: Array
 
     def at(self, swivel: ArrayLike) -> Array:
-        """Postures with the elbow at these swivels (rad), (..., 9)."""
+        """Return the postures at elbow swivels (rad), (..., 9)."""
         return np.asarray(CubicSpline(self.swivel, self.postures)(swivel))
 
 
 def self_motion(
-    arm: Arm,
+    arm: ArmKinematics,
     angles: Array,
     *,
     lowest: float,
     highest: float,
     girdle_follow: float = 0.0,
 ) -> SelfMotion:
-    """Follow the self-motion from a posture both ways.
+    """Follow the self-motion from a posture in both directions.
 
     Each step goes along the null direction of the pose Jacobian and is then corrected
-    to the hand pose of the start. The walk ends before a joint comes near its limit.
+    to the hand pose of the start. It ends before a joint comes near its limit.
 
     Parameters
     ----------
-    arm : Arm
-        The arm.
+    arm : ArmKinematics
     angles : (18,) array
         Joint angles of the body at the start.
     lowest, highest : float
-        Swivels at which to stop, rad.
+        Swivels at which it ends, rad.
     girdle_follow : float
-        How the clavicle follows the upper arm meanwhile, see :func:`girdle`.
+        How far the clavicle follows the upper arm, see :func:`girdle`.
 
     Returns
     -------
     SelfMotion
-        Of at least the starting posture.
+        With at least the starting posture.
     """
     position, rotation = arm.hand(angles)
     start = angles[arm.columns]
     rest = start[:2] - girdle(start, np.zeros(2), follow=girdle_follow)
     swivels, postures = [arm.swivel(angles)], [start]
-    for way in (1.0, -1.0):
-        current, swivel = angles, swivels[0 if way < 0 else -1]
+    for sign in (1.0, -1.0):
+        current, swivel = angles, swivels[0 if sign < 0 else -1]
         ahead: Array | None = None
         while lowest < swivel < highest:
             null = np.append(
@@ -210,7 +207,7 @@ def self_motion(
             if ahead is None:
                 posture = current[arm.columns]
                 turned = arm.swivel(arm.put(current, posture + 1e-4 * null)) - swivel
-                ahead = null * np.sign(turned) * way
+                ahead = null * np.sign(turned) * sign
             ahead = null * np.sign(null @ ahead)
             posture = current[arm.columns] + _STRIDE * ahead
             posture[:2] = girdle(posture, rest, follow=girdle_follow)
@@ -218,9 +215,9 @@ def self_motion(
             before, swivel = swivel, arm.swivel(current)
             posture = current[arm.columns]
             stopped = np.minimum(posture - arm.lower, arm.upper - posture) < _MARGIN
-            if stopped[2:].any() or way * (swivel - before) < 0.1 * _STRIDE:
+            if stopped[2:].any() or sign * (swivel - before) < 0.1 * _STRIDE:
                 break
-            end = len(swivels) if way > 0 else 0
+            end = len(swivels) if sign > 0 else 0
             swivels.insert(end, swivel)
             postures.insert(end, posture)
     return SelfMotion(np.array(swivels), np.array(postures))

@@ -1,4 +1,4 @@
-"""What cameras and skin do to markers: noise, soft tissue, occlusion."""
+"""Artifacts of markers: soft tissue and occlusion."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ __all__ = ["SoftTissue", "occlusions"]
 
 Array = NDArray[np.float64]
 
-#: Shares of the variance: the cluster moves as one, each marker on its own with the
-#: posture, each marker slowly at random. Translations and rotations of the whole
+#: Shares of the variance: the cluster moves as one, each marker moves with the posture,
+#: each marker moves slowly at random. Translations and rotations of the whole
 #: cluster dominate (Andersen et al. 2012, Gait & Posture 35:606); the numbers are ours.
 _CLUSTER, _OWN, _RANDOM = 0.5, 0.25, 0.25
 #: Cut-off of the random part, Hz: slow slip and muscle contraction (assumption).
 _RANDOM_HZ = 0.3
-#: How far from the cluster's middle a marker sits when turning the cluster moves it as
-#: much as shifting it, m: the radius of an upper arm.
+#: Distance from the middle of the cluster at which rotation and translation of the
+#: cluster move a marker equally, m: the radius of an upper arm.
 _LEVER = 0.05
-#: Shortest, mean and longest time that a marker is hidden, s (assumption).
+#: Shortest, mean and longest duration of an occlusion, s (assumption).
 _BURST_S = (0.05, 0.12, 0.30)
 #: Share of occlusions that hide neighbors on the same segment too (assumption).
 _TOGETHER = 0.3
 
 
 class SoftTissue:
-    """Skin that moves over bone with the posture, in the frame of each segment.
+    """Soft tissue artifact: displacement of markers over bone with the posture.
 
     The displacement of a marker is linear in the angles of the joints at both ends of
     its segment, counted from a reference posture (a linear model explains about 95 % of
@@ -47,9 +47,9 @@ class SoftTissue:
         Root mean square length of the displacement over `angles`, on average over the
         markers of a segment, m; the same for every segment.
     reference : (18,) array
-        Joint angles at which the posture moves no skin.
+        Joint angles without displacement.
     angles : (T, 18) array
-        Joint angles over which `size` is meant.
+        Joint angles over which `size` is the root mean square.
     rng : numpy.random.Generator
         Source of randomness.
     """
@@ -102,17 +102,17 @@ class SoftTissue:
         return self.in_world(q, local)
 
     def with_posture(self, q: Array) -> Array:
-        """Return what the posture moves, in the segments' frames, (T, M, 3)."""
+        """Return the part due to posture, in the frames of the segments, (T, M, 3)."""
         return self._moved(self._gains, q[:, -len(self.reference) :])
 
     def at_random(self, n: int, *, rate: float, rng: np.random.Generator) -> Array:
-        """Return n samples of the random part, in the segments' frames, (n, M, 3)."""
+        """Return the random part, in the frames of the segments, (n, M, 3)."""
         m, sd = len(self.links), self.size * np.sqrt(_RANDOM / 3)
         slow = wander(rng, n, 3 * m, sd=sd, cutoff=_RANDOM_HZ, rate=rate)
         return slow.reshape(n, m, 3)
 
     def in_world(self, q: Array, local: Array) -> Array:
-        """Turn displacements in the segments' frames into the world, (T, M, 3)."""
+        """Rotate displacements from the frames of the segments to the world."""
         in_world = np.empty_like(local)
         root = Rotation.from_quat(q[:, 3:7]).as_matrix()
         for link in np.unique(self.links):
@@ -133,10 +133,10 @@ def occlusions(
     share: float,
     rate: float,
 ) -> NDArray[np.bool_]:
-    """Which markers the cameras do not see, in bursts, (n, M).
+    """Return which markers the cameras miss, in bursts, (n, M).
 
-    Bursts of geometrically distributed length start anywhere, until `share` of all
-    marker frames are hidden. Some hide a second and a third marker of the segment.
+    Bursts of geometrically distributed length start at random, until `share` of all
+    marker frames is hidden. Some hide one or two more markers of the same segment.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def occlusions(
     """
     if not 0 <= share <= 0.5:
         raise InvalidInput(
-            f"the share of occluded markers must be 0 to 0.5, not {share}."
+            f"expected a share of occluded markers from 0 to 0.5, found {share}."
         )
     hidden = np.zeros((n, len(links)), dtype=bool)
     shortest, mean, longest = (max(1, round(s * rate)) for s in _BURST_S)
@@ -173,7 +173,7 @@ def occlusions(
 
 
 def _joints_at(link: str) -> set[str]:
-    """Joints at both ends of a segment."""
+    """Return the joints at both ends of a segment."""
     if link == "thorax":
         return {j for s in SIDES for j in chain_joints(f"{s}_arm_clavicle")[:5]}
     side, segment = link.split("_", 1)

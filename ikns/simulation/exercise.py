@@ -1,4 +1,4 @@
-"""The exercises of the protocol as plans, one an arm and all of the same length."""
+"""The exercises of the protocol as plans, one per arm and of equal length."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.simulation.arm import Arm
+from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.movement import (
     SWIVEL_HZ,
-    Plan,
+    MovementPlan,
     explore,
     join,
     reach,
@@ -18,24 +18,24 @@ from ikns.simulation.movement import (
 )
 from ikns.simulation.places import Place, random_place
 
-__all__ = ["roam", "visit"]
+__all__ = ["explore_freely", "explore_points"]
 
 
-def roam(
-    arms: Sequence[Arm],
+def explore_freely(
+    arms: Sequence[ArmKinematics],
     angles: NDArray[np.float64],
     *,
     seconds: float,
     rate: float,
     girdle_rest: NDArray[np.float64],
     rng: np.random.Generator,
-) -> list[Plan]:
-    """Free exploration: reach from one random place to the next.
+) -> list[MovementPlan]:
+    """Plan free exploration: reaches from one random place to the next.
 
     Parameters
     ----------
-    arms : sequence of Arm
-        Those that move, each to places of its own.
+    arms : sequence of ArmKinematics
+        The moving arms, each with its own places.
     angles : (18,) array
         Joint angles of the rest of the body.
     seconds, rate : float
@@ -60,29 +60,29 @@ def roam(
     return [join(plans).first(n) for plans in zip(*reaches, strict=True)]
 
 
-def visit(
+def explore_points(
     places: Sequence[Sequence[Place]],
     *,
     seconds: float,
     rate: float,
     rng: np.random.Generator,
-) -> list[Plan]:
-    """Explore one place after the other, with reaches between.
+) -> list[MovementPlan]:
+    """Plan to explore one place after the other, with reaches in between.
 
-    Two elbows are told to move each in its own rhythm: one takes the slow third of the
-    frequencies, the other the fast third. Moved in step they would show one degree of
-    freedom, not two.
+    Two elbows move in different rhythms: one in the slow third of the frequencies, the
+    other in the fast third. Moving in step they would show one degree of freedom, not
+    two.
 
     Parameters
     ----------
     places : sequence of sequence of Place
-        For each arm its places, in order.
+        Places of each arm, in order.
     seconds, rate : float
-        Stay at each place, and samples per second.
+        Duration at each place, and samples per second.
     rng : numpy.random.Generator
         Source of randomness.
     """
-    parts: list[list[Plan]] = []
+    parts: list[list[MovementPlan]] = []
     low, high = SWIVEL_HZ
     third = (high - low) / 3
     bands = (
@@ -107,7 +107,7 @@ def visit(
 
 def _reach_together(
     starts: Sequence[Place], ends: Sequence[Place], rate: float
-) -> list[Plan]:
+) -> list[MovementPlan]:
     pairs = list(zip(starts, ends, strict=True))
     n = max(reach_samples(start, end, rate=rate) for start, end in pairs)
     return [reach(start, end, n=n) for start, end in pairs]

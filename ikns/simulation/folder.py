@@ -1,4 +1,4 @@
-"""A simulated protocol on disk: C3D files, and the truth beside them."""
+"""Writes a simulated protocol: C3D files, with the truth next to them."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ _FORMAT = 1
 def write_protocol(
     folder: str | Path, protocol: Protocol, *, force: bool = False
 ) -> list[Path]:
-    """Write ``static.c3d``, ``free.c3d``, ``points.c3d`` and what is true of them.
+    """Write ``static.c3d``, ``free.c3d`` and ``points.c3d`` with their truth.
 
-    Beside each recording lies ``<name>_truth.csv``: time (s), every joint angle (deg),
-    swivel of each exploring elbow (deg) and position of its hand in the thorax frame
-    (mm), and the point (-1 on the way). ``truth.json`` has the person, segment lengths
-    (m), places of the markers in their links (m), points (m) and all settings;
-    ``truth.urdf`` the body.
+    Each recording has a file ``<name>_truth.csv``: time (s), joint angles (deg), swivel
+    of each exploring elbow (deg) and position of its hand in the thorax frame (mm), and
+    the point (-1 during reaches). ``truth.json`` has the person, segment lengths (m),
+    positions of the markers in their links (m), points (m) and all settings;
+    ``truth.urdf`` is the body.
 
     Parameters
     ----------
     folder : str or Path
-        Made when missing.
+        Created if missing.
     protocol : Protocol
-        From :func:`simulate_protocol`.
+        From :func:`ikns.simulate_protocol`.
     force : bool
-        Whether to replace files that exist.
+        Whether to replace existing files.
 
     Returns
     -------
@@ -47,6 +47,16 @@ def write_protocol(
     ------
     FileError
         When a file exists and `force` is false, or the folder cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from ikns import read, simulate_protocol, virtual_subject, write_protocol
+    >>> run = simulate_protocol(virtual_subject(1), seed=1, n_points=1, quick=True)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     static, free, points = write_protocol(folder, run)
+    ...     len(read(static).labels), static.name, points.name
+    (24, 'static.c3d', 'points.c3d')
     """
     folder = Path(folder)
     recordings = [folder / f"{trial.name}.c3d" for trial in protocol.trials]
@@ -54,7 +64,7 @@ def write_protocol(
     body, summary = folder / "truth.urdf", folder / "truth.json"
     for path in (*recordings, *tables, body, summary):
         if path.exists() and not force:
-            raise FileError(f"{path}: the file exists already and was left as it is.")
+            raise FileError(f"{path}: the file exists already and was not replaced.")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for trial, recording, table in zip(

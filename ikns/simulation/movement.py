@@ -1,9 +1,8 @@
-"""What the arm does: reaches between places, and exploring the self-motion at one.
+"""Movements of an arm: reaches between places, and exploring the self-motion at one.
 
-A movement is first written as a plan: the postures that the arm would take, and the
-hand pose that the person means to have, sample by sample. Carrying it out adds what
-nobody means (drift of the held pose, tremor) and solves every sample by closed-loop
-inverse kinematics, changing the planned posture no more than the hand pose asks for.
+A movement is first a plan: the intended postures of the arm and poses of the hand, one
+per sample. Its execution adds drift of the hand and tremor, and solves each sample by
+closed-loop inverse kinematics that changes the planned posture as little as possible.
 """
 
 from __future__ import annotations
@@ -15,33 +14,35 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from ikns.simulation.arm import Arm
+from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.places import Place
 from ikns.simulation.wander import minimum_jerk, tremor, wander
 
 __all__ = [
     "SWIVEL_HZ",
-    "Plan",
+    "MovementPlan",
     "Unsteadiness",
-    "carry_out",
+    "execute_plan",
     "explore",
+    "hand_drift",
     "join",
     "reach",
     "reach_samples",
+    "reach_seconds",
 ]
 
 Array = NDArray[np.float64]
 
-#: Swivel frequency while exploring, Hz: a comfortable back and forth (assumption).
+#: Range of the swivel frequency in exploration, Hz: a comfortable pace (assumption).
 SWIVEL_HZ = (0.3, 0.6)
-#: Reaches take this long plus so much per meter, s (assumption: peak speeds of a
-#: minimum-jerk reach of 0.3 m are then 0.6 m/s, those of unhurried reaching).
+#: Duration of a reach, s, and of each further meter (assumption: the peak speed of a
+#: minimum-jerk reach of 0.3 m is then 0.6 m/s, that of unhurried reaching).
 _REACH_S, _REACH_S_PER_M = 0.6, 1.2
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What the person means to do with one arm.
+class MovementPlan:
+    """Intended movement of one arm.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ class Plan:
     rotation : (T, 3, 3) array
         Hand orientation in the thorax frame.
     point : (T,) integer array
-        Index of the place that is explored, -1 on the way.
+        Index of the place that is explored, -1 during reaches.
     """
 
     postures: Array
@@ -60,25 +61,25 @@ class Plan:
     rotation: Array
     point: NDArray[np.int64]
 
-    def first(self, n: int) -> Plan:
+    def first(self, n: int) -> MovementPlan:
         """Return the first `n` samples."""
-        return Plan(
+        return MovementPlan(
             self.postures[:n], self.position[:n], self.rotation[:n], self.point[:n]
         )
 
 
 @dataclass(frozen=True)
 class Unsteadiness:
-    """How far from steady the hand is when it is meant to be held.
+    """Involuntary movement of a hand that is meant to be still.
 
     Parameters
     ----------
     drift : float
-        Slow wandering of the hand, m, standard deviation per axis.
+        Slow drift of the hand, m, standard deviation per axis.
     tilt : float
-        Slow wandering of its orientation, rad, standard deviation per axis.
+        Slow drift of its orientation, rad, standard deviation per axis.
     drift_hz : float
-        Cut-off of both.
+        Cut-off frequency of both, Hz.
     tremor : float
         Tremor of the hand, m, standard deviation per axis. The mode of postural hand
         tremor is 0.01 g peak at 7 Hz, its range 0.0015 to 0.035 g (Wade, Gresty and
@@ -87,10 +88,10 @@ class Unsteadiness:
         Tremor of its orientation, rad, standard deviation per axis: the tremor of the
         knuckles seen from the wrist, 0.08 m away.
 
-    Drift and cut-off are assumptions: a hand that is meant to be still, without a
-    support, moves by about a centimeter within some seconds. The speed that follows,
-    8 mm/s per axis (standard deviation), stays below a gate of 0.05 m/s. The tilt is
-    what moves the tip of a hand of 0.19 m as much as the drift moves its knuckles.
+    Drift and cut-off are assumptions: an unsupported hand that is meant to be still
+    moves by about a centimeter within some seconds. The resulting speed, 8 mm/s per
+    axis (standard deviation), stays below a threshold of 0.05 m/s. The tilt moves the
+    tip of a hand of 0.19 m as much as the drift moves its knuckles.
     """
 
     drift: float = 4e-3
@@ -100,17 +101,22 @@ class Unsteadiness:
     tremor_tilt: float = np.radians(0.03)
 
 
+def reach_seconds(distance: float) -> float:
+    """Return the duration of an unhurried reach over a distance (m), s."""
+    return _REACH_S + _REACH_S_PER_M * distance
+
+
 def reach_samples(start: Place, end: Place, *, rate: float) -> int:
-    """How many samples an unhurried reach takes."""
+    """Return the number of samples of an unhurried reach."""
     distance = float(np.linalg.norm(end.position - start.position))
-    return max(2, round(rate * (_REACH_S + _REACH_S_PER_M * distance)))
+    return max(2, round(rate * reach_seconds(distance)))
 
 
-def reach(start: Place, end: Place, *, n: int) -> Plan:
-    """Minimum-jerk reach from place to place in `n` samples, straight in space."""
+def reach(start: Place, end: Place, *, n: int) -> MovementPlan:
+    """Plan a minimum-jerk reach along a straight line in `n` samples."""
     share = minimum_jerk(n)
     turn = Slerp([0.0, 1.0], Rotation.from_matrix([start.rotation, end.rotation]))
-    return Plan(
+    return MovementPlan(
         postures=start.posture + share[:, None] * (end.posture - start.posture),
         position=start.position + share[:, None] * (end.position - start.position),
         rotation=turn(share).as_matrix(),
@@ -126,24 +132,24 @@ def explore(
     rng: np.random.Generator,
     index: int,
     swivel_hz: tuple[float, float] = SWIVEL_HZ,
-) -> Plan:
-    """Hold the hand and swivel the elbow through the range that the place allows.
+) -> MovementPlan:
+    """Plan to hold the hand and swivel the elbow through its range at a place.
 
-    The swivel runs between the ends of the range like a sine of varying frequency and
-    amplitude (70 to 100 % of the range), from rest to rest in the comfortable posture.
+    The swivel is a sine with varying frequency and amplitude (70 to 100 % of the
+    range). It starts and ends at rest in the comfortable posture.
 
     Parameters
     ----------
     place : Place
-        With its self-motion; without one the arm just stays.
+        With its self-motion; without one the arm does not move.
     seconds, rate : float
-        How long, and samples per second.
+        Duration, and samples per second.
     rng : numpy.random.Generator
         Source of randomness.
     index : int
-        Which point this is.
+        Index of the point.
     swivel_hz : (float, float)
-        Between which frequencies to choose, Hz.
+        Range of the frequency, Hz.
     """
     n = max(2, round(seconds * rate))
     time = np.arange(n) / rate
@@ -153,19 +159,19 @@ def explore(
         low, high = place.motion.swivel[[0, -1]]
         hertz = rng.uniform(*swivel_hz)
         slow = wander(rng, n, 1, sd=0.1, cutoff=0.3, rate=rate)[:, 0]
-        pace = hertz * np.exp(slow)
-        phase = 2 * np.pi * (np.cumsum(pace) / rate + rng.integers(2) / 2)
-        beat = 2 * np.pi * (0.15 * time + rng.uniform())
-        amplitude = 0.85 + 0.15 * np.cos(beat)
+        frequency = hertz * np.exp(slow)
+        phase = 2 * np.pi * (np.cumsum(frequency) / rate + rng.integers(2) / 2)
+        modulation = 2 * np.pi * (0.15 * time + rng.uniform())
+        amplitude = 0.85 + 0.15 * np.cos(modulation)
         wave = (low + high) / 2 + (high - low) / 2 * amplitude * np.sin(phase)
-        # Half a second to get going and to come to rest.
+        # It takes half a second to start, and to come to rest.
         ramp = minimum_jerk(max(2, min(n // 2, round(0.5 * rate))))
         envelope = np.ones(n)
         envelope[: len(ramp)] = ramp
         envelope[-len(ramp) :] = ramp[::-1] if len(ramp) < n else 0.0
         swivel = place.swivel + envelope * (wave - place.swivel)
         postures = place.motion.at(swivel)
-    return Plan(
+    return MovementPlan(
         postures=postures,
         position=np.repeat(place.position[None], n, axis=0),
         rotation=np.repeat(place.rotation[None], n, axis=0),
@@ -173,9 +179,9 @@ def explore(
     )
 
 
-def join(plans: Sequence[Plan]) -> Plan:
-    """One plan after the other."""
-    return Plan(
+def join(plans: Sequence[MovementPlan]) -> MovementPlan:
+    """Join plans into one, in order."""
+    return MovementPlan(
         *(
             np.concatenate([getattr(plan, name) for plan in plans])
             for name in ("postures", "position", "rotation", "point")
@@ -183,27 +189,27 @@ def join(plans: Sequence[Plan]) -> Plan:
     )
 
 
-def carry_out(
-    arm: Arm,
+def execute_plan(
+    arm: ArmKinematics,
     angles: Array,
-    plan: Plan,
+    plan: MovementPlan,
     *,
     unsteadiness: Unsteadiness,
     rate: float,
     rng: np.random.Generator,
 ) -> Array:
-    """Joint angles of the body while the arm follows a plan.
+    """Return the joint angles of the body while the arm executes a plan.
 
     Parameters
     ----------
-    arm : Arm
+    arm : ArmKinematics
         The arm that moves.
     angles : (T, 18) array
         Joint angles of the body; those of the arm are replaced.
-    plan : Plan
-        What the person means to do.
+    plan : MovementPlan
+        Intended movement.
     unsteadiness : Unsteadiness
-        What the hand does besides.
+        Involuntary movement of the hand.
     rate : float
         Samples per second.
     rng : numpy.random.Generator
@@ -225,3 +231,27 @@ def carry_out(
         body = arm.put(angles[i], plan.postures[i])
         solved[i] = arm.to_pose(body, position[i], rotation[i])
     return solved
+
+
+def hand_drift(
+    n: int,
+    *,
+    rate: float,
+    seed: int | np.random.Generator,
+    unsteadiness: Unsteadiness,
+) -> Array:
+    """Return the deviation of a hand from its intended pose, m and rad, (n, 6).
+
+    Parameters
+    ----------
+    n : int
+        Samples.
+    rate : float
+        Samples per second.
+    seed : int or numpy.random.Generator
+    unsteadiness : Unsteadiness
+    """
+    rng, u = np.random.default_rng(seed), unsteadiness
+    size = np.repeat([[u.drift, u.tilt], [u.tremor, u.tremor_tilt]], 3, axis=1)
+    slow = wander(rng, n, 6, sd=1.0, cutoff=u.drift_hz, rate=rate)
+    return np.asarray(size[0] * slow + size[1] * tremor(rng, n, 6, sd=1.0, rate=rate))

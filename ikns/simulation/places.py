@@ -1,8 +1,8 @@
-"""Where the hand goes: comfortable postures, and the points of the calibration box.
+"""Places of the hand: comfortable postures, and the points of the calibration box.
 
-The box stands in front of the shoulder in the thorax frame (X forward, Y up, Z right)
-and grows with the arm. Its far corners leave the elbow bent by 60 deg or so and its
-near ones by 120 deg: the dexterous region, without its boundary.
+The box is in front of the shoulder in the thorax frame (X forward, Y up, Z right) and
+scales with the arm. The elbow is bent by about 60 deg at its far corners and 120 deg at
+its near ones: the dexterous region, without its boundary.
 """
 
 from __future__ import annotations
@@ -16,34 +16,40 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ikns.errors import InvalidInput
-from ikns.simulation.arm import Arm, SelfMotion, girdle, self_motion
+from ikns.simulation.arm import ArmKinematics, SelfMotion, girdle, self_motion
 
 __all__ = [
+    "FOREARM_TURNS",
+    "LEAST_RANGE",
     "Place",
     "box_points",
     "comfortable_posture",
     "explored_places",
     "random_place",
+    "wider",
 ]
 
 Array = NDArray[np.float64]
 
-#: Box for the hand, from the shoulder joint, in arm lengths (shoulder to knuckles):
+#: Corners of the box from the shoulder joint, in arm lengths (shoulder to knuckles):
 #: forward, up, and outwards. In a hundred subjects, on both arms, the elbow can swivel
 #: by 55 deg or more at every point.
 BOX_LOW = np.array([0.42, -0.42, -0.27])
 BOX_HIGH = np.array([0.70, 0.10, 0.27])
-#: "Near" the vertices of an imagined box: error per axis, m (assumption).
+#: The hand is placed "near" the vertices of a box: error per axis, m (assumption).
 _VERTEX_SD = 0.012
-#: Size of what two hands hold between them, and how far its middle goes sideways, m.
+#: Size of an object held between two hands, and sideways range of its middle, m.
 _OBJECT, _SIDEWAYS = 0.30, 0.20
-#: Swivel that people explore: from the elbow straight below the shoulder-wrist line to
-#: nearly level with it, rad (assumption; joint limits cut it further).
+#: Range of the swivel that people explore, rad: from the elbow below the shoulder-wrist
+#: line to nearly level with it (assumption; joint limits reduce it further).
 LOWEST, HIGHEST = np.radians(0.0), np.radians(80.0)
-#: Farthest that the elbow swivels to either side of its comfortable place, rad.
+#: Range of the largest swivel to either side of the comfortable one, rad.
 _FARTHEST = np.radians([30.0, 40.0])
-#: A place is no good when the elbow can swivel by less than this in all, rad.
-_LEAST = np.radians(40.0)
+#: Smallest total range of the swivel at a place, rad.
+LEAST_RANGE = np.radians(40.0)
+#: Turns of the forearm that are tried for a larger range, and the gain that is worth
+#: another turn, rad.
+FOREARM_TURNS, _WORTH_TURNING = np.radians([0.0, 25.0, -25.0]), np.radians(3.0)
 #: Clavicle angle with the upper arm forward, rad. Sternoclavicular elevation of 6 to
 #: 10 deg and a protraction of the same order go with raising the arm to the front
 #: (recalled from Ludewig et al. 2009, J Bone Joint Surg Am 91:378; rounded).
@@ -65,7 +71,7 @@ class Place:
     swivel : float
         Elbow swivel of the comfortable posture, rad.
     motion : SelfMotion or None
-        The postures that can be explored; None where nobody explores.
+        The postures that can be explored; None where the place is not explored.
     """
 
     posture: Array
@@ -74,9 +80,15 @@ class Place:
     swivel: float
     motion: SelfMotion | None = None
 
+    @property
+    def swivel_range(self) -> float:
+        """Range of the swivel, rad; 0 without a self-motion."""
+        swivel = None if self.motion is None else self.motion.swivel
+        return 0.0 if swivel is None else float(swivel[-1] - swivel[0])
+
 
 def comfortable_posture(
-    arm: Arm,
+    arm: ArmKinematics,
     angles: Array,
     position: Array,
     *,
@@ -84,14 +96,13 @@ def comfortable_posture(
     wrist: Array,
     girdle_rest: Array,
 ) -> Array:
-    """Posture with the hand at a position, the elbow at a swivel, and a given wrist.
+    """Return the posture for a hand position, an elbow swivel and a wrist posture.
 
     Parameters
     ----------
-    arm : Arm
-        The arm.
+    arm : ArmKinematics
     angles : (18,) array
-        The rest of the body.
+        Joint angles of the rest of the body.
     position : (3,) array
         Hand in the thorax frame, m.
     swivel : float
@@ -134,9 +145,9 @@ def comfortable_posture(
 
 
 def random_place(
-    arm: Arm, angles: Array, *, rng: np.random.Generator, girdle_rest: Array
+    arm: ArmKinematics, angles: Array, *, rng: np.random.Generator, girdle_rest: Array
 ) -> Place:
-    """Return a place somewhere in the box, in any comfortable posture."""
+    """Return a random place in the box, in a random comfortable posture."""
     position = _from_box(arm, angles, rng.uniform(BOX_LOW, BOX_HIGH))
     posture = comfortable_posture(
         arm,
@@ -150,18 +161,18 @@ def random_place(
 
 
 def box_points(
-    arms: Sequence[Arm], angles: Array, *, n: int, rng: np.random.Generator
+    arms: Sequence[ArmKinematics], angles: Array, *, n: int, rng: np.random.Generator
 ) -> list[Array]:
-    """Where each hand goes at the points of the protocol, one (n, 3) array an arm, m.
+    """Return the positions of each hand at the points of the protocol, (n, 3) m.
 
-    Near the vertices of the box, then near the centers of its upper and lower face; the
-    upper points come first. Fewer than 10 are the first ones. Two hands hold an object
-    between them, and the box is that of its middle.
+    They are near the vertices of the box, the upper ones first, then near the centers
+    of its upper and lower face; fewer than 10 are the first ones. Two hands hold an
+    object between them, whose middle is near the points.
     """
     corners = itertools.product((1, 0), ((1, 0), (1, 1), (0, 1), (0, 0)))
     shares = [(x, y, z) for y, (x, z) in corners] + [(0.5, 1, 0.5), (0.5, 0, 0.5)]
     if not 1 <= n <= len(shares):
-        raise InvalidInput(f"n_points must be 1 to {len(shares)}, not {n}.")
+        raise InvalidInput(f"expected n_points from 1 to {len(shares)}, found {n}.")
     share = np.array(shares[:n], dtype=np.float64)
     goals = BOX_LOW + share * (BOX_HIGH - BOX_LOW)
     near = rng.normal(0.0, _VERTEX_SD, (n, 3))
@@ -175,7 +186,7 @@ def box_points(
 
 
 def explored_places(
-    arm: Arm,
+    arm: ArmKinematics,
     angles: Array,
     positions: Array,
     *,
@@ -183,16 +194,15 @@ def explored_places(
     girdle_rest: Array,
     girdle_follow: float,
 ) -> list[Place]:
-    """Return places to explore at these hand positions, each with its self-motion.
+    """Return places to explore at hand positions, each with its self-motion.
 
-    The forearm's pronation is the one, of a few, that leaves the elbow most room.
+    Of a few pronations of the forearm, the one with the largest swivel range is taken.
 
     Parameters
     ----------
-    arm : Arm
-        The arm.
+    arm : ArmKinematics
     angles : (18,) array
-        The rest of the body.
+        Joint angles of the rest of the body.
     positions : (n, 3) array
         Hand in the thorax frame, m.
     rng : numpy.random.Generator
@@ -203,7 +213,7 @@ def explored_places(
     Raises
     ------
     InvalidInput
-        When a position is out of reach, or leaves the elbow no room.
+        When a position is out of reach, or the swivel range is too small.
     """
     comfortable = rng.normal(np.radians(38.0), np.radians(4.0))
     places = []
@@ -212,8 +222,8 @@ def explored_places(
         farthest = rng.uniform(*_FARTHEST)
         habit = rng.normal(0.0, np.radians([8, 4, 3]))
         best: Place | None = None
-        for turn in np.radians([0.0, 25.0, -25.0]):
-            if best is not None and _room(best.motion) > 0.9 * 2 * farthest:
+        for turn in FOREARM_TURNS:
+            if best is not None and best.swivel_range > 0.9 * 2 * farthest:
                 break
             posture = comfortable_posture(
                 arm,
@@ -230,9 +240,8 @@ def explored_places(
                 highest=min(HIGHEST, swivel + farthest),
                 girdle_follow=girdle_follow,
             )
-            if best is None or _room(motion) > _room(best.motion) + np.radians(3.0):
-                best = _place(arm, angles, posture, motion)
-        if best is None or _room(best.motion) < _LEAST:
+            best = wider(best, _place(arm, angles, posture, motion))
+        if best is None or best.swivel_range < LEAST_RANGE:
             raise InvalidInput(
                 f"the elbow has no room to swivel with the {arm.side} hand at "
                 f"{np.round(position, 3)} m in the thorax frame; draw another subject."
@@ -241,19 +250,22 @@ def explored_places(
     return places
 
 
+def wider(best: Place | None, other: Place) -> Place:
+    """Return the other place if its swivel range is clearly larger, else the best."""
+    if best is None or other.swivel_range > best.swivel_range + _WORTH_TURNING:
+        return other
+    return best
+
+
 def _place(
-    arm: Arm, angles: Array, posture: Array, motion: SelfMotion | None = None
+    arm: ArmKinematics, angles: Array, posture: Array, motion: SelfMotion | None = None
 ) -> Place:
     body = arm.put(angles, posture)
     return Place(posture, *arm.hand(body), arm.swivel(body), motion)
 
 
-def _room(motion: SelfMotion | None) -> float:
-    return 0.0 if motion is None else float(motion.swivel[-1] - motion.swivel[0])
-
-
-def _from_box(arm: Arm, angles: Array, share: Array) -> Array:
-    """Positions in the thorax frame of places in arm lengths from the shoulder."""
+def _from_box(arm: ArmKinematics, angles: Array, share: Array) -> Array:
+    """Convert positions from arm lengths off the shoulder to the thorax frame, m."""
     lengths = arm.skeleton.segment_lengths
     reach = sum(lengths[f"{arm.side}_{s}"] for s in ("upper_arm", "forearm", "hand"))
     return arm.shoulder(angles) + reach * share * np.array([1.0, 1.0, arm.outward])

@@ -1,8 +1,8 @@
-"""The calibration protocol of the paper, carried out by a virtual subject.
+"""The calibration protocol of the paper with a virtual subject.
 
-Five seconds standing still; then seated, one minute of free exploration; then the hand
-at ten points of a box, five seconds each, with the elbow moving freely while the hand
-is held, and reaches in between. All of it is simulated and says so.
+Five seconds standing still; then seated, one minute of free exploration; then ten
+points of a box, five seconds each, with the hand held and the elbow moving freely, and
+reaches in between. Everything is simulated, and labeled so.
 """
 
 from __future__ import annotations
@@ -13,55 +13,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.body.chains import SIDES
-from ikns.body.skeleton import Skeleton
-from ikns.simulation.arm import Arm
+from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.artifacts import SoftTissue
-from ikns.simulation.exercise import roam, visit
-from ikns.simulation.movement import Plan, Unsteadiness, carry_out
-from ikns.simulation.places import GIRDLE_FOLLOW, box_points, explored_places
+from ikns.simulation.exercise import explore_freely, explore_points
+from ikns.simulation.movement import Unsteadiness
+from ikns.simulation.places import GIRDLE_FOLLOW
+from ikns.simulation.protocol_body import draw_protocol_body
 from ikns.simulation.subject import VirtualSubject
-from ikns.simulation.trial import Trial, film, place_in_room
-from ikns.simulation.wander import wander
+from ikns.simulation.trial import Trial, record_trial
 
 __all__ = ["Protocol", "simulate_protocol"]
 
 Array = NDArray[np.float64]
 
-#: Height of the jugular notch over the floor, share of stature, standing and on a chair
-#: (assumptions; no result depends on them).
-_STANDING, _SEATED = 0.81, 0.60
-#: Sway of the trunk, m and rad per axis: seated it is small, as the protocol asks not
-#: to move the torso (assumptions).
-_SWAY_SEATED, _SWAY_STANDING = (2e-3, np.radians(0.3)), (5e-3, np.radians(0.5))
-#: Slow wandering of joints that are meant to be still, rad (assumption).
-_STILL = np.radians(0.3)
-#: Arms a little off the body and a little bent, for the static trial; hand in the lap.
-#: In the order of the chain ``*_arm_clavicle``, rad.
-_STATIC = np.radians([0.0, 0.0, 17.0, 8.0, 0.0, 20.0, 0.0, 0.0, 0.0])
-_RESTING = np.radians([0.0, 0.0, 8.0, 22.0, -25.0, 75.0, 20.0, 0.0, 0.0])
-#: How the static posture differs from person to person, rad (assumption).
-_STATIC_SD = np.radians(2.0)
-
 
 @dataclass(frozen=True)
 class Protocol:
-    """All trials of a virtual subject.
+    """The trials of a virtual subject.
 
     Parameters
     ----------
     subject : VirtualSubject
-        Who.
     side : {"right", "left", "both"}
-        What explored.
+        The exploring arm.
     static, free, points : Trial
         Standing still; free exploration; the points with the reaches between them.
     places : (P, 3) array
-        Where the hand, or the middle of both, was meant to be at each point, thorax
-        frame, m.
+        Intended position of the hand, or of the middle between both hands, at each
+        point, thorax frame, m.
     settings : dict
-        Every setting, for the record.
+        All settings of the simulation.
     skin : SoftTissue, optional
-        How this person's skin moves, where it does.
+        Soft tissue of this person, if it moves.
     """
 
     subject: VirtualSubject
@@ -96,22 +79,22 @@ def simulate_protocol(
     rate: float = 100.0,
     quick: bool = False,
 ) -> Protocol:
-    """Let a virtual subject go through the protocol.
+    """Simulate the calibration protocol with a virtual subject.
 
     Parameters
     ----------
     subject : VirtualSubject
         From :func:`virtual_subject`.
     seed : int
-        Same seed and settings, same recordings. The motion does not depend on the
-        settings of markers, so two kinds of artifacts can be compared on one motion.
+        The same seed and settings give the same recordings. The motion does not depend
+        on the settings of markers, so artifacts can be compared on one motion.
     side : {"right", "left", "both"}
         The arm that explores while the other rests; or both, as if holding an object
         between the hands, each elbow with a rhythm of its own.
     n_points : int
         Points of the box, at most 10.
     static_seconds, free_seconds, point_seconds : float
-        Length of the static trial, of the free exploration, of the stay at each point.
+        Duration of the static trial, of free exploration, and at each point.
     marker_noise : float
         Camera noise, m, standard deviation per axis.
     soft_tissue : float
@@ -119,10 +102,10 @@ def simulate_protocol(
     occluded : float
         Share of marker frames that the cameras miss.
     unsteadiness : Unsteadiness, optional
-        How still the hand is held.
+        How steadily the hand is held.
     girdle_rhythm : float
-        How much of its way the clavicle follows the upper arm while the hand is held:
-        0 keeps it still at each point, 1 moves it as between points.
+        How far the clavicle follows the upper arm while the hand is held: 0 keeps it
+        still at each point, 1 moves it as much as between points.
     rate : float
         Frames per second.
     quick : bool
@@ -139,10 +122,10 @@ def simulate_protocol(
 
     Examples
     --------
-    >>> from ikns.simulation.subject import virtual_subject
+    >>> from ikns import simulate_protocol, virtual_subject
     >>> run = simulate_protocol(virtual_subject(1), seed=1, n_points=1, quick=True)
-    >>> run.points.recording.rate.__round__(), run.points.recording.source
-    (100, 'simulated points trial')
+    >>> run.points.recording.source, len(run.static.recording.labels)
+    ('simulated points trial', 24)
     """
     if quick:
         free_seconds, point_seconds = min(free_seconds, 5.0), min(point_seconds, 3.0)
@@ -162,88 +145,51 @@ def simulate_protocol(
         "rate": rate,
     }
     sides = SIDES if side == "both" else (side,)
-    arms = [Arm(subject.skeleton, name) for name in sides]
+    arms = [ArmKinematics(subject.skeleton, name) for name in sides]
     # A stream for each use, so that changing one thing leaves the others as they are.
     of_person, of_static, of_free, of_points, of_skin, of_cameras = (
         np.random.default_rng(seed).spawn(6)
     )
-    girdle_rest = of_person.normal(0.0, np.radians([3.0, 2.0]))
-    heading = of_person.uniform(-np.pi, np.pi)
-    sitting = _pose(subject.skeleton, _RESTING)
-    standing = _pose(subject.skeleton, _STATIC)
-    standing += of_person.normal(0.0, _STATIC_SD, len(standing))
-    for arm in arms:
-        standing[arm.columns[:2]] = girdle_rest
-    positions = box_points(arms, sitting, n=n_points, rng=of_person)
-    places = [
-        explored_places(
-            arm,
-            sitting,
-            position,
-            rng=of_person,
-            girdle_rest=girdle_rest,
-            girdle_follow=girdle_rhythm * GIRDLE_FOLLOW,
-        )
-        for arm, position in zip(arms, positions, strict=True)
-    ]
-
-    def seated(plans: list[Plan], rng: np.random.Generator) -> Array:
-        angles = _still(sitting, len(plans[0].point), rate, rng)
-        for arm, plan in zip(arms, plans, strict=True):
-            angles = carry_out(
-                arm, angles, plan, unsteadiness=unsteadiness, rate=rate, rng=rng
-            )
-        return place_in_room(
-            angles,
-            height=_SEATED * subject.adult.stature_m,
-            heading=heading,
-            sway=_SWAY_SEATED,
-            rate=rate,
-            rng=rng,
-        )
-
-    n_static = max(2, round(static_seconds * rate))
-    free = roam(
+    person = draw_protocol_body(
+        subject,
         arms,
-        sitting,
+        n_points=n_points,
+        girdle_follow=girdle_rhythm * GIRDLE_FOLLOW,
+        rng=of_person,
+    )
+    free = explore_freely(
+        arms,
+        person.sitting,
         seconds=free_seconds,
         rate=rate,
-        girdle_rest=girdle_rest,
+        girdle_rest=person.girdle_rest,
         rng=of_free,
     )
-    points = visit(places, seconds=point_seconds, rate=rate, rng=of_points)
+    points = explore_points(
+        person.places, seconds=point_seconds, rate=rate, rng=of_points
+    )
+    n_static = max(2, round(static_seconds * rate))
     q = {
-        "static": place_in_room(
-            _still(standing, n_static, rate, of_static),
-            height=_STANDING * subject.adult.stature_m,
-            heading=heading,
-            sway=_SWAY_STANDING,
-            rate=rate,
-            rng=of_static,
-        ),
-        "free": seated(free, of_free),
-        "points": seated(points, of_points),
+        "static": person.standing_still(n_static, rate, of_static),
+        "free": person.seated(free, unsteadiness, rate, of_free),
+        "points": person.seated(points, unsteadiness, rate, of_points),
     }
-    point = {
-        "static": np.full(n_static, -1),
-        "free": free[0].point,
-        "points": points[0].point,
-    }
-    skin = None
+    point = {"free": free[0].point, "points": points[0].point}
+    skin, n_joints = None, len(person.standing)
     if soft_tissue > 0:
         skin = SoftTissue(
             subject.skeleton,
             soft_tissue,
-            reference=q["static"][:, -len(standing) :].mean(axis=0),
-            angles=q["points"][:, -len(standing) :],
+            reference=q["static"][:, -n_joints:].mean(axis=0),
+            angles=q["points"][:, -n_joints:],
             rng=of_skin,
         )
     trials = {
-        name: film(
+        name: record_trial(
             arms,
             q[name],
             name=name,
-            point=point[name],
+            point=point.get(name, np.full(n_static, -1)),
             with_static_only=name == "static",
             noise=marker_noise,
             skin=skin,
@@ -256,21 +202,8 @@ def simulate_protocol(
     return Protocol(
         subject=subject,
         side=side,
-        places=np.mean(positions, axis=0),
+        places=np.mean(person.positions, axis=0),
         settings=settings,
         skin=skin,
         **trials,
     )
-
-
-def _pose(skeleton: Skeleton, posture: Array) -> Array:
-    """Joint angles with both arms in the same posture, (18,)."""
-    angles = np.zeros(len(skeleton.joint_names))
-    for side in SIDES:
-        angles = Arm(skeleton, side).put(angles, posture)
-    return angles
-
-
-def _still(angles: Array, n: int, rate: float, rng: np.random.Generator) -> Array:
-    """Joints that are meant to be still, (n, 18)."""
-    return angles + wander(rng, n, len(angles), sd=_STILL, cutoff=0.3, rate=rate)

@@ -1,4 +1,4 @@
-"""A robot that explores its null space, as a person does at a PCA point: simulated."""
+"""A simulated robot that explores its null space, as a person does at a PCA point."""
 
 from __future__ import annotations
 
@@ -14,14 +14,13 @@ __all__ = ["explore_null_space", "reach_pose"]
 
 Array = NDArray[np.float64]
 
-#: Pose error at which Newton stops, m and rad: far above rounding, far below what
-#: anybody measures.
+#: Pose error at which Newton's method stops, m and rad: far above rounding, far below
+#: what can be measured.
 _TOLERANCE = 1e-10
-#: A step of the joints is this share of the way to where they are drawn: what is drawn
-#: wanders slowly, so the lag of some samples does no harm, and a start away from it
-#: makes no jump.
+#: Share of the distance to the attracting posture that the joints cover per sample. The
+#: posture drifts slowly, so the lag does no harm, and a distant start makes no jump.
 _FOLLOW = 0.1
-#: A Newton step moves no joint further than this, rad, and there are so many at most.
+#: Largest change of a joint in a Newton step, rad, and largest number of steps.
 _LONGEST_STEP, _ITERATIONS = 0.3, 100
 
 
@@ -36,23 +35,22 @@ def explore_null_space(
     task: str = "pose",
     seed: int | np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Move the joints at random while the frame stays where it is.
+    """Move the joints at random while the frame is held.
 
-    The joints are drawn to a posture that wanders about `q`. Only the part of that pull
-    that lies in the null space of the Jacobian is followed, and Newton's method then
-    puts the frame back exactly.
+    An attracting posture drifts about `q`. The joints follow it in the null space of
+    the Jacobian only, and Newton's method then restores the frame exactly.
 
     Parameters
     ----------
     robot : Robot
     q : (n,) array
-        Where to start, rad.
+        Initial posture, rad.
     seconds, rate : float
-        How long, and samples per second.
+        Duration, and samples per second.
     spread : float
-        Standard deviation of what the joints are drawn to, rad a joint.
+        Standard deviation of the attracting posture, rad per joint.
     cutoff : float
-        How fast that wanders, Hz.
+        Cut-off frequency of its drift, Hz.
     task : {"pose", "position"}
         What is held.
     seed : int or numpy.random.Generator
@@ -67,7 +65,7 @@ def explore_null_space(
     Raises
     ------
     InvalidInput
-        When `q` is not a posture within the limits, or nothing is free to move there.
+        When `q` is not a posture within the limits, or has no null space.
     """
     start = np.array(q, dtype=np.float64)
     n = len(robot.joint_names)
@@ -87,12 +85,12 @@ def explore_null_space(
     target = robot.pose(start)
     samples = max(2, round(seconds * rate))
     rng = np.random.default_rng(seed)
-    drawn = start + wander(rng, samples, n, sd=spread, cutoff=cutoff, rate=rate)
+    attractor = start + wander(rng, samples, n, sd=spread, cutoff=cutoff, rate=rate)
     visited = np.empty((samples, n))
     current = start
     for i in range(samples):
         basis = robot.null_spaces(current, task=task)[0]
-        step = _FOLLOW * basis.T @ (basis @ (drawn[i] - current))
+        step = _FOLLOW * basis.T @ (basis @ (attractor[i] - current))
         moved = reach_pose(robot, current + step, *target, task=task)
         if ((moved >= robot.lower) & (moved <= robot.upper)).all():
             current = moved
@@ -108,20 +106,20 @@ def reach_pose(
     *,
     task: str = "pose",
 ) -> Array:
-    """Posture near `q` that puts the frame at a pose, by Newton's method.
+    """Return a posture near `q` that puts the frame at a pose, by Newton's method.
 
-    Each step is the shortest that the Jacobian allows, so the null space is left alone.
-    Limits are not looked at.
+    Steps have minimum norm, so they do not move in the null space. Joint limits are
+    ignored.
 
     Parameters
     ----------
     robot : Robot
     q : (n,) array
-        Where to start, rad.
+        Initial posture, rad.
     position : (3,) array
-        Seen from the base, m.
+        In the base frame, m.
     rotation : (3, 3) array
-        Not looked at for the task ``"position"``.
+        Ignored for the task ``"position"``.
     task : {"pose", "position"}
 
     Returns
@@ -131,7 +129,7 @@ def reach_pose(
     Raises
     ------
     InvalidInput
-        When the pose is out of reach from there.
+        When the pose cannot be reached from `q`.
     """
     joints, place = np.array(q, dtype=np.float64), np.array(position, dtype=np.float64)
     for _ in range(_ITERATIONS):

@@ -1,4 +1,4 @@
-"""A virtual subject: a simulated person whose bones and markers are known exactly."""
+"""A virtual subject: a simulated person with exactly known bones and markers."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from ikns.body.skeleton import Skeleton
 
 __all__ = ["VirtualSubject", "virtual_subject"]
 
-#: Spread of thorax size among people of one stature (our estimate).
+#: Spread of thorax size between people of one stature, relative (our estimate).
 _THORAX_SD = 0.04
-#: Left against right segment in one person (our estimate).
+#: Spread of a segment's length between the sides of one person, relative (our
+#: estimate).
 _SIDE_SD = 0.01
-#: A marker whose site people meet less exactly than this is technical: it sits on soft
-#: tissue somewhere along the segment, and is not palpated.
+#: A marker with a larger spread of placement, m, is technical: it sits on soft tissue
+#: somewhere along the segment, not on a palpated landmark.
 _TECHNICAL = 0.012
 
 
@@ -29,13 +30,13 @@ class VirtualSubject:
     Parameters
     ----------
     skeleton : Skeleton
-        The true body, wearing the true markers, the static-only ones included.
+        The true body with the true markers, static-only ones included.
     adult : Adult
         Sex, stature, mass and lengths as drawn from the population.
     marker_set : str
         Name of the marker set.
     seed : int
-        What it was drawn from.
+        Seed that the person was drawn from.
     """
 
     skeleton: Skeleton
@@ -52,24 +53,25 @@ def virtual_subject(
     palpation_sd: float = 2e-3,
     technical_sd: float = 10e-3,
 ) -> VirtualSubject:
-    """Draw a simulated adult with markers on.
+    """Draw a simulated adult who wears markers.
 
-    Segment lengths are those of a sampled adult (ANSUR II), thorax and side differences
-    added. Each marker sits off its nominal place by a normal error per axis.
+    Segment lengths are those of a sampled adult (ANSUR II), with random differences of
+    the thorax and between the sides. Each marker is displaced from its nominal position
+    by a normal error per axis.
 
     Parameters
     ----------
     seed : int
-        Same seed, same person.
+        The same seed gives the same person.
     marker_set : str or path
-        What the person wears.
+        Name or file of the marker set.
     sex : {"female", "male"}, optional
         Default: either.
     palpation_sd : float
-        Placement error on bony landmarks, m per axis. 2 mm is an assumption: a trained
-        examiner on landmarks right under the skin. Where tissue is thick, spreads of 15
-        to 20 mm are published (trochanter; review by Della Croce et al. 2005, Gait &
-        Posture 21:226).
+        Placement error on bony landmarks, m per axis. 2 mm is an assumption, for a
+        trained examiner and landmarks right under the skin. Under thick tissue, spreads
+        of 15 to 20 mm are published (trochanter; review by Della Croce et al. 2005,
+        Gait & Posture 21:226).
     technical_sd : float
         Placement error of technical markers, m per axis (assumption).
 
@@ -79,6 +81,7 @@ def virtual_subject(
 
     Examples
     --------
+    >>> from ikns import virtual_subject
     >>> person = virtual_subject(3)
     >>> 0.2 < person.skeleton.segment_lengths["right_upper_arm"] < 0.35
     True

@@ -1,4 +1,4 @@
-"""One simulated recording: the body's truth, and what cameras make of it."""
+"""One simulated recording: the true motion, and the markers that cameras record."""
 
 from __future__ import annotations
 
@@ -14,16 +14,28 @@ from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.motion.motion import Motion
 from ikns.recording.recording import Recording
-from ikns.simulation.arm import Arm
+from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.wander import wander
 
-__all__ = ["Trial", "film", "place_in_room", "true_motion"]
+__all__ = [
+    "SEATED_SWAY",
+    "Trial",
+    "place_in_room",
+    "record_trial",
+    "still_joints",
+    "true_motion",
+]
 
 Array = NDArray[np.float64]
 
-#: Cut-off of the trunk's sway, Hz (quiet sitting and standing sway mostly below it).
+#: Sway of the trunk on a chair, m and rad, standard deviations per axis: small, as the
+#: protocol asks not to move the torso (assumption).
+SEATED_SWAY = (2e-3, np.radians(0.3))
+#: Cut-off of the trunk's sway, Hz: sway in quiet sitting and standing is mostly slower.
 _SWAY_HZ = 0.3
+#: Drift of joints that are meant to be still, rad, and its cut-off, Hz (assumption).
+_STILL_SD, _STILL_HZ = np.radians(0.3), 0.3
 
 
 @dataclass(frozen=True)
@@ -35,11 +47,11 @@ class Trial:
     name : str
         "static", "free" or "points".
     recording : Recording
-        What the cameras saw.
+        Markers as the cameras record them.
     truth : Motion
-        What the body did, on the same frames.
+        True motion of the body, in the same frames.
     swivel : (T,) or (T, 2) array
-        True elbow swivel of the arm that explores, or of both (right, left), rad.
+        True elbow swivel of the exploring arm, or of both (right, left), rad.
     point : (T,) integer array
         Index of the point at which the hand is held, -1 elsewhere.
     """
@@ -60,7 +72,7 @@ def place_in_room(
     rate: float,
     rng: np.random.Generator,
 ) -> Array:
-    """Put a body into a room with Z up, its trunk swaying, (T, 25).
+    """Place a body in a room with Z up, with a swaying trunk, (T, 25).
 
     Parameters
     ----------
@@ -82,14 +94,34 @@ def place_in_room(
     turned = wander(rng, n, 3, sd=sway[1], cutoff=_SWAY_HZ, rate=rate)
     shifted = wander(rng, n, 3, sd=sway[0], cutoff=_SWAY_HZ, rate=rate)
     quaternion = (upright * Rotation.from_rotvec(turned)).as_quat()
-    # q and -q are one rotation; without jumps, differences stay small.
+    # q and -q are the same rotation; the signs are chosen so that q does not jump.
     flips = np.cumprod(np.sign(np.sum(quaternion[1:] * quaternion[:-1], axis=1)))
     quaternion[1:] *= flips[:, None]
     return np.hstack([shifted + [0.0, 0.0, height], quaternion, angles])
 
 
+def still_joints(
+    angles: Array, n: int, *, rate: float, rng: np.random.Generator
+) -> Array:
+    """Return n samples of joints that are meant to be still, (n, 18) rad.
+
+    Parameters
+    ----------
+    angles : (18,) array
+        Mean joint angles.
+    n : int
+        Samples.
+    rate : float
+        Samples per second.
+    rng : numpy.random.Generator
+        Source of randomness.
+    """
+    drift = wander(rng, n, len(angles), sd=_STILL_SD, cutoff=_STILL_HZ, rate=rate)
+    return angles + drift
+
+
 def true_motion(skeleton: Skeleton, time: Array, q: Array) -> Motion:
-    """Write the truth as a motion; velocities are central differences."""
+    """Return the truth as a motion; velocities are central differences."""
     position, rotation = skeleton.hands_in_thorax(q)
     steps = np.stack([skeleton.difference(*pair) for pair in pairwise(q)])
     path = np.vstack([np.zeros(skeleton.nv), np.cumsum(steps, axis=0)])
@@ -108,8 +140,8 @@ def true_motion(skeleton: Skeleton, time: Array, q: Array) -> Motion:
     )
 
 
-def film(
-    arms: Sequence[Arm],
+def record_trial(
+    arms: Sequence[ArmKinematics],
     q: Array,
     *,
     name: str,
@@ -121,12 +153,12 @@ def film(
     rate: float,
     rng: np.random.Generator,
 ) -> Trial:
-    """Record a body with cameras.
+    """Record a body with simulated cameras.
 
     Parameters
     ----------
-    arms : sequence of Arm
-        Those that explore, and the person they belong to.
+    arms : sequence of ArmKinematics
+        The exploring arms, with the skeleton of the person.
     q : (T, 25) array
         Configurations.
     name : str
@@ -134,13 +166,13 @@ def film(
     point : (T,) integer array
         See :class:`Trial`.
     with_static_only : bool
-        Whether the person wears the static-only markers in this trial.
+        Whether static-only markers are worn in this trial.
     noise : float
         Camera noise, m, standard deviation per axis.
     skin : SoftTissue or None
-        How skin moves the markers over the bones.
+        Displacement of the markers over the bones.
     occluded : float
-        Share of marker frames not seen.
+        Share of marker frames that the cameras miss.
     rate : float
         Frames per second.
     rng : numpy.random.Generator

@@ -1,4 +1,4 @@
-"""Smooth random processes: what a body does without meaning to."""
+"""Smooth random processes for involuntary movement: drift and tremor."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def wander(
 ) -> Array:
     """Slow drift around zero: Gaussian noise through a second-order low-pass.
 
-    Its velocity has a standard deviation of ``2 pi cutoff sd`` (the second moment of
-    the Butterworth spectrum of order two is the square of its cut-off).
+    Its velocity has a standard deviation of ``2 pi cutoff sd``: the second moment of
+    the Butterworth spectrum of order two is the square of its cut-off.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def tremor(
 
 
 def minimum_jerk(n: int) -> Array:
-    """Way from 0 to 1 with the least jerk (Flash and Hogan 1985), (n,).
+    """Return the minimum-jerk path from 0 to 1 (Flash and Hogan 1985), (n,).
 
     ``10 s^3 - 15 s^4 + 6 s^5``, s from one sample after the start to the end.
     """

@@ -1,4 +1,4 @@
-"""Picks of virtual participants, with contact physics: simulated."""
+"""Simulated picks of virtual participants, with contact physics."""
 
 from __future__ import annotations
 
@@ -16,34 +16,31 @@ from ikns.experiments.picking.schedule import PickStep
 from ikns.live.control.settings import ControlSettings
 from ikns.simulation.grasp import (
     CarriedArm,
-    Elbow,
+    ElbowInput,
     Grasp,
     Person,
-    Picked,
-    Ring,
+    PickResult,
+    RingInput,
     Route,
     Solid,
     arch_length,
     draw_habits,
     grip_height,
-    hand_drift,
     hand_route,
     pick,
 )
-from ikns.simulation.grasp.route import BEYOND, DOWN, LIFT
-from ikns.simulation.movement import Unsteadiness
+from ikns.simulation.grasp.route import DOWN, EXTRA_RANGE, LIFT
+from ikns.simulation.movement import Unsteadiness, hand_drift, reach_seconds
 from ikns.simulation.operator import Operator, Participant
 
 __all__ = ["VIRTUAL_CONDITIONS", "virtual_pick", "virtual_pick_step"]
 
 Array = NDArray[np.float64]
 
-#: What a virtual participant can drive the finger with.
+#: Conditions that a virtual participant can do.
 VIRTUAL_CONDITIONS = ("ikns", "ring")
-#: An unhurried reach: so long plus so much per meter, s (the simulated calibration's).
-_REACH_S, _REACH_S_PER_M = 0.6, 1.2
-#: Height of the table under the hand at the lowest grip, m: the usual way of the hand.
-_USUAL = 0.045
+#: Height of the lowest grip above the table, m; higher grips raise the route.
+_LOWEST_GRIP = 0.045
 
 
 def virtual_pick_step(
@@ -55,9 +52,10 @@ def virtual_pick_step(
     latency: float = 0.05,
     **more: Any,
 ) -> dict[str, Any]:
-    """Let a participant do one step of a schedule; give a row of a visit.
+    """Simulate one step of a schedule; return it as a row of a visit.
 
-    Same participant, step and settings, same row, whatever was done before.
+    The row depends on participant, step and settings alone, not on what was simulated
+    before.
 
     Parameters
     ----------
@@ -65,24 +63,24 @@ def virtual_pick_step(
     step : PickStep
         Training or trial.
     practised : int
-        Picks done in this condition before, training included.
+        Earlier picks in this condition, training included.
     rate : float
         Frames per second.
     latency : float
         Of the system, s.
     **more
-        Of :func:`virtual_pick`.
+        Passed to :func:`virtual_pick`.
 
     Returns
     -------
     dict
         The columns of a picking attempt and, in SI units: `why`; `peak_grip_N`, the
-        finger's largest force on the object; `slip_m`, how far the object moved in the
-        hand while carried; `c_drift`, by how much the way to the goal alone changes c,
-        the elbow held where it just closed (signed, the largest; 0 for a ring);
-        `hold_share`, share of the carrying in which the finger touched the object;
-        `contact_c`, flexion at which it stopped the finger; `c_margin`, the least that
-        the finger was told beyond that on the way. NaN where there was none.
+        finger's largest force on the object; `slip_m`, displacement of the object in
+        the hand while carried; `c_drift`, largest change of c due to the movement to
+        the goal with the elbow held as at contact (signed; 0 for a ring); `hold_share`,
+        share of the carrying in which the finger touched the object; `contact_c`,
+        flexion at contact; `c_margin`, smallest command beyond that while carrying. NaN
+        where there was none.
     """
     picked, drift = virtual_pick(
         participant, step, practised=practised, rate=rate, latency=latency, **more
@@ -90,7 +88,7 @@ def virtual_pick_step(
     carried = picked.carried
     force = picked.trace[:, 3]
     held = picked.in_hand[carried]
-    told = picked.trace[carried, 1]
+    commands = picked.trace[carried, 1]
     contact = float(picked.trace[np.argmax(carried), 2]) if len(held) else math.nan
     return {
         "key": step.key,
@@ -106,11 +104,11 @@ def virtual_pick_step(
         "comment": "",
         "why": picked.why,
         "peak_grip_N": float(force.max()),
-        "slip_m": _farthest(held),
+        "slip_m": _largest_displacement(held),
         "c_drift": drift,
         "hold_share": float(np.mean(force[carried] > 0)) if len(held) else math.nan,
         "contact_c": contact,
-        "c_margin": float(np.min(told) - contact) if len(held) else math.nan,
+        "c_margin": float(np.min(commands) - contact) if len(held) else math.nan,
     }
 
 
@@ -123,17 +121,17 @@ def virtual_pick(
     latency: float = 0.05,
     settings: ControlSettings | None = None,
     unsteadiness: Unsteadiness | None = None,
-    sees: Literal["finger", "signal"] = "finger",
+    feedback: Literal["finger", "signal"] = "finger",
     squeeze: float | None = None,
-    planted: float = 0.0,
+    crosstalk: float = 0.0,
     objects: dict[str, PickObject] | None = None,
     **model: Any,
-) -> tuple[Picked, float]:
-    """Let a participant pick and place one object; simulated.
+) -> tuple[PickResult, float]:
+    """Simulate one pick and place.
 
-    With "ikns" through the whole chain: what the person wants -> limb -> elbow along
-    the Jacobian's self-motion at the travelling hand -> markers with noise, skin and
-    gaps -> IK -> map -> controller -> finger. With "ring" a button.
+    With "ikns" the signal passes through the whole chain: intended command -> limb ->
+    elbow along the Jacobian's self-motion at the moving hand -> markers with noise,
+    skin and gaps -> IK -> map -> controller -> finger. With "ring" it is a button.
 
     Parameters
     ----------
@@ -145,23 +143,23 @@ def virtual_pick(
     settings : ControlSettings, optional
         Of the controller.
     unsteadiness : Unsteadiness, optional
-        How straight the hand keeps to its way.
-    sees : {"finger", "signal"}
-        What the person goes by, see :class:`ikns.simulation.grasp.Elbow`.
+        Deviation of the hand from its route.
+    feedback : {"finger", "signal"}
+        What the person sees, see :class:`ikns.simulation.grasp.ElbowInput`.
     squeeze : float, optional
-        Instead of what this person does, see :class:`ikns.simulation.grasp.Habits`.
-    planted : float
-        Crosstalk to add to the map's own: by how much c falls on the way to the goal.
+        Replaces the person's own, see :class:`ikns.simulation.grasp.Habits`.
+    crosstalk : float
+        Crosstalk added to that of the map: how far c falls on the way to the goal.
     objects : dict of str to PickObject, optional
         Default: :func:`ikns.experiments.picking.load_objects`.
     **model
-        Of :class:`ikns.simulation.grasp.Grasp`.
+        Passed to :class:`ikns.simulation.grasp.Grasp`.
 
     Returns
     -------
-    picked : Picked
+    picked : PickResult
     drift : float
-        Change of c by the way alone; NaN when nothing was carried.
+        Change of c due to the movement alone; NaN when nothing was carried.
     """
     if step.condition not in VIRTUAL_CONDITIONS or step.kind == "rest":
         raise InvalidInput(
@@ -182,21 +180,21 @@ def virtual_pick(
         3, np.uint64
     )
     noise, body, shake = (int(word) for word in seeds)
-    height = round(grip_height(solid) - _USUAL, 6)
-    route = _route(_Same(participant), height)
+    height = round(grip_height(solid) - _LOWEST_GRIP, 6)
+    route = _route(_ByIdentity(participant), height)
     n = round(step.limit * rate) + 1
     steady = Unsteadiness() if unsteadiness is None else unsteadiness
-    drift = hand_drift(n, rate=rate, seed=shake, steady=steady)
+    drift = hand_drift(n, rate=rate, seed=shake, unsteadiness=steady)
     span = arch_length(float(np.linalg.norm(route.goal - route.start)), LIFT)
     person = Person(
-        habits if squeeze is None else habits.aiming(squeeze),
-        down=_REACH_S + _REACH_S_PER_M * DOWN,
-        across=_REACH_S + _REACH_S_PER_M * span,
+        habits if squeeze is None else habits.with_squeeze(squeeze),
+        down=reach_seconds(DOWN),
+        across=reach_seconds(span),
     )
-    drive: Elbow | Ring
+    drive: ElbowInput | RingInput
     if step.condition == "ikns":
         ability = participant.abilities["ikns"].practised(practised)
-        limits = (-BEYOND, 1 + BEYOND)
+        limits = (-EXTRA_RANGE, 1 + EXTRA_RANGE)
         operator = Operator(ability, rate=rate, seed=noise, start=0.0, limits=limits)
         arm = CarriedArm(
             participant,
@@ -207,9 +205,9 @@ def virtual_pick(
             latency=latency,
             settings=settings,
         )
-        drive = Elbow(operator, arm, sees=sees, planted=planted)
+        drive = ElbowInput(operator, arm, feedback=feedback, crosstalk=crosstalk)
     else:
-        drive = Ring(reaction=habits.reaction, latency=latency, rate=rate)
+        drive = RingInput(reaction=habits.reaction, latency=latency, rate=rate)
     side = participant.protocol.side
     picked = pick(
         Grasp(solid, rate=rate, side=side, **model),
@@ -227,34 +225,34 @@ def virtual_pick(
     return picked, _crosstalk(participant, route, contact)
 
 
-class _Same:
-    """A participant that equals itself only: participants hold arrays."""
+class _ByIdentity:
+    """A hashable participant that equals only itself, as participants hold arrays."""
 
     def __init__(self, participant: Participant) -> None:
         self.participant = participant
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.participant is other.participant
+        return isinstance(other, _ByIdentity) and self.participant is other.participant
 
     def __hash__(self) -> int:
         return id(self.participant)
 
 
 @lru_cache(maxsize=8)
-def _route(same: _Same, height: float) -> Route:
-    return hand_route(same.participant, height=height)
+def _route(key: _ByIdentity, height: float) -> Route:
+    return hand_route(key.participant, height=height)
 
 
 def _in_world(v: Array) -> Array:
-    """Thorax axes (forward, up, right) as those of the world (forward, left, up)."""
+    """Convert thorax axes (forward, up, right) to the world (forward, left, up)."""
     return np.stack([v[..., 0], -v[..., 2], v[..., 1]], axis=-1)
 
 
 def _crosstalk(participant: Participant, route: Route, contact: float) -> float:
-    """Largest change of c on the way to the goal with the elbow held, signed.
+    """Return the largest change of c on the way to the goal, the elbow held, signed.
 
-    The elbow is where c at the object is what stops the finger there. By the calibrated
-    map at the true postures: no noise, no limb.
+    The elbow is held where c at the object equals the flexion at contact. c is that of
+    the calibrated map at the true postures, without noise or operator.
     """
     subject = participant.subject
     columns = subject.skeleton.columns(chain_joints(subject.chain)) - 6
@@ -272,7 +270,7 @@ def _crosstalk(participant: Participant, route: Route, contact: float) -> float:
     return float(change[np.argmax(np.abs(change))])
 
 
-def _farthest(path: Array) -> float:
+def _largest_displacement(path: Array) -> float:
     if not len(path):
         return math.nan
     return float(np.linalg.norm(path - path[0], axis=1).max())

@@ -1,4 +1,4 @@
-"""What is gripped, and the gripper as its URDF writes it."""
+"""The object, and the gripper as its URDF describes it."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ Three = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Solid:
-    """An object as one homogeneous solid.
+    """An object as a homogeneous solid.
 
     Parameters
     ----------
     shape : {"box", "cylinder", "sphere"}
-        A cylinder stands upright; a cup is a full cylinder of the cup's weight.
+        A cylinder stands upright; a cup is a solid cylinder of the cup's mass.
     size : tuple of float
-        Box: three edges, the last one upright. Cylinder: diameter and height. Sphere:
-        diameter. m.
+        m. Box: three edges, the last one vertical. Cylinder: diameter and height.
+        Sphere: diameter.
     mass : float
         kg.
 
@@ -42,7 +42,7 @@ class Solid:
     mass: float
 
     def __post_init__(self) -> None:
-        """Refuse what no object is."""
+        """Check that shape, size and mass are possible."""
         numbers = {"box": 3, "cylinder": 2, "sphere": 1}
         if self.shape not in numbers:
             raise InvalidInput(
@@ -60,7 +60,7 @@ class Solid:
     def extent(self) -> Three:
         """Depth along the finger, width between finger and palm, height, m.
 
-        A box is taken across the narrower of its lying edges.
+        A box is gripped across the shorter of its horizontal edges.
         """
         if self.shape == "box":
             return max(self.size[:2]), min(self.size[:2]), self.size[2]
@@ -69,7 +69,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Module:
-    """One link of the finger, in its own frame, with the joint that carries it.
+    """A link of the finger in its own frame, with the joint to the link before.
 
     Parameters
     ----------
@@ -79,17 +79,17 @@ class Module:
     center : (float, float, float)
         Center of mass, m.
     inertia : (float, float, float)
-        About it, kg m^2.
+        About the center of mass, kg m^2.
     box : (float, float, float)
-        Edges of what it collides with, m.
+        Edges of the collision box, m.
     box_at : (float, float, float)
-        Its middle, m.
+        Middle of the collision box, m.
     joint : str
         Empty for the base.
     origin, axis : (float, float, float)
         Of the joint, in the frame of the link before.
     upper : float
-        Farthest angle, rad; 0 is the least.
+        Largest angle, rad; the smallest is 0.
     effort : float
         Largest torque, N m.
     """
@@ -132,7 +132,7 @@ def finger_parts() -> tuple[Module, ...]:
 
 @cache
 def hand_size() -> Three:
-    """Length, breadth and thickness of the hand of ``urdf/upper_body.urdf``, m.
+    """Return length, breadth and thickness of the hand in the URDF, m.
 
     >>> hand_size()
     (0.0801, 0.08, 0.028)
@@ -146,7 +146,7 @@ def hand_size() -> Three:
 
 @cache
 def constant(name: str) -> float:
-    """Value of a constant of the mechanics; unit and source: ``contact.toml``.
+    """Return a constant of the mechanics; ``contact.toml`` has unit and source.
 
     >>> constant("friction_hand")
     0.5

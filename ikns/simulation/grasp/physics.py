@@ -1,4 +1,4 @@
-"""Hand, finger and object in motion, one control frame at a time."""
+"""Contact physics of hand, finger and object, one control frame at a time."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 
-# The simulated finger's motor is this one's, too.
+# The motor is that of the simulated finger.
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.simulated import FOLLOW, SPEED, SPIN
 from ikns.simulation.grasp.parts import Solid, constant, finger_parts
 from ikns.simulation.grasp.world import world_model
 
-__all__ = ["Grasp", "Seen"]
+__all__ = ["Grasp", "Observation"]
 
 Array = NDArray[np.float64]
 
 
-class Seen(NamedTuple):
-    """What there is to see and to feel after a frame.
+class Observation(NamedTuple):
+    """What can be seen and felt after a frame.
 
     Parameters
     ----------
     flexion : float
-        Of the finger, mean over its joints, 0 to 1.
+        Flexion of the finger, mean over its joints, 0 to 1.
     load : float
-        Share of its full effort that the tendon pulls with.
+        Pull of the tendon, as a share of its full effort.
     place : (3,) array
         Middle of the object in the world, m.
     in_hand : (3,) array
-        The same in the gripper's frame.
+        The same in the gripper's frame, m.
     speed : float
-        Of the object's middle, m/s.
+        Speed of the object's middle, m/s.
     finger, hand, table : float
-        Sum of the normal forces on the object from each, N.
+        Total normal force of each on the object, N.
     """
 
     flexion: float
@@ -53,9 +53,9 @@ class Seen(NamedTuple):
 class Grasp:
     """The physics of one pick.
 
-    The finger is told through the same guard as every finger (limits of range, rate and
-    acceleration; after a long push it pushes less), its motor is that of
-    :class:`ikns.finger.SimulatedFinger`, and its tendon pulls on all joints alike.
+    Commands to the finger pass the same guard as for every finger (limits of range,
+    rate and acceleration; less force after a long push). Its motor is that of
+    :class:`ikns.finger.SimulatedFinger`, and its tendon pulls on all joints equally.
 
     Parameters
     ----------
@@ -63,9 +63,9 @@ class Grasp:
     rate : float
         Control frames per second.
     safety : Safety, optional
-        Of the finger.
+        Limits of the finger.
     **model
-        Of :func:`ikns.simulation.grasp.world.world_model`.
+        Passed to :func:`ikns.simulation.grasp.world.world_model`.
 
     Examples
     --------
@@ -120,44 +120,43 @@ class Grasp:
 
     @property
     def time(self) -> float:
-        """Of the frames done, s."""
+        """Time of the frames done, s."""
         return self.frames / self.rate
 
     def frame(
         self, flexion: float, shift: ArrayLike = (0, 0, 0), turn: ArrayLike = (0, 0, 0)
-    ) -> Seen:
-        """Go on by a frame.
+    ) -> Observation:
+        """Advance by one frame.
 
         Parameters
         ----------
         flexion : float
-            What the finger is told, 0 to 1; NaN: nothing.
+            Command to the finger, 0 to 1; NaN: none.
         shift : (3,) array
-            Where the hand is to be at the end of the frame, from where it would grip
-            the object, m in the world.
+            Position of the hand at the end of the frame, relative to where it grips the
+            object at the start, m in the world.
         turn : (3,) array
-            How it is to be turned about the object's middle, a rotation vector, rad in
-            the world.
+            Rotation vector of the hand about the object's middle, rad in the world.
 
         Raises
         ------
         InvalidInput
-            When the physics comes apart.
+            When the physics becomes unstable.
         """
         data = self.data
         now = self.time
         self.guard.command(now, flexion)
         goal = self.guard.goal
         start = data.mocap_pos[0].copy()
-        end, facing = self._asked(np.asarray(shift), np.asarray(turn))
-        if self.frames == 0:  # the hand begins there, it does not fly there
+        end, facing = self._hand_pose(np.asarray(shift), np.asarray(turn))
+        if self.frames == 0:  # the hand starts there, without a jump
             start = end
             data.qpos[7:10] = end
             data.qpos[10:14] = facing
         data.mocap_quat[0] = facing
         for k in range(self.steps):
             data.mocap_pos[0] = start + (end - start) * ((k + 1) / self.steps)
-            data.ctrl[0] = self._turn_motor(goal)
+            data.ctrl[0] = self._advance_motor(goal)
             self._step(self.model, data)
         self.frames += 1
         if data.warning.number.any():
@@ -170,16 +169,16 @@ class Grasp:
 
     @property
     def flexion(self) -> float:
-        """Mean of the joints' shares of full flexion."""
+        """Mean flexion of the joints, 0 to 1."""
         return float(self.data.ten_length[0])
 
-    def seen(self) -> Seen:
-        """Read what there is to see now."""
+    def seen(self) -> Observation:
+        """Return what can be seen and felt now."""
         data = self.data
         place = data.xpos[self._object].copy()
         axes = data.xmat[self._hand].reshape(3, 3)
-        finger, hand, table = self._pressing()
-        return Seen(
+        finger, hand, table = self._normal_forces()
+        return Observation(
             flexion=self.flexion,
             load=float(data.actuator_force[0]) / self._full_force,
             place=place,
@@ -190,8 +189,8 @@ class Grasp:
             table=table,
         )
 
-    def _asked(self, shift: Array, turn: Array) -> tuple[Array, Array]:
-        """Place and orientation of the hand turned about the object's middle."""
+    def _hand_pose(self, shift: Array, turn: Array) -> tuple[Array, Array]:
+        """Return position and orientation of the hand after a shift and a turn."""
         angle = float(np.linalg.norm(turn))
         axis = turn / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
         way, facing, arm = np.empty(4), np.empty(4), np.empty(3)
@@ -200,7 +199,7 @@ class Grasp:
         self._rotate(arm, self._home - self._middle, way)
         return self._middle + shift + arm, facing
 
-    def _pressing(self) -> list[float]:
+    def _normal_forces(self) -> list[float]:
         total, wrench = [0.0, 0.0, 0.0], np.zeros(6)
         pairs = self.data.contact.geom.tolist()
         for i, (one, other) in enumerate(pairs):
@@ -210,9 +209,9 @@ class Grasp:
             total[self._kind[other if one == self._thing else one]] += wrench[0]
         return [float(force) for force in total]
 
-    def _turn_motor(self, goal: float) -> float:
+    def _advance_motor(self, goal: float) -> float:
         dt = self._dt
-        if math.isnan(goal):  # the gear brakes it
+        if math.isnan(goal):  # without a command the gear holds the motor
             self._spin = 0.0
         else:
             wanted = min(max((goal - self._motor) / FOLLOW, -SPEED), SPEED)

@@ -1,4 +1,4 @@
-"""One object picked, carried and placed, decided by contact forces alone."""
+"""One simulated pick; contact forces alone decide whether it succeeds."""
 
 from __future__ import annotations
 
@@ -13,45 +13,45 @@ from numpy.typing import NDArray
 from ikns.errors import InvalidInput
 from ikns.finger.inputs import RingButton
 from ikns.simulation.grasp.carried_arm import CarriedArm
-from ikns.simulation.grasp.person import PRESSES, Person
-from ikns.simulation.grasp.physics import Grasp, Seen
+from ikns.simulation.grasp.person import PRESSING_LOAD, Person
+from ikns.simulation.grasp.physics import Grasp, Observation
 from ikns.simulation.operator.loop import Delay
 from ikns.simulation.operator.model import Operator
 
-__all__ = ["Elbow", "Picked", "Ring", "arch_length", "pick"]
+__all__ = ["ElbowInput", "PickResult", "RingInput", "arch_length", "pick"]
 
 Array = NDArray[np.float64]
 Outcome = Literal["success", "dropped", "timeout"]
-Sees = Literal["finger", "signal"]
+Feedback = Literal["finger", "signal"]
 
-#: How near the goal the object must lie, m: inside a circle of a decimeter (assumption;
-#: the paper shows a red circle).
+#: Largest distance of the object from the goal, m (assumption; the paper shows a red
+#: circle).
 NEAR = 0.05
-#: An object that meets the table while the hand is higher than this over where it puts
-#: things down was not put down, m (assumption).
+#: An object that touches the table while the hand is this far above the height for
+#: putting it down was dropped, m (assumption).
 _PUT_DOWN = 0.03
-#: What lies still: slower than this for so long, m/s and s.
+#: An object lies still if it is slower than this for this time, m/s and s.
 _STILL, _STILL_FOR = 0.02, 0.2
-#: An object that has risen by so much, and touches nothing below, was lifted, m.
+#: An object that has risen this far without touching the table was lifted, m.
 _LEFT = 0.005
-#: A hand that has gone so far from an object on the table has lost it, m.
+#: An object on the table that moved this far relative to the hand is lost, m.
 _LOST = 0.06
 
 
-class Elbow:
-    """The self-motion drives the finger: operator, body, cameras, map, controller.
+class ElbowInput:
+    """The finger driven by self-motion: operator, body, cameras, map, controller.
 
     Parameters
     ----------
     operator : Operator
-        Fresh.
+        New.
     arm : CarriedArm
-    sees : {"finger", "signal"}
-        What the operator goes by. The finger: once it is felt to press, nothing tells
-        how much further c is, so the elbow stays where it is, as well as it can. Or the
-        signal on a screen, whatever the finger does.
-    planted : float
-        Crosstalk to add: by how much c falls on the way from object to goal.
+    feedback : {"finger", "signal"}
+        What the operator sees: the finger, which does not show how far c is beyond the
+        contact, so the elbow is then held as well as possible; or the signal on a
+        screen.
+    crosstalk : float
+        Added crosstalk: how far c falls on the way from object to goal.
     """
 
     def __init__(
@@ -59,114 +59,116 @@ class Elbow:
         operator: Operator,
         arm: CarriedArm,
         *,
-        sees: Sees = "finger",
-        planted: float = 0.0,
+        feedback: Feedback = "finger",
+        crosstalk: float = 0.0,
     ) -> None:
-        if sees not in ("finger", "signal"):
-            raise InvalidInput(f"expected to see finger or signal, found '{sees}'.")
-        self.operator, self.arm, self.sees = operator, arm, sees
-        self._planted, self._told = planted, math.nan
+        if feedback not in ("finger", "signal"):
+            raise InvalidInput(
+                f"expected feedback of finger or signal, found '{feedback}'."
+            )
+        self.operator, self.arm, self.feedback = operator, arm, feedback
+        self._crosstalk, self._sent = crosstalk, math.nan
 
     @property
     def c(self) -> float:
-        """The map's, of the last frame."""
+        """The raw c of the map in the last frame."""
         return self.arm.c
 
-    def __call__(self, want: float, place: float, seen: Seen) -> float:
-        """Take what the person wants, where the hand is, what is seen: tell it."""
-        if self.sees == "signal":
-            shown = self._told
-        elif want > seen.flexion and seen.load >= PRESSES:
-            shown = want
+    def __call__(self, command: float, place: float, seen: Observation) -> float:
+        """Take intended command, hand position and observation; return the command."""
+        if self.feedback == "signal":
+            shown = self._sent
+        elif command > seen.flexion and seen.load >= PRESSING_LOAD:
+            shown = command
         else:
             shown = seen.flexion
-        limb = self.operator.step(want, shown)
-        self._told = self.arm.step(limb, place) - self._planted * max(place, 0.0)
-        return self._told
+        limb = self.operator.step(command, shown)
+        self._sent = self.arm.step(limb, place) - self._crosstalk * max(place, 0.0)
+        return self._sent
 
 
-class Ring:
-    """A button drives the finger: pressed a reaction after the person wants it."""
+class RingInput:
+    """The finger driven by a button that is pressed after a reaction time."""
 
     def __init__(self, *, reaction: float, latency: float, rate: float) -> None:
         self._frames, self._rate = 0, rate
         self._ring = RingButton(clock=lambda: self._frames / rate)
-        self._late = Delay(reaction, rate=rate)
-        self._told = Delay(latency, rate=rate)
+        self._reaction = Delay(reaction, rate=rate)
+        self._latency = Delay(latency, rate=rate)
         self._closed = False
         self.c = 0.0
 
-    def __call__(self, want: float, place: float, seen: Seen) -> float:
-        """Take what the person wants; tell the finger."""
-        if (self._late.step(want) > 0.5) is not self._closed:
+    def __call__(self, command: float, place: float, seen: Observation) -> float:
+        """Take the intended command; return the command to the finger."""
+        if (self._reaction.step(command) > 0.5) is not self._closed:
             self._closed = not self._closed
             self._ring.press()
         self._frames += 1
         self.c = self._ring()[1]
-        return self._told.step(self.c)
+        return self._latency.step(self.c)
 
 
 @dataclass(frozen=True)
-class Picked:
-    """What came of it; simulated.
+class PickResult:
+    """Result of a simulated pick.
 
     Parameters
     ----------
     outcome : {"success", "dropped", "timeout"}
     why : str
-        In words; empty for a success.
+        Reason in words; empty for a success.
     time : float
         From the beginning to the outcome, s.
-    doing : (T,) tuple of str
-        What the person did in each frame.
+    phases : (T,) tuple of str
+        Phase of the person in each frame.
     trace : (T, 6) array
-        c of the map, what the finger was told, flexion, force of the finger (N), height
-        of the object (m), place of the hand on its way.
+        c of the map, command to the finger, flexion, force of the finger (N), height of
+        the object (m), position of the hand on its route.
     in_hand : (T, 3) array
-        Object in the gripper's frame, m.
+        Position of the object in the gripper's frame, m.
     """
 
     outcome: Outcome
     why: str
     time: float
-    doing: tuple[str, ...]
+    phases: tuple[str, ...]
     trace: Array
     in_hand: Array
 
     @property
     def carried(self) -> NDArray[np.bool_]:
-        """Frames in which the hand travelled with the object."""
-        return np.array([doing == "carrying" for doing in self.doing])
+        """Frames in which the hand carried the object."""
+        return np.array([phase == "carrying" for phase in self.phases])
 
 
 def pick(
     grasp: Grasp,
     person: Person,
-    drive: Callable[[float, float, Seen], float],
+    drive: Callable[[float, float, Observation], float],
     way: Callable[[float], tuple[Array, float]],
     *,
     drift: Array,
     limit: float = 20.0,
-) -> Picked:
-    """Let a person pick an object and place it.
+) -> PickResult:
+    """Simulate a person who picks and places an object.
 
     Parameters
     ----------
     grasp : Grasp
-        Fresh; it sets the rate.
+        New; it sets the rate.
     person : Person
-        Fresh.
+        New.
     drive : callable
-        What the person wants the finger to be told (0 to 1), the place of the hand on
-        its way and what is seen, to what the finger is told: an :class:`Elbow`, a
-        :class:`Ring`.
+        From intended command (0 to 1), position of the hand on its route and
+        observation to the command to the finger: an :class:`ElbowInput` or a
+        :class:`RingInput`.
     way : callable
-        Place on the way to where the hand is from where it grips, m in the world, and
-        how far it has turned about the vertical, rad.
+        From position on the route to the shift of the hand from where it grips, m in
+        the world, and its turn about the vertical, rad.
     drift : (n, 6) array
-        How the hand strays from that, m and rad in the world.
+        Deviation of the hand from the route, m and rad in the world.
     limit : float
-        s.
+        Time limit, s.
     """
     frames = round(limit * grasp.rate)
     if frames < 1 or len(drift) < frames:
@@ -176,35 +178,35 @@ def pick(
         )
     goal = way(1.0)[0]
     seen = grasp.seen()
-    doing, trace, in_hand = [], np.empty((frames, 6)), np.empty((frames, 3))
+    phases, trace, in_hand = [], np.empty((frames, 6)), np.empty((frames, 3))
     judge = _Judge(grasp, goal)
     outcome: Outcome = "timeout"
     why = ""
     k = 0
     for k in range(frames):
         person.step(grasp.time, seen)
-        told = drive(person.want, person.place, seen)
+        command = drive(person.command, person.place, seen)
         shift, yaw = way(person.place)
         turn = drift[k, 3:] + [0.0, 0.0, yaw]
-        seen = grasp.frame(told, shift + drift[k, :3], turn)
-        doing.append(person.doing)
-        c = getattr(drive, "c", told)
-        height = seen.place[2] - grasp.solid.extent[2] / 2  # of its middle, risen
-        trace[k] = c, told, seen.flexion, seen.finger, height, person.place
+        seen = grasp.frame(command, shift + drift[k, :3], turn)
+        phases.append(person.phase)
+        c = getattr(drive, "c", command)
+        height = seen.place[2] - grasp.solid.extent[2] / 2  # risen by
+        trace[k] = c, command, seen.flexion, seen.finger, height, person.place
         in_hand[k] = seen.in_hand
-        ended = judge.step(person.doing, seen, float(shift[2]))
+        ended = judge.step(person.phase, seen, float(shift[2]))
         if ended:
             outcome, why = ended
             break
     else:
-        why = f"still {person.doing}"
+        why = f"still {person.phase}"
     n = k + 1
     time = min(grasp.time, limit)
-    return Picked(outcome, why, time, tuple(doing), trace[:n], in_hand[:n])
+    return PickResult(outcome, why, time, tuple(phases), trace[:n], in_hand[:n])
 
 
 def arch_length(width: float, height: float) -> float:
-    """Length of the arch over a width with a height, m (Ramanujan's first formula).
+    """Return the length of half an ellipse, m, by Ramanujan's first formula.
 
     >>> round(arch_length(2.0, 1.0) / np.pi, 6)
     1.0
@@ -214,7 +216,7 @@ def arch_length(width: float, height: float) -> float:
 
 
 class _Judge:
-    """Success or drop, by where the object is and what touches it."""
+    """Decides success or drop from the position of the object and its contacts."""
 
     def __init__(self, grasp: Grasp, goal: Array) -> None:
         self._goal, self._long = goal, math.ceil(_STILL_FOR * grasp.rate)
@@ -222,9 +224,11 @@ class _Judge:
         self._lifted, self._still = False, 0
         self._held: Array | None = None
 
-    def step(self, doing: str, seen: Seen, high: float) -> tuple[Outcome, str] | None:
-        """Return outcome and reason once there is one."""
-        if doing not in ("carrying", "placing", "releasing"):
+    def step(
+        self, phase: str, seen: Observation, high: float
+    ) -> tuple[Outcome, str] | None:
+        """Return outcome and reason, or None as long as there is none."""
+        if phase not in ("carrying", "placing", "releasing"):
             return None
         if self._held is None:
             self._held = seen.in_hand
@@ -241,6 +245,6 @@ class _Judge:
             return "dropped", f"fell with the hand {100 * high:.0f} cm up"
         alone = down and seen.speed < _STILL and seen.finger == 0.0
         self._still = self._still + 1 if alone else 0
-        if doing == "releasing" and self._lifted and self._still >= self._long:
+        if phase == "releasing" and self._lifted and self._still >= self._long:
             return "success", ""
         return None

@@ -1,9 +1,9 @@
-"""The way of the hand over the table, and what the elbow can do all along it.
+"""The route of the hand over the table, with the self-motion along it.
 
-The hand comes down over the object and carries it over half an ellipse to the goal; it
-turns about the vertical as the arm turns about the shoulder, and in no other way. At
-some places of the way the self-motion is followed by the Jacobian, as everywhere in
-this simulation, and between them interpolated: the body knows nothing of any map.
+The hand moves down to the object and carries it along half an ellipse to the goal; it
+turns about the vertical as the arm turns about the shoulder. The self-motion is
+computed from the Jacobian at some positions and interpolated between them. The
+simulated body is independent of any map.
 """
 
 from __future__ import annotations
@@ -16,59 +16,59 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from ikns.errors import InvalidInput
-from ikns.simulation.arm import Arm, SelfMotion, self_motion
+from ikns.simulation.arm import ArmKinematics, SelfMotion, self_motion
 from ikns.simulation.artifacts import SoftTissue
+from ikns.simulation.body_frames import arm_rows
 from ikns.simulation.operator.cohort import Participant, tracking_place
 
-__all__ = ["BEYOND", "DOWN", "LEVELS", "LIFT", "Route", "hand_route"]
+__all__ = ["EXTRA_RANGE", "DOWN", "LEVELS", "LIFT", "Route", "hand_route"]
 
 Array = NDArray[np.float64]
 Piece = tuple[Array, Array, Array]
 
-#: Where object and goal are among the points of the calibration, as shares of their
-#: box, forward and outwards (assumptions: the paper shows two places on a table), and
-#: how high: the lowest of these where the elbow has room all the way.
+#: Positions of object and goal in the box of the calibration points, as shares forward
+#: and outwards (assumptions: the paper shows two places on a table), and levels: the
+#: lowest one at which the elbow has room on the whole route is taken.
 START, GOAL = (0.5, 0.8), (0.5, 0.2)
 LEVELS = (0.15, 0.3, 0.45, 0.6)
-#: How high the hand comes from and how high it carries, m (assumptions).
+#: Height from which the hand moves down, and to which it lifts, m (assumptions).
 DOWN, LIFT = 0.12, 0.12
-#: The elbow goes farther than it does while tracking, by this share of that range at
-#: either end, where joints let it (assumption): nobody stops with the finger half open.
-BEYOND = 0.2
-#: A place is no good where it can go less far than this share of that range.
+#: The swivel range is larger than in tracking by this share at either end, within joint
+#: limits (assumption): people do not stop with the finger half open.
+EXTRA_RANGE = 0.2
+#: Smallest swivel range on the route, as a share of that in tracking.
 _LEAST = 0.8
-#: Places at which the self-motion is followed: on the way down and on the arch; and
-#: swivels at which it is kept.
+#: Number of positions with a computed self-motion, on the way down and on the arch; and
+#: relative swivels at which it is stored.
 _ON_COLUMN, _ON_ARCH, _EVEN = 4, 9, np.linspace(0.0, 1.0, 25)
 
 
 @dataclass(frozen=True)
 class Route:
-    """Postures on the way.
+    """Postures along a route.
 
-    The place `s` on the way is -1 above the object, 0 at it, 1 at the goal.
+    The position `s` on the route is -1 above the object, 0 at it, 1 at the goal.
 
     Parameters
     ----------
-    arm : Arm
+    arm : ArmKinematics
     angles : (18,) array
-        The rest of the body.
+        Joint angles of the rest of the body.
     start, goal : (3,) array
-        Hand at the object and at the goal, thorax frame, m.
+        Position of the hand at the object and at the goal, thorax frame, m.
     rotation : (3, 3) array
-        Of the hand at the object.
+        Orientation of the hand at the object.
     shoulder : (3,) array
-        Its joint center, m.
+        Joint center, m.
     swivel : (float, float)
-        Elbow swivels that are limb 0 and 1, rad.
+        Elbow swivels at positions 0 and 1 of the limb, rad.
     pieces : tuple of (knots, ranges, rows)
-        On the way down and on the arch: (K,) places where the self-motion is known;
-        (K, 2) swivels that can be reached there, rad; and (K, U, C) at even steps
-        between those: posture (9), pseudo-inverse of the Jacobian (42), what skin adds
-        to the markers (3 each).
+        On the way down and on the arch: (K,) positions with a computed self-motion;
+        (K, 2) swivel ranges there, rad; and (K, U, C) states of the arm at even steps
+        in between, from :func:`ikns.simulation.body_frames.arm_rows`.
     """
 
-    arm: Arm
+    arm: ArmKinematics
     angles: Array
     start: Array
     goal: Array
@@ -78,43 +78,43 @@ class Route:
     pieces: tuple[Piece, Piece]
 
     def hand(self, s: float) -> Array:
-        """Where the hand is meant to be, thorax frame, (3,) m."""
-        return _way(self.start, self.goal, s)
+        """Return the intended position of the hand, thorax frame, (3,) m."""
+        return _position(self.start, self.goal, s)
 
     def turn(self, s: float) -> float:
-        """How far the hand has turned about the vertical since the object, rad."""
+        """Return the turn of the hand about the vertical since the object, rad."""
         return _yaw(self.shoulder, self.start, self.hand(max(s, 0.0)))
 
     def row(self, s: float, limb: float) -> Array:
-        """Posture, pseudo-inverse and skin with the limb (0 to 1) at a place."""
+        """Return the state of the arm for a position and a limb (0 to 1)."""
         knots, ranges, rows = self.pieces[0 if s < 0 else 1]
-        first, along = _four(knots, s)
+        first, along = _cubic_weights(knots, s)
         here = slice(first, first + 4)
         low, high = along @ ranges[here]
         wanted = self.swivel[0] + limb * (self.swivel[1] - self.swivel[0])
         share = min(max((wanted - low) / (high - low), 0.0), 1.0)
-        second, across = _four(_EVEN, share)
+        second, across = _cubic_weights(_EVEN, share)
         block = rows[here, second : second + 4]
         return np.asarray(np.outer(along, across).ravel() @ block.reshape(16, -1))
 
     def posture(self, s: float, limb: float) -> Array:
-        """Joint angles of the body, (18,), the hand where it is meant to be."""
+        """Return the joint angles of the body, (18,), without drift."""
         return self.arm.put(self.angles, self.row(s, limb)[:9])
 
 
 def hand_route(participant: Participant, *, height: float = 0.0) -> Route:
-    """Find the way of a participant's hand.
+    """Find the route of a participant's hand.
 
     Parameters
     ----------
     participant : Participant
     height : float
-        Of object and goal over the usual, m.
+        Of object and goal above the usual, m.
 
     Raises
     ------
     InvalidInput
-        When the hand cannot get there, or the elbow has no room, at any level.
+        When the hand cannot get there, or the elbow has no room, at all levels.
     """
     reason: InvalidInput | None = None
     for level in LEVELS:
@@ -122,12 +122,12 @@ def hand_route(participant: Participant, *, height: float = 0.0) -> Route:
             return _at_level(participant, level, height)
         except InvalidInput as error:
             reason = error
-    raise InvalidInput(f"no way for the hand over a table: {reason}")
+    raise InvalidInput(f"no route for the hand over a table: {reason}")
 
 
 def _at_level(participant: Participant, level: float, height: float) -> Route:
     run = participant.protocol
-    arm = Arm(run.subject.skeleton, run.side)
+    arm = ArmKinematics(run.subject.skeleton, run.side)
     labels = arm.skeleton.marker_set.labels
     columns = participant.subject.skeleton.marker_set.columns(labels)
     low_corner, high_corner = run.places.min(axis=0), run.places.max(axis=0)
@@ -139,20 +139,20 @@ def _at_level(participant: Participant, level: float, height: float) -> Route:
     )
     start[1] += height
     goal[1] += height
-    # The hand is held as this person would hold it halfway.
+    # The hand is held as this person holds it halfway.
     angles, rest = tracking_place(run, (start + goal) / 2)
     assert rest.motion is not None
     low, high = (float(x) for x in rest.motion.swivel[[0, -1]])
-    more = BEYOND * (high - low)
+    more = EXTRA_RANGE * (high - low)
     body = arm.put(angles, rest.posture)
     shoulder = arm.shoulder(body)
 
     def turned(s: float) -> Array:
-        yaw = _yaw(shoulder, rest.position, _way(start, goal, max(s, 0.0)))
+        yaw = _yaw(shoulder, rest.position, _position(start, goal, max(s, 0.0)))
         return np.asarray(Rotation.from_rotvec([0, yaw, 0]).as_matrix() @ rest.rotation)
 
     def motion(s: float, near: Array) -> SelfMotion:
-        position = _way(start, goal, s)
+        position = _position(start, goal, s)
         here = arm.to_pose(near, position, turned(s))
         swivel = arm.swivel(here)
         found = self_motion(
@@ -173,11 +173,11 @@ def _at_level(participant: Participant, level: float, height: float) -> Route:
         found: list[SelfMotion] = []
         for s in knots:
             found.append(motion(float(s), body))
-            # The next place is sought from the middle of what this one allows.
+            # The search for the next one starts in the middle of this range.
             first, last = found[-1].swivel[[0, -1]]
             body = arm.put(angles, found[-1].at(np.clip((low + high) / 2, first, last)))
         ranges = np.array([m.swivel[[0, -1]] for m in found])
-        rows = [_rows(arm, angles, m, run.skin, columns) for m in found]
+        rows = [_even_rows(arm, angles, m, run.skin, columns) for m in found]
         pieces.append((knots, ranges, np.array(rows)))
     return Route(
         arm,
@@ -191,7 +191,7 @@ def _at_level(participant: Participant, level: float, height: float) -> Route:
     )
 
 
-def _way(start: Array, goal: Array, s: float) -> Array:
+def _position(start: Array, goal: Array, s: float) -> Array:
     if s < 0:
         return np.asarray(start + [0.0, -s * DOWN, 0.0])
     share = (1 - np.cos(np.pi * s)) / 2
@@ -201,36 +201,28 @@ def _way(start: Array, goal: Array, s: float) -> Array:
 
 
 def _yaw(shoulder: Array, before: Array, now: Array) -> float:
-    """Turn about the thorax's Y from one place to another, seen from the shoulder."""
+    """Return the angle about the thorax's Y between two positions, at the shoulder."""
     (x0, z0), (x1, z1) = (before - shoulder)[[0, 2]], (now - shoulder)[[0, 2]]
     return float(np.arctan2(z0 * x1 - x0 * z1, x0 * x1 + z0 * z1))
 
 
-def _rows(
-    arm: Arm,
+def _even_rows(
+    arm: ArmKinematics,
     angles: Array,
     motion: SelfMotion,
     skin: SoftTissue | None,
     columns: NDArray[np.intp],
 ) -> Array:
-    bodies = np.array([arm.put(angles, posture) for posture in motion.postures])
-    inverse = [
-        np.linalg.pinv(arm.skeleton.chain_jacobian(body, arm.chain)).ravel()
-        for body in bodies
-    ]
-    q = np.hstack([np.tile(arm.skeleton.neutral()[:7], (len(bodies), 1)), bodies])
-    shift = np.zeros((len(q), len(columns), 3))
-    if skin is not None:
-        shift = skin.in_world(q, skin.with_posture(q))[:, columns]
-    rows = np.hstack([motion.postures, inverse, shift.reshape(len(q), -1)])
+    """Return the states of the arm at even steps of the swivel."""
+    rows = arm_rows(arm, angles, motion, skin=skin, columns=columns)
     even = motion.swivel[0] + np.ptp(motion.swivel) * _EVEN
     return np.asarray(CubicSpline(motion.swivel, rows)(even))
 
 
-def _four(knots: Array, x: float) -> tuple[int, Array]:
-    """First of the four even knots about x, and the weights of the cubic through them.
+def _cubic_weights(knots: Array, x: float) -> tuple[int, Array]:
+    """Return the first of four even knots around x, and the cubic's weights.
 
-    >>> _four(np.arange(6.0), 2.5)
+    >>> _cubic_weights(np.arange(6.0), 2.5)
     (1, array([-0.0625,  0.5625,  0.5625, -0.0625]))
     """
     at = (x - knots[0]) / (knots[1] - knots[0])

@@ -1,13 +1,13 @@
 """The grasp as a MuJoCo model: table, object, and a hand that carries the finger.
 
-World: origin on the table under the object, X away from the person, Z up. In the
-gripper's frame, that of ``urdf/finger.urdf``, X runs along the straight finger, Y from
-the palm to it; a right hand has Y to the left and a left hand to the right. The palm is
-a plate that the tip would touch, the heel of the hand with the forearm behind it a
-second one, from the palm to the base: the object is squeezed into their corner.
+World: origin on the table under the object, X away from the person, Z up. The gripper's
+frame is that of ``urdf/finger.urdf``: X along the straight finger, Y from the palm to
+it, which is to the left for a right hand and to the right for a left one. The palm is a
+plate opposite the finger; the heel of the hand is a second plate, from the palm to the
+finger's base. The object is squeezed into their corner.
 
-The hand is a body of its own that a stiff weld keeps at the place asked for: contacts
-then know how fast it moves, which they do not of a body that is merely put somewhere.
+The hand is a body that a stiff weld moves to the commanded pose: contacts then see its
+velocity, which a directly positioned body would not have.
 """
 
 from __future__ import annotations
@@ -21,19 +21,18 @@ from ikns.simulation.grasp.parts import Solid, constant, finger_parts, hand_size
 
 __all__ = ["CLEAR", "grip_height", "object_in_gripper", "world_model"]
 
-#: Mass of hand and forearm, kg: the weld carries it, and nothing depends on it.
+#: Mass of hand and forearm, kg: the weld carries it, and no result depends on it.
 _CARRIER = 1.5
-#: Room between palm and straight finger, m.
+#: Space between palm and straight finger, m.
 CLEAR = WIDEST - finger_parts()[1].box[1] / 2
-#: How far palm and forearm reach along the finger from its base, m: as far as the hand,
-#: and as far back as anything could touch.
+#: Length of palm and forearm behind the finger's base, m: as far as contacts occur.
 _BACK = 0.06
-#: How little contacts and limits give way: a hundredth once a millimeter deep.
+#: Impedance of contacts and limits: nearly rigid beyond a depth of 1 mm.
 _SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
 
 
 def grip_height(solid: Solid) -> float:
-    """Height of the finger over the table: half the object's, if the hand can.
+    """Return the height of the finger above the table: half the object's if possible.
 
     >>> grip_height(Solid("cylinder", (0.075, 0.25), 0.2))
     0.125
@@ -43,7 +42,7 @@ def grip_height(solid: Solid) -> float:
 
 
 def object_in_gripper(solid: Solid) -> tuple[float, float]:
-    """Middle of the object along X and Y of the gripper when the hand is there, m."""
+    """Return the object's middle along X and Y of the gripper before the grasp, m."""
     depth, width, _ = solid.extent
     gap = min(constant("gap"), max(CLEAR - width, 0.0) / 2)
     return constant("gap") + depth / 2, gap + width / 2 - WIDEST
@@ -57,24 +56,24 @@ def world_model(
     effort: float = 0.5,
     gravity: float = 9.81,
 ) -> Any:
-    """Build the model, the hand around the object and the finger straight.
+    """Build the model, with the hand around the object and the finger straight.
 
     Parameters
     ----------
     solid : Solid
     side : {"right", "left"}
     friction : float, optional
-        Of hand and finger instead of what ``contact.toml`` says.
+        Of hand and finger, instead of the values in ``contact.toml``.
     effort : float
-        Share of the URDF's torque that the tendon may pull with.
+        Largest pull of the tendon, as a share of the URDF's torque.
     gravity : float
         m/s^2.
 
     Returns
     -------
     mujoco.MjModel
-        Bodies "guide" (to be moved), "hand", the links of the finger, "object"; geom
-        "table"; actuator "tendon", whose control is the motor's flexion.
+        Bodies "guide" (its pose is the command), "hand", the links of the finger,
+        "object"; geom "table"; actuator "tendon", with the motor's flexion as control.
     """
     import mujoco
 

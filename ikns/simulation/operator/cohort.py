@@ -1,4 +1,4 @@
-"""Participants: a virtual body, calibrated, and an operator to move it; simulated."""
+"""Virtual participants: a calibrated body, and the abilities of an operator."""
 
 from __future__ import annotations
 
@@ -12,10 +12,17 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
-from ikns.simulation.arm import Arm, girdle, self_motion
+from ikns.simulation.arm import ArmKinematics, girdle, self_motion
 from ikns.simulation.operator.ability import CONDITIONS, Ability, sample_abilities
 from ikns.simulation.operator.arm_loop import ArmLoop
-from ikns.simulation.places import GIRDLE_FOLLOW, Place, comfortable_posture
+from ikns.simulation.places import (
+    FOREARM_TURNS,
+    GIRDLE_FOLLOW,
+    LEAST_RANGE,
+    Place,
+    comfortable_posture,
+    wider,
+)
 from ikns.simulation.protocol import Protocol, simulate_protocol
 from ikns.simulation.subject import virtual_subject
 
@@ -23,16 +30,13 @@ __all__ = ["Participant", "draw_participant", "tracking_place"]
 
 Array = NDArray[np.float64]
 
-#: Persons drawn until one can do the protocol.
+#: Largest number of persons drawn until one can do the protocol.
 _TRIES = 20
-#: Turns of the forearm tried for room to swivel, and the least room, rad: as in the
-#: simulated protocol.
-_TURNS, _LEAST = np.radians([0.0, 25.0, -25.0]), np.radians(40.0)
 
 
 @dataclass(frozen=True)
 class Participant:
-    """A simulated person, calibrated and ready to track.
+    """A simulated person, calibrated and ready for experiments.
 
     Parameters
     ----------
@@ -43,15 +47,15 @@ class Participant:
     abilities : dict of str to Ability
         By condition; before practice.
     protocol : Protocol
-        The calibration as it was recorded, with the true body.
+        The recorded calibration, with the true body.
     subject : Subject
-        As calibrated.
+        The calibrated person.
     angles : (18,) array
         Joint angles of the rest of the body.
     place : Place
         Where the hand is held while tracking.
     redrawn : int
-        Persons before this one who could not reach the points of the protocol.
+        Number of persons drawn before, who could not reach the points of the protocol.
     """
 
     number: int
@@ -66,14 +70,14 @@ class Participant:
     def arm_loop(
         self, *, seconds: float, rate: float, seed: Any, **more: Any
     ) -> ArmLoop:
-        """Arm, cameras and map of this person for so many seconds of frames.
+        """Return arm, cameras and map of this person, for a duration in seconds.
 
-        `more` goes to :class:`ArmLoop`; noise and gaps are those of the calibration if
-        not given.
+        `more` is passed to :class:`ArmLoop`; by default noise and gaps are those of the
+        calibration.
         """
         for key in ("marker_noise", "occluded"):
             more.setdefault(key, self.protocol.settings[key])
-        arm = Arm(self.protocol.subject.skeleton, self.protocol.side)
+        arm = ArmKinematics(self.protocol.subject.skeleton, self.protocol.side)
         return ArmLoop(
             arm,
             self.angles,
@@ -95,10 +99,10 @@ def draw_participant(
     latency: float = 0.05,
     **protocol: Any,
 ) -> Participant:
-    """Draw a person, let it go through the calibration, calibrate it.
+    """Draw a person, simulate the protocol, and calibrate.
 
-    Anthropometry is sampled from ANSUR II, ability from ``parameters.toml``. Who cannot
-    reach the points of the protocol is replaced by another person.
+    Anthropometry is sampled from ANSUR II, ability from ``parameters.toml``. A person
+    who cannot reach the points of the protocol is replaced by another one.
 
     Parameters
     ----------
@@ -111,15 +115,15 @@ def draw_participant(
     latency : float
         See :func:`ikns.simulation.operator.sample_abilities`, s.
     **protocol
-        Of :func:`ikns.simulation.simulate_protocol`. Free exploration, which no
-        calibration uses, is left out by default.
+        Passed to :func:`ikns.simulate_protocol`. Free exploration, which calibration
+        does not use, is left out by default.
 
     Raises
     ------
     InvalidInput
-        When nobody of 20 can do the protocol.
+        When no one of 20 persons drawn can do the protocol.
     NotEnoughData
-        When the calibration fails, as it does with too short a stay at the points.
+        When the calibration fails, as it does with too little time at the points.
     """
     reason: InvalidInput | None = None
     for attempt in range(_TRIES):
@@ -156,18 +160,18 @@ def draw_participant(
         return Participant(
             number, seed, abilities, run, subject, angles, place, redrawn=attempt
         )
-    raise InvalidInput(f"nobody of {_TRIES} can do the protocol: {reason}")
+    raise InvalidInput(f"no one of {_TRIES} persons can do the protocol: {reason}")
 
 
 def tracking_place(
     protocol: Protocol, position: Array | None = None
 ) -> tuple[Array, Place]:
-    """Find a hand pose to hold, as this person held the points of the calibration.
+    """Find a hand pose to hold, with the habits that the person had in calibration.
 
     Parameters
     ----------
     protocol : Protocol
-        Of one arm.
+        With one exploring arm.
     position : (3,) array, optional
         In the thorax frame, m. Default: the middle of the points.
 
@@ -180,9 +184,9 @@ def tracking_place(
     Raises
     ------
     InvalidInput
-        When it is out of reach or leaves the elbow no room.
+        When it is out of reach, or the swivel range is too small.
     """
-    arm = Arm(protocol.subject.skeleton, protocol.side)
+    arm = ArmKinematics(protocol.subject.skeleton, protocol.side)
     truth, point = protocol.points.truth, protocol.points.point
     where = protocol.places.mean(axis=0) if position is None else np.array(position)
     rows = [np.flatnonzero(point == k) for k in range(len(protocol.places))]
@@ -195,7 +199,7 @@ def tracking_place(
     swivel = float(protocol.points.swivel[first].mean())
     half = float(np.mean([np.ptp(protocol.points.swivel[row]) for row in rows])) / 2
     best: Place | None = None
-    for turn in _TURNS:
+    for turn in FOREARM_TURNS:
         posture = comfortable_posture(
             arm,
             angles,
@@ -207,15 +211,10 @@ def tracking_place(
         body = arm.put(angles, posture)
         motion = self_motion(arm, body, lowest=swivel - half, highest=swivel + half)
         here = Place(posture, *arm.hand(body), arm.swivel(body), motion)
-        if best is None or _room(here) > _room(best) + np.radians(3.0):
-            best = here
-    if best is None or _room(best) < _LEAST:
+        best = wider(best, here)
+    if best is None or best.swivel_range < LEAST_RANGE:
         raise InvalidInput(
             f"the elbow has no room to swivel with the {arm.side} hand at "
             f"{np.round(where, 3)} m in the thorax frame; choose another place."
         )
     return angles, best
-
-
-def _room(place: Place) -> float:
-    return 0.0 if place.motion is None else float(np.ptp(place.motion.swivel))

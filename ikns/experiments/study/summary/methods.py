@@ -85,8 +85,8 @@ def _tracking(found: TrackingSummary) -> str:
     align = design.get("align", _only(found.table["align"]))
     parts = [
         "Tracking: a pointer crossed the screen at constant speed and was to follow a "
-        "pseudo-random curve; its height was 100 c, c being the control signal cut "
-        "off at 0 and 1."
+        "pseudo-random curve; its height was 100 c, c being the control signal clipped "
+        "to 0 to 1."
     ]
     if found.trajectories:
         parts.append(f"Curves were of kind {', '.join(found.trajectories)}.")
@@ -158,7 +158,7 @@ def _tracking_tests(found: TrackingSummary) -> str:
         f"{number(found.margin, 'of 100')} declared beforehand"
     )
     return (
-        "Analysis of tracking: RMSE is the root mean square of pointer less target "
+        "Analysis of tracking: RMSE is the root mean square of pointer minus target "
         "over the samples from the curve's beginning to its end, of 100; the lag is "
         "that of the highest cross-correlation; overshoot is how far moves went past "
         "their end on average; smoothness is the spectral arc length of the pointer's "

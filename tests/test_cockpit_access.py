@@ -1,4 +1,4 @@
-"""Who may come into the cockpit: no foreign page, and from afar with the token."""
+"""Access to the cockpit: no foreign page, and from other machines with the token."""
 
 import asyncio
 import http.client
@@ -50,9 +50,9 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cockpit]:
 
 
 @pytest.fixture(scope="module")
-def afar(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cockpit]:
+def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cockpit]:
     """Listens on every address, as asked."""
-    with serving(tmp_path_factory.mktemp("afar"), host="0.0.0.0") as cockpit:
+    with serving(tmp_path_factory.mktemp("remote"), host="0.0.0.0") as cockpit:
         yield cockpit
 
 
@@ -68,12 +68,16 @@ def ask(
         line.close()
 
 
-def knock(
-    cockpit: Cockpit, *, role: str = "panel", says: tuple[str, ...] = (), **headers: str
+def open_socket(
+    cockpit: Cockpit,
+    *,
+    role: str = "panel",
+    messages: tuple[str, ...] = (),
+    **headers: str,
 ) -> dict[str, object] | int:
     """Open a web socket; return the first message, or the status of the refusal."""
 
-    async def come() -> dict[str, object] | int:
+    async def connect() -> dict[str, object] | int:
         url = f"ws://127.0.0.1:{cockpit.access.port}/link?role={role}"
         try:
             link: WebSocketClientConnection = await websocket_connect(
@@ -82,22 +86,22 @@ def knock(
         except HTTPClientError as refusal:
             return refusal.code
         message = json.loads(await link.read_message() or "{}")
-        for words in says:
+        for words in messages:
             await link.write_message(words)
             # A few frames were on their way; no more than 12 come unanswered.
             frames = 0
             while frames < 10 and (answer := await link.read_message()) is not None:
                 frames += json.loads(answer)["kind"] == "now"
-        shown_out = link.close_code
+        closed = link.close_code
         link.close()
-        if shown_out is not None:
-            return {"closed": shown_out}
-        # Hear the server say so, too: our socket is closed only then.
+        if closed is not None:
+            return {"closed": closed}
+        # Our socket is closed only when the server has answered.
         while await link.read_message() is not None:
             pass
         return message
 
-    return asyncio.run(asyncio.wait_for(come(), 10))
+    return asyncio.run(asyncio.wait_for(connect(), 10))
 
 
 def own(cockpit: Cockpit) -> str:
@@ -127,10 +131,8 @@ def test_pages_are_served_and_may_load_nothing_else(here: Cockpit, path: str) ->
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:{port}", "127.0.0.1", ""]
 )
-def test_a_name_that_was_led_here_is_refused(
-    here: Cockpit, path: str, host: str
-) -> None:
-    # Of a page that has its own name lead to this machine (DNS rebinding).
+def test_a_foreign_host_name_is_refused(here: Cockpit, path: str, host: str) -> None:
+    # DNS rebinding: the name of a foreign page resolves to this machine.
     named = host.format(port=here.access.port)
     status, _, body = ask(here, path, Host=named, Origin=f"http://{named}")
     assert status == 403
@@ -149,15 +151,15 @@ def test_a_name_that_was_led_here_is_refused(
     ],
 )
 def test_a_socket_of_a_foreign_page_is_refused(here: Cockpit, origin: str) -> None:
-    assert knock(here, Origin=origin.format(port=here.access.port)) == 403
+    assert open_socket(here, Origin=origin.format(port=here.access.port)) == 403
 
 
-def test_a_socket_that_does_not_say_whose_it_is_is_refused(here: Cockpit) -> None:
-    assert knock(here) == 403
+def test_a_socket_without_an_origin_is_refused(here: Cockpit) -> None:
+    assert open_socket(here) == 403
 
 
-def test_our_own_page_comes_in(here: Cockpit) -> None:
-    message = knock(here, Origin=own(here))
+def test_our_own_page_is_accepted(here: Cockpit) -> None:
+    message = open_socket(here, Origin=own(here))
     assert isinstance(message, dict)
     assert message["kind"] == "hello"
     assert message["role"] == "panel"
@@ -182,63 +184,67 @@ def test_no_other_file_is_served(here: Cockpit, path: str) -> None:
     "words",
     ["no json", "[]", '{"n": "x"}', '{"c": "high"}', "1", "[" * 4000],
 )
-def test_whoever_talks_nonsense_is_shown_out(here: Cockpit, words: str) -> None:
-    told = knock(here, role="participant", says=(words,), Origin=own(here))
-    assert told == {"closed": 1003}
+def test_a_malformed_message_closes_the_connection(here: Cockpit, words: str) -> None:
+    answer = open_socket(here, role="participant", messages=(words,), Origin=own(here))
+    assert answer == {"closed": 1003}
 
 
-def test_a_message_that_is_too_long_ends_the_talk(here: Cockpit) -> None:
-    told = knock(here, says=(json.dumps({"text": "x" * 5000}),), Origin=own(here))
-    assert told == {"closed": 1009}
+def test_a_message_that_is_too_long_closes_the_connection(here: Cockpit) -> None:
+    answer = open_socket(
+        here, messages=(json.dumps({"text": "x" * 5000}),), Origin=own(here)
+    )
+    assert answer == {"closed": 1009}
 
 
-def test_a_participant_cannot_do_what_is_the_experimenters(tmp_path: Path) -> None:
+def test_a_participant_cannot_send_commands_of_the_experimenter(tmp_path: Path) -> None:
     with serving(tmp_path) as cockpit:
         for name in ("pause", "skip", "end", "page_disconnected"):
             says = json.dumps({"command": name})
-            knock(cockpit, role="participant", says=(says,), Origin=own(cockpit))
+            open_socket(
+                cockpit, role="participant", messages=(says,), Origin=own(cockpit)
+            )
             shown = cockpit.conductor.update(1.0)
             assert shown["state"] == "waiting"
             assert shown["step_index"] == 0
             assert not cockpit.conductor.over
         says = json.dumps({"command": "pause"})
-        knock(cockpit, role="panel", says=(says,), Origin=own(cockpit))
+        open_socket(cockpit, role="panel", messages=(says,), Origin=own(cockpit))
         assert cockpit.conductor.update(1.0)["state"] == "paused"
 
 
 # --- with another address -----------------------------------------------------------
 
 
-def test_from_afar_the_token_is_needed(afar: Cockpit) -> None:
-    token = afar.access.token
+def test_other_machines_need_the_token(remote: Cockpit) -> None:
+    token = remote.access.token
     assert len(token) >= 32  # 24 bytes
-    assert f"token={token}" in afar.url
+    assert f"token={token}" in remote.url
     wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
-    cookie = f"{afar.access.cookie}={wrong}"
+    cookie = f"{remote.access.cookie}={wrong}"
     for path in [*PAGES, f"/?token={wrong}", "/?token=", "/link"]:
-        assert ask(afar, path)[0] == 403, path
-        assert ask(afar, path, Cookie=cookie)[0] == 403, path
-        assert token.encode() not in ask(afar, path)[2]
-    assert knock(afar, Origin=own(afar)) == 403
-    assert knock(afar, Origin=own(afar), Cookie=cookie) == 403
+        assert ask(remote, path)[0] == 403, path
+        assert ask(remote, path, Cookie=cookie)[0] == 403, path
+        assert token.encode() not in ask(remote, path)[2]
+    assert open_socket(remote, Origin=own(remote)) == 403
+    assert open_socket(remote, Origin=own(remote), Cookie=cookie) == 403
 
 
 def test_the_token_is_exchanged_for_a_cookie_and_leaves_the_address(
-    afar: Cockpit,
+    remote: Cockpit,
 ) -> None:
-    status, headers, _ = ask(afar, f"/panel?token={afar.access.token}")
+    status, headers, _ = ask(remote, f"/panel?token={remote.access.token}")
     assert status == 302
     assert headers["Location"] == "/panel"
     cookie = headers["Set-Cookie"]
     assert "HttpOnly" in cookie
     assert "SameSite=Lax" in cookie
     mine = cookie.partition(";")[0]
-    assert ask(afar, "/panel", Cookie=mine)[0] == 200
-    message = knock(afar, Origin=own(afar), Cookie=mine)
+    assert ask(remote, "/panel", Cookie=mine)[0] == 200
+    message = open_socket(remote, Origin=own(remote), Cookie=mine)
     assert isinstance(message, dict)
     assert message["kind"] == "hello"
-    # The token opens the door to our own pages only.
-    assert knock(afar, Origin="http://evil.example", Cookie=mine) == 403
+    # The token is of use to our own pages only.
+    assert open_socket(remote, Origin="http://evil.example", Cookie=mine) == 403
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "lab.example", ""])

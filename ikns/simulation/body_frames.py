@@ -1,0 +1,167 @@
+"""Marker frames of a seated body while one arm moves along a self-motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ikns._kernels.body.tree import place_joints
+from ikns.calibration.subject import Subject
+from ikns.errors import InvalidInput
+from ikns.simulation.arm import ArmKinematics, SelfMotion
+from ikns.simulation.artifacts import SoftTissue, occlusions
+from ikns.simulation.trial import SEATED_SWAY, place_in_room, still_joints
+
+__all__ = ["BodyFrames", "arm_rows"]
+
+Array = NDArray[np.float64]
+
+#: Height of the thorax frame, m: no result depends on it.
+_HEIGHT = 1.0
+
+
+class BodyFrames:
+    """Body and cameras, frame by frame.
+
+    What does not depend on the moving arm (sway of the trunk, the other joints, camera
+    noise, gaps) is drawn in advance for all frames. The drift of the hand is added to
+    the joints by the pseudo-inverse of the Jacobian, correct to first order.
+
+    Parameters
+    ----------
+    arm : ArmKinematics
+        The moving arm, of the true body.
+    angles : (18,) array
+        Joint angles of the rest of the body.
+    subject : Subject
+        The same person as calibrated; its markers are recorded.
+    drift : (n, 6) array
+        Deviation of the hand from its intended pose in each frame, m and rad.
+    rate : float
+        Frames per second.
+    generators : sequence of 4 numpy.random.Generator
+        For the body, camera noise, gaps and skin.
+    marker_noise : float
+        Camera noise, m, standard deviation per axis.
+    occluded : float
+        Share of marker frames that the cameras miss.
+    skin : SoftTissue or None
+
+    Attributes
+    ----------
+    columns : (M,) array
+        Markers of the true body that the calibrated one wears.
+    """
+
+    def __init__(
+        self,
+        arm: ArmKinematics,
+        angles: Array,
+        subject: Subject,
+        *,
+        drift: Array,
+        rate: float,
+        generators: Sequence[np.random.Generator],
+        marker_noise: float,
+        occluded: float,
+        skin: SoftTissue | None,
+    ) -> None:
+        of_body, of_noise, of_gaps, of_skin = generators
+        frames, worn = len(drift), arm.skeleton.marker_set
+        self.columns = subject.skeleton.marker_set.columns(worn.labels)
+        links = np.array([worn.markers[i].link for i in self.columns])
+        self._arm, self._drift = arm, drift
+        self._q = place_in_room(
+            still_joints(angles, frames, rate=rate, rng=of_body),
+            height=_HEIGHT,
+            heading=0.0,
+            sway=SEATED_SWAY,
+            rate=rate,
+            rng=of_body,
+        )
+        self._to_world = Rotation.from_quat(self._q[:, 3:7]).as_matrix()
+        self._noise = marker_noise * of_noise.normal(size=(frames, len(links), 3))
+        hidden = occlusions(of_gaps, frames, links, share=occluded, rate=rate)
+        self._noise[hidden] = np.nan
+        if skin is not None:
+            # Isotropic noise is the same whether or not it turns with the segment.
+            moved = skin.at_random(frames, rate=rate, rng=of_skin)
+            self._noise += moved[:, self.columns]
+        joint, in_joint = arm.skeleton.tree_markers
+        self._joint, self._in_joint = joint[self.columns], in_joint[self.columns]
+        joints = len(arm.skeleton.joint_names) + 1
+        self._rotation = np.empty((joints, 3, 3))
+        self._translation = np.empty((joints, 3))
+
+    def posture(self, frame: int, row: Array) -> Array:
+        """Return the true configuration of the body, (25,).
+
+        Parameters
+        ----------
+        frame : int
+            From 0.
+        row : (51 + 3 M,) array
+            State of the arm, from :func:`arm_rows`.
+
+        Raises
+        ------
+        InvalidInput
+            After the last frame.
+        """
+        if frame >= len(self._drift):
+            raise InvalidInput(f"expected {len(self._drift)} frames, found one more.")
+        q = self._q[frame].copy()
+        q[7:][self._arm.columns] = row[:9]
+        q[7:][self._arm.columns[2:]] += row[9:51].reshape(7, 6) @ self._drift[frame]
+        return q
+
+    def markers(self, frame: int, row: Array) -> Array:
+        """Return the markers that the cameras record, (M, 3) m; see :meth:`posture`."""
+        q = self.posture(frame, row)
+        place_joints(self._arm.skeleton.tree, q, self._rotation, self._translation)
+        markers = np.einsum("mij,mj->mi", self._rotation[self._joint], self._in_joint)
+        markers += self._translation[self._joint]
+        skin = row[51:].reshape(-1, 3)
+        moved = skin @ self._to_world[frame].T
+        return np.asarray(markers + moved + self._noise[frame])
+
+
+def arm_rows(
+    arm: ArmKinematics,
+    angles: Array,
+    motion: SelfMotion,
+    *,
+    skin: SoftTissue | None,
+    columns: NDArray[np.intp],
+) -> Array:
+    """Return the states of an arm along a self-motion, to interpolate between them.
+
+    Parameters
+    ----------
+    arm : ArmKinematics
+    angles : (18,) array
+        Joint angles of the rest of the body.
+    motion : SelfMotion
+    skin : SoftTissue or None
+    columns : (M,) array
+        Markers of the body that are needed.
+
+    Returns
+    -------
+    (K, 51 + 3 M) array
+        Posture (9), pseudo-inverse of the Jacobian (42), displacement of the markers by
+        the skin in the thorax frame (3 each).
+    """
+    bodies = np.array([arm.put(angles, posture) for posture in motion.postures])
+    inverse = [
+        np.linalg.pinv(arm.skeleton.chain_jacobian(body, arm.chain)).ravel()
+        for body in bodies
+    ]
+    q = np.hstack([np.tile(arm.skeleton.neutral()[:7], (len(bodies), 1)), bodies])
+    shift = np.zeros((len(q), len(columns), 3))
+    if skin is not None:
+        shift = skin.in_world(q, skin.with_posture(q))[:, columns]
+    return np.hstack([motion.postures, inverse, shift.reshape(len(q), -1)])
