@@ -73,7 +73,7 @@ Host = Annotated[
         "token in the printed address and are not encrypted."
     ),
 ]
-Port = Annotated[int, typer.Option(help="0 takes a free one.")]
+Port = Annotated[int, typer.Option(help="Port of the pages; 0 takes a free one.")]
 Browser = Annotated[
     bool, typer.Option("--browser/--no-browser", help="Open the pages.")
 ]

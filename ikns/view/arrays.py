@@ -1,4 +1,4 @@
-"""Checks of the arrays that figures take."""
+"""Arrays of figures: checks, and directions away from their middle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 
-__all__ = ["same_length", "series"]
+__all__ = ["outward", "same_length", "series"]
 
 
 def series(values: ArrayLike, name: str) -> NDArray[np.float64]:
@@ -18,6 +18,17 @@ def series(values: ArrayLike, name: str) -> NDArray[np.float64]:
     if array.ndim != 1:
         raise InvalidInput(f"expected {name} (n,), found {array.shape}.")
     return array
+
+
+def outward(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return unit vectors from the mean of points (n, 3) to each; zero at the mean.
+
+    >>> outward(np.array([[1.0, 0, 0], [-1.0, 0, 0], [0.0, 0, 0]]))[:, 0]
+    array([ 1., -1.,  0.])
+    """
+    away = points - points.mean(axis=0)
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    return np.divide(away, length, out=np.zeros_like(away), where=length > 0)
 
 
 def same_length(**arrays: NDArray[Any]) -> None:

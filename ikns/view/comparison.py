@@ -12,23 +12,11 @@ from numpy.typing import NDArray
 
 from ikns.analysis.compare import Crosstalk, NullSpaceComparison
 from ikns.errors import InvalidInput
-from ikns.view.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PURPLE,
-    figure_style,
-    new_figure,
-)
+from ikns.view.style import BLUE, GREY, INK, MARKS, figure_style, new_figure
 
 __all__ = ["comparison_figure"]
 
 Array = NDArray[np.float64]
-
-#: Distinct in shape and lightness as well as in color.
-_MARKS = ((BLUE, "o"), (ORANGE, "D"), (GREEN, "s"), (PURPLE, "^"))
 
 
 def comparison_figure(
@@ -53,9 +41,9 @@ def comparison_figure(
     matplotlib.figure.Figure
         Four panels; points of the map are numbered from 1.
     """
-    if not 1 <= len(found) <= len(_MARKS):
+    if not 1 <= len(found) <= len(MARKS):
         raise InvalidInput(
-            f"expected 1 to {len(_MARKS)} comparisons to draw, found {len(found)}."
+            f"expected 1 to {len(MARKS)} comparisons to draw, found {len(found)}."
         )
     most = max(len(each.points) for each in found.values())
     with figure_style():
@@ -68,7 +56,7 @@ def comparison_figure(
         shift = 0.22
         offsets = shift * (np.arange(len(found)) - (len(found) - 1) / 2)
         for (name, each), (color, mark), offset in zip(
-            found.items(), _MARKS, offsets, strict=False
+            found.items(), MARKS, offsets, strict=False
         ):
             at = np.asarray(each.points + 1 + offset, dtype=np.float64)
             style = {"color": color, "marker": mark, "label": name}
@@ -84,7 +72,7 @@ def comparison_figure(
         first = next(iter(found.values()))
         for dof in range(first.leak.shape[1]):
             at = np.asarray(first.points + 1 + shift * dof, dtype=np.float64)
-            color, mark = _MARKS[dof % len(_MARKS)] if dof else (INK, "o")
+            color, mark = MARKS[dof % len(MARKS)] if dof else (INK, "o")
             _dots(leak, 1000 * first.leak[:, dof], at, color=color, marker=mark)
             _bars(leak, 1000 * first.leak_interval[:, dof], at, color)
         ends = first.points + 1

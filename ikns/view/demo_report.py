@@ -44,12 +44,12 @@ _DPI = 110
 _LEAD = (
     "A simulated person went through the calibration of the paper. The C3D files alone "
     "gave a scaled skeleton, joint angles, a null-space map and the control signal c; "
-    "this page holds them against the simulated truth."
+    "this page compares them with the simulated truth."
 )
 _NEXT_STEPS = (
     NextStep(
         "ikns view subject recordings/points.c3d --open",
-        "See body, map and motion in 3-D, as in `view.html` beside this page:",
+        "See body, map and motion in 3-D, as in `view.html` next to this page:",
     ),
     NextStep(
         "ikns calibrate --static static.c3d --exploration points.c3d --out person",

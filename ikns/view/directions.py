@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.errors import InvalidInput
 from ikns.view.style import (
     BLUE,
-    GREEN,
     GREY,
     INK,
+    MARKS,
     ORANGE,
-    PURPLE,
     RED,
     figure_style,
     joint_labels,
@@ -27,8 +26,7 @@ __all__ = ["directions_figure", "principal_angle_figure"]
 Array = NDArray[np.float64]
 
 _COLUMNS = 5
-#: Distinct in shape as well as in color.
-_MARKS = ((BLUE, "o"), (ORANGE, "D"), (GREEN, "s"), (PURPLE, "^"), (RED, "v"))
+_MARKS = (*MARKS, (RED, "v"))
 
 
 def directions_figure(

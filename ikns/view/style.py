@@ -15,6 +15,7 @@ __all__ = [
     "GREEN",
     "GREY",
     "INK",
+    "MARKS",
     "ORANGE",
     "PAGE_WIDTH",
     "PALE",
@@ -32,6 +33,9 @@ BLUE, RED, PURPLE, YELLOW = "#0072B2", "#D55E00", "#CC79A7", "#F0E442"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#E4E4E4"
 #: The paper shows the interpolation volume in light red; it is drawn translucent.
 VOLUME = "#CC2233"
+
+#: Colors with their marks, for up to four series: distinct in shape and lightness too.
+MARKS = ((BLUE, "o"), (ORANGE, "D"), (GREEN, "s"), (PURPLE, "^"))
 
 #: Neighbors differ in lightness as well as in hue.
 _CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, YELLOW)

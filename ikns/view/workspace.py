@@ -11,6 +11,7 @@ from matplotlib.ticker import MultipleLocator
 from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
+from ikns.view.arrays import outward
 from ikns.view.body import body_surfaces
 from ikns.view.style import (
     BLUE,
@@ -177,10 +178,8 @@ def _draw_points(axes: Any, centers: Array) -> None:
         label="PCA point",
     )
     # Numbers are outside the volume, so that no sample is hidden.
-    outward = centers - centers.mean(axis=0)
-    length = np.linalg.norm(outward, axis=1, keepdims=True)
-    outward = np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
-    places = centers + _NUMBER_AWAY * max(0.1, float(length.max())) * outward
+    radius = float(np.linalg.norm(centers - centers.mean(axis=0), axis=1).max())
+    places = centers + _NUMBER_AWAY * max(0.1, radius) * outward(centers)
     axes.scatter(
         *_drawn(places),
         s=90,

@@ -85,7 +85,7 @@ def map_scene(
         title,
         f"{'Arms' if two else 'Arm'} at PCA point {chosen + 1} with the "
         f"{'hands' if two else 'hand'} held: the Jacobian's self-motion "
-        "(body) beside the learned direction Z (ghosts)."
+        "(body) next to the learned direction Z (ghosts)."
         # A subject folder holds hand positions, but no postures.
         + ("" if visited is not None else " The posture is assumed."),
         simulated,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.view.arrays import outward
 from ikns.view.scene.commands import (
     ROOT,
     Command,
@@ -36,13 +37,11 @@ def point_commands(centers: Array) -> list[Command]:
     """Draw PCA points (P, 3) m, each ``/ikns/points/<number>`` with its number."""
     ball = {"type": "SphereGeometry", "radius": _POINT_RADIUS}
     segments = {"widthSegments": 24, "heightSegments": 18}
-    outward = centers - centers.mean(axis=0)
-    length = np.linalg.norm(outward, axis=1, keepdims=True)
-    outward = np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
+    outwards = outward(centers)
     commands = []
     for k, center in enumerate(centers):
         node = f"{ROOT}/points/{k + 1}"
-        away = pose_matrix(np.eye(3), _NUMBER_AWAY * outward[k])
+        away = pose_matrix(np.eye(3), _NUMBER_AWAY * outwards[k])
         commands += [
             object_command(node, ball | segments, point_color(k)),
             transform_command(node, pose_matrix(np.eye(3), center)),

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from ikns.view.style import BLUE, GREEN, INK, ORANGE, PURPLE, new_figure
+from ikns.view.style import INK, MARKS, new_figure
 
 __all__ = [
     "ConditionStyle",
@@ -27,10 +27,7 @@ class ConditionStyle(NamedTuple):
 
 
 _STYLES = (
-    ConditionStyle(BLUE, "o"),
-    ConditionStyle(ORANGE, "D"),
-    ConditionStyle(GREEN, "s"),
-    ConditionStyle(PURPLE, "^"),
+    *(ConditionStyle(color, mark) for color, mark in MARKS),
     ConditionStyle(INK, "v"),
 )
 

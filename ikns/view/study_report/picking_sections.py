@@ -34,7 +34,7 @@ def picking_figures(found: PickingSummary) -> list[ReportFigure]:
             "picking_objects",
             picking_figure(found),
             "Above: share of trials that succeeded, with 95 % intervals (Clopper and "
-            "Pearson). Below: time of every trial; crosses failed and stand at the "
+            "Pearson). Below: time of every trial; crosses are failures, at the "
             "limit; black bars: mean time with failures counted at the limit.",
             "Success and time by object and condition",
         ),

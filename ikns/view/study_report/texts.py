@@ -15,14 +15,14 @@ CANNOT = (
     "What it cannot show: how well people do. The operators follow a model of human "
     "tracking whose free parameters were taken from the literature, and many settings "
     "of them fit the paper's figures as well; the difference between two devices is "
-    "to a good part what was put into the model. Comfort, fatigue, attention, "
+    "largely what was put into the model. Comfort, fatigue, attention, "
     "embodiment and learning by understanding are not in it. A difference between "
     "conditions here, or none, is no evidence about people.",
 )
 
 NO_MAP = (
     "Left out: no visit has a recorded session, or a folder `subject` (as `ikns "
-    "calibrate` writes it) inside of it or beside it, to take a map from."
+    "calibrate` writes it) in it or next to it, to take a map from."
 )
 
 NO_MARGIN = "No margin was declared beforehand, so equivalence was not tested."

@@ -78,9 +78,9 @@ def tracking_figures(found: TrackingSummary) -> list[ReportFigure]:
             found.comparisons,
             equivalence=lambda compared: compared.analysis.equivalence,
             quantity="RMSE",
-            caption=". Equivalence is shown where the interval lies inside of the "
-            "margin altogether; where it does not, it is not shown, whatever the test "
-            "of a difference says.",
+            caption=". Equivalence is shown where the whole interval lies within "
+            "the margin; where it does not, it is not shown, whatever the test of a "
+            "difference says.",
             simulated=found.simulated,
         ),
     ]
@@ -140,8 +140,8 @@ def _comparison(
     ]
     text = [
         f"Every difference is {worded(a)} minus {worded(b)}. The paper's tests count "
-        "each trajectory of a participant as independent; beside them are tests with "
-        "one vote a person."
+        "each trajectory of a participant as independent; the other tests "
+        "take the participant as the unit."
     ]
     if many:
         text.append("No correction was made for comparing several conditions.")
