@@ -84,6 +84,14 @@ def test_blocks_grow_with_correlation_and_not_with_scale():
     assert block_length(np.ones(50)) == 1
 
 
+def test_the_length_for_a_long_series_is_the_one_of_the_formula():
+    rng, phi = np.random.default_rng(4), 0.5
+    lengths = [block_length(ar1(rng, 20_000, phi)) for _ in range(12)]
+    # One length scatters by 5.5 %: four standard errors of the mean. A window without
+    # a flat top would shorten it by 16 %.
+    assert np.mean(lengths) == pytest.approx(20 * phi / (1 - phi**2), rel=0.065)
+
+
 @pytest.mark.parametrize(
     ("blocks", "critical"),
     # Kiefer and Vogelsang 2005, Bartlett, 97.5 %:

@@ -461,6 +461,15 @@ def test_what_is_carried_is_found_as_a_share_of_the_way(skeleton):
         assert abs(share - quantile) <= 2 * speed.max() / speed.sum()
     control = RateControl(control.null_space_map, carry=0.9 + 1e-9, travel=np.inf)
     assert np.ptp(control.track(moved)) == 0
+    # While the hand is as good as held, c may go as fast as it will.
+    held = np.arange(120) < 40
+    v[held, column] *= 10
+    hand = moved.hand_velocity_in_thorax.copy()
+    hand[held] *= 0.04 / speed[held, None, None]
+    slow = replaced(motion, v=v, hand_velocity_in_thorax=hand)
+    for quantile, expected in ((0.0, ratio[40]), (1.0, 0.9)):
+        found = reach_gain(control, slow, quantile=quantile)
+        assert found == pytest.approx(expected, rel=ROUNDING)
 
 
 # --- what does not fit ----------------------------------------------------------------

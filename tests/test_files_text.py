@@ -1,6 +1,7 @@
 """TRC and Nexus CSV: read as printed, in meters; damage is told where it is."""
 
 import csv
+import re
 
 import numpy as np
 import pytest
@@ -216,6 +217,15 @@ def test_real_nexus_values_are_those_printed(data):
 def test_other_sections_of_nexus_are_ignored(tmp_path, text):
     recording = reading(tmp_path / "trial.csv", text)
     np.testing.assert_array_equal(recording.markers, POINTS * 1e-3)
+
+
+def test_a_nexus_frame_of_which_only_the_number_is_left_is_no_title(tmp_path):
+    text = re.sub(r"\n2,0,.*\n", "\n2\n", nexus())
+    assert text != nexus()
+    expected = POINTS * 1e-3
+    expected[1] = np.nan
+    recording = reading(tmp_path / "trial.csv", text)
+    np.testing.assert_array_equal(recording.markers, expected)
 
 
 def test_nexus_time_is_the_frame_number_over_the_rate(tmp_path):

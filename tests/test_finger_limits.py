@@ -186,12 +186,12 @@ class TestGuard:
         guard.start(0.0, flexion)
         return guard
 
-    def drive(self, guard, target, start, end, measured=None):
+    def drive(self, guard, target, start, end, measured=None, stopped=min):
         now = start
         while now < end:
             now += 0.01
             guard.command(now, target)
-            position = guard.goal if measured is None else min(guard.goal, measured)
+            position = guard.goal if measured is None else stopped(guard.goal, measured)
             guard.measured(now, position)
         return now
 
@@ -236,6 +236,17 @@ class TestGuard:
         assert guard.goal == pytest.approx(0.2)
         self.drive(guard, 1.0, now, now + 1.0)
         assert guard.goal == pytest.approx(1.0)  # free again
+
+    def test_pushing_open_for_too_long_ends_as_lightly(self):
+        guard = self.make(1.0)
+        now = self.drive(guard, 0.0, 0.0, 0.9, measured=0.6, stopped=max)
+        assert not guard.stalled
+        now = self.drive(guard, 0.0, now, 3.0, measured=0.6, stopped=max)
+        assert guard.stalled
+        assert guard.goal == pytest.approx(0.6 - guard.safety.grip, abs=1e-6)
+        self.drive(guard, 0.8, now, now + 1.0)
+        assert not guard.stalled
+        assert guard.goal == pytest.approx(0.8)
 
     def test_an_object_that_gives_way_is_followed(self):
         guard = self.make(0.0)

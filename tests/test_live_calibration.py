@@ -357,14 +357,14 @@ def passed(clock: DeviceClock, *device_times: float) -> list[float]:
 
 def test_time_is_that_of_the_device_and_never_goes_back():
     """Frames that come all at once still take the time that they show."""
-    clock = DeviceClock()
+    clock, began = DeviceClock(), time.monotonic()
     now = passed(clock, 50.0, 50.01, 50.5, 50.49, 50.51)
     assert_allclose(now, [0.0, 0.01, 0.5, 0.5, 0.51], atol=1e-9)
     # A clock set back, or ahead by more than anybody waited, is not followed; the time
-    # that really passed, below 1 s here, is.
+    # that really passed is.
     now += passed(clock, 9.0, 9.01, 1e6, 1e6 + 0.01)
     assert np.all(np.diff(now) >= 0)
-    assert 0.02 <= now[-1] - 0.51 < 1.0
+    assert 0.02 - 1e-9 <= now[-1] - 0.51 <= 0.02 + time.monotonic() - began
 
 
 def test_time_goes_on_where_no_frame_comes_and_waits_for_those_held_up():

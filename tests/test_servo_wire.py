@@ -107,7 +107,10 @@ def test_groups_read_and_write_several_servos(client, wire):
 
 
 def test_the_sdk_finds_who_is_there(client):
-    found, result = client.packets.broadcastPing(client.port)
+    for _ in range(20):  # a busy machine answers too late
+        found, result = client.packets.broadcastPing(client.port)
+        if result == sdk.COMM_SUCCESS and len(found) == 2:
+            break
     assert result == sdk.COMM_SUCCESS
     assert {number: about[0] for number, about in found.items()} == {1: 1060, 2: 1060}
 
@@ -119,10 +122,12 @@ def test_registered_writes_reboot_and_refusals(client, wire):
     time.sleep(0.05)  # the SDK does not read the answer to this one
     answer = until_answered(lambda: packets.read1ByteTxRx(port, 1, 65))
     assert answer == (1, sdk.COMM_SUCCESS, 0)
-    _, error = packets.factoryReset(port, 1, 0xFF)
-    assert error == 2
-    assert packets.write4ByteTxRx(port, 1, *GOAL[:1], 4096) == (sdk.COMM_SUCCESS, 6)
-    assert packets.reboot(port, 1) == (sdk.COMM_SUCCESS, 0)
+    for ask, error in (
+        (lambda: packets.factoryReset(port, 1, 0xFF), 2),
+        (lambda: packets.write4ByteTxRx(port, 1, *GOAL[:1], 4096), 6),
+        (lambda: packets.reboot(port, 1), 0),
+    ):
+        assert until_answered(ask) == (sdk.COMM_SUCCESS, error)
     assert client.ping()[1] != sdk.COMM_SUCCESS  # it is starting
 
 
@@ -142,7 +147,8 @@ def test_a_wrong_rate_hears_nothing(wire):
 )
 def test_the_sdk_sees_the_faults(client, wire, fault, result):
     wire.inject(fault, value=9)
-    assert client.ping()[1] == result
+    # An answer that is damaged may come too late, too.
+    assert result in (client.ping()[1] for _ in range(20))
     wire.clear_faults()
     assert until_answered(client.ping)[1] == sdk.COMM_SUCCESS
 
@@ -152,7 +158,8 @@ def test_alerts_reach_the_sdk(client, wire):
     end = time.monotonic() + 10
     while not client.ping()[2] & 0x80:
         assert time.monotonic() < end
-    assert client.packets.read1ByteTxRx(client.port, 1, 70)[0] == 1 << 4
+    read = client.packets.read1ByteTxRx
+    assert until_answered(lambda: read(client.port, 1, 70))[0] == 1 << 4
 
 
 def test_a_link_follows_the_port_and_is_never_taken_from_others(tmp_path):
@@ -224,10 +231,10 @@ def test_the_command_serves_until_it_is_reported_to_stop(tmp_path):
         "simulated": True,
     }
     with Client(str(link)) as client:
-        client.packets.write1ByteTxRx(client.port, 1, 64, 1)
-    time.sleep(0.2)  # it looks for news every 50 ms
+        write = client.packets.write1ByteTxRx
+        assert until_answered(lambda: write(client.port, 1, 64, 1))[1] == 0
+        assert any(b"torque on at 2048" in line for line in process.stderr)
     os.kill(process.pid, signal.SIGINT)
-    _, log = process.communicate(timeout=10)
+    process.communicate(timeout=60)
     assert process.returncode == 0
-    assert b"torque on at 2048" in log
     assert not link.is_symlink()

@@ -4,6 +4,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -277,21 +278,27 @@ def test_a_deleted_folder_is_told_within_a_second(tmp_path):
 
 
 def test_a_row_costs_no_wait(tmp_path, monkeypatch):
-    # A disk that takes half a second for every write.
+    # A disk that writes nothing until every row has been handed over.
     import ikns.live.session.writer as writer
 
-    real = writer.os.write
-    monkeypatch.setattr(
-        writer.os, "write", lambda *args: (time.sleep(0.5), real(*args))[1]
-    )
+    real, disk, wrote = writer.os.write, threading.Event(), []
+
+    def write(*args):
+        wrote.append(disk.wait(5))
+        return real(*args)
+
+    monkeypatch.setattr(writer.os, "write", write)
     session = create_session(tmp_path / "s")
+    disk.set()
     with begun(session) as run:
-        start = time.monotonic()
+        disk.clear()
         for i in range(200):
             run.row("markers", [i, i / 100, i / 100, *[0.0] * 6])
-        spent = time.monotonic() - start
-    # Handing over takes microseconds; one write would take half a second.
-    assert spent < 0.5
+            assert all(wrote)
+        disk.set()
+    # A row that waited for the disk would have waited in vain.
+    assert wrote
+    assert all(wrote)
 
 
 # --- bad input -----------------------------------------------------------------------
