@@ -83,7 +83,7 @@ def shown(row: dict) -> str:
         for value in (row["slowest"], row["stated"], row["stall"])
     ]
     wrong = [f"{count} {kind}" for kind, count in row["violations"].items()]
-    wrong += [f"did not begin: {words}" for words in row["failed"]]
+    wrong += [f"did not begin: {' '.join(w.split())}" for w in row["failed"]]
     cells = [
         *(row[name] for name in ("ending", "command", "line", "measured")),
         f"{row['in_time']} of {row['n']}",
