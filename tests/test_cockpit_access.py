@@ -20,7 +20,7 @@ from ikns.experiments.cockpit import Cockpit
 from ikns.experiments.cockpit.handlers import FILES
 from ikns.experiments.conduct import Conductor, HeldInput, TrackingExperiment, VisitLog
 from ikns.experiments.tracking import schedule
-from ikns.web_access import WebAccess
+from ikns.live.web_access import WebAccess
 
 ABOUT = {"experiment": "tracking", "participant": "01", "simulated": False}
 PAGES = sorted(FILES)

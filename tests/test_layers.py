@@ -10,7 +10,7 @@ import pytest
 # floor do not know each other.
 FLOORS = (
     "errors",
-    "_kernels output_file output_folder strict_json web_access",
+    "_kernels output",
     "numerics",
     "recording finger statistics",
     "body",

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from ikns.errors import InvalidInput
-from ikns.output_file import refuse_overwriting, write_bytes, write_csv
+from ikns.output.file import refuse_overwriting, write_bytes, write_csv
 
 
 def test_a_table_has_nine_digits_and_empty_cells(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from ikns.errors import FileError, InvalidInput
-from ikns.output_folder import check_output_folder, output_folder
+from ikns.output.folder import check_output_folder, output_folder
 
 FILES = ("a.txt", "deep/b.txt")
 

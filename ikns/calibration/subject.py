@@ -22,7 +22,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, IknsError, InvalidInput, naming
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
-from ikns.output_folder import check_output_folder, output_folder
+from ikns.output.folder import check_output_folder, output_folder
 
 __all__ = ["FILES", "FORMAT", "Subject"]
 

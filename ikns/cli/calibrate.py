@@ -17,7 +17,7 @@ from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import AsJson, Force, MarkerSetName
 from ikns.cli.output import notes, progress, show, table
 from ikns.errors import InvalidInput
-from ikns.output_folder import check_output_folder
+from ikns.output.folder import check_output_folder
 
 __all__ = ["calibrate", "calibration_parts"]
 

@@ -11,7 +11,7 @@ import typer
 import ikns
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
 from ikns.cli.output import progress, show, table
-from ikns.output_file import refuse_overwriting, write_csv
+from ikns.output.file import refuse_overwriting, write_csv
 
 __all__ = ["control"]
 

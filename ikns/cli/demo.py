@@ -11,8 +11,8 @@ import typer
 from ikns.cli.compare import comparison_rows, comparison_table
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import json_text, notes, progress, show
-from ikns.output_file import write_csv, write_text
-from ikns.output_folder import check_output_folder, output_folder
+from ikns.output.file import write_csv, write_text
+from ikns.output.folder import check_output_folder, output_folder
 
 __all__ = ["demo"]
 

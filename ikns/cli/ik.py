@@ -12,7 +12,7 @@ import ikns
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
 from ikns.cli.output import progress, show, table
 from ikns.errors import naming
-from ikns.output_file import refuse_overwriting, write_csv
+from ikns.output.file import refuse_overwriting, write_csv
 
 __all__ = ["ik"]
 

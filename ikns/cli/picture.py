@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ikns.errors import InvalidInput
-from ikns.output_file import refuse_overwriting, write_bytes
+from ikns.output.file import refuse_overwriting, write_bytes
 
 __all__ = ["refuse_picture", "write_picture"]
 

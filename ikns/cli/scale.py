@@ -10,7 +10,7 @@ import typer
 import ikns
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import show, table
-from ikns.output_file import refuse_overwriting, write_text
+from ikns.output.file import refuse_overwriting, write_text
 
 __all__ = ["scale"]
 

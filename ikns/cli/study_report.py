@@ -9,7 +9,7 @@ import typer
 
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, progress, show, table
-from ikns.output_folder import check_output_folder, output_folder
+from ikns.output.folder import check_output_folder, output_folder
 
 __all__ = ["report"]
 

@@ -14,7 +14,7 @@ import ikns
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import progress, show, table
 from ikns.errors import InvalidInput
-from ikns.output_file import refuse_overwriting, write_bytes, write_text
+from ikns.output.file import refuse_overwriting, write_bytes, write_text
 
 if TYPE_CHECKING:
     from ikns.view.scene import Scene

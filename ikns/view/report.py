@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ikns.errors import FileError
-from ikns.output_file import write_bytes
+from ikns.output.file import write_bytes
 from ikns.view.document import html_document
 from ikns.view.parts import (
     Cell,

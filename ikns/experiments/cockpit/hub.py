@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, Protocol
 
 from ikns.experiments.conduct import Conductor
-from ikns.web_access import WebAccess
+from ikns.live.web_access import WebAccess
 
 __all__ = ["ConnectedPage", "Hub", "Role"]
 

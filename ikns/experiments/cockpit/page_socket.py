@@ -14,7 +14,7 @@ from tornado.websocket import WebSocketClosedError
 from ikns.experiments.cockpit.handlers import CheckedSocket
 from ikns.experiments.cockpit.hub import Hub, Role
 from ikns.experiments.conduct import Command
-from ikns.strict_json import strict_json
+from ikns.output.strict_json import strict_json
 
 __all__ = ["PageSocket"]
 

@@ -12,7 +12,7 @@ from typing import Any, Self
 from ikns.errors import FileError
 from ikns.experiments.cockpit.hub import ConnectedPage
 from ikns.experiments.conduct import Command, Conductor, HeldInput
-from ikns.web_access import WebAccess
+from ikns.live.web_access import WebAccess
 
 __all__ = ["Cockpit", "check_port"]
 

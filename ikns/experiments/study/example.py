@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ikns.experiments.study.declaration import FILE
-from ikns.output_folder import check_output_folder, output_folder
+from ikns.output.folder import check_output_folder, output_folder
 
 __all__ = ["init_study"]
 

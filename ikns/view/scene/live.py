@@ -17,12 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, InvalidInput
+from ikns.live.web_access import WebAccess
 from ikns.view.scene.body import drawn_links, pose_commands
 from ikns.view.scene.commands import ROOT
 from ikns.view.scene.finger import flexion_commands
 from ikns.view.scene.page import packed_json, scene_html
 from ikns.view.scene.scene import Scene
-from ikns.web_access import WebAccess
 
 __all__ = ["LiveView"]
 

@@ -1,0 +1,1 @@
+"""What is written: files and folders that overwrite nothing, and strict JSON."""
