@@ -1,7 +1,7 @@
-"""One query for natural neighbors: from where it is to weights of the sites or a value.
+"""One natural-neighbor query: from its position to weights of the sites or a value.
 
-The query is scaled and brought near, placed in or on the hull by the rule for queries
-outside it, moved away from the hull by a skin, and given its coordinates (`cavity`,
+The query is scaled and brought near, projected onto the hull if it is outside and that
+is the rule, moved away from the hull by a skin, and given its coordinates (`cavity`,
 `sibson`). A query whose coordinates cannot be trusted, for the walk to it failed or a
 weight came out negative, is `UNSURE` and has NaN for weights and value.
 
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.voronoi.cavity import find_cavity, forget_cavity, try_all
+from ikns._kernels.voronoi.cavity import check_all_spheres, clear_cavity, find_cavity
 from ikns._kernels.voronoi.diagram import (
     CENTER,
     GRADIENT,
@@ -29,10 +29,11 @@ from ikns._kernels.voronoi.diagram import (
     LAPLACE,
     METHOD,
     MIDDLE,
-    NEAR,
     NEAREST,
+    NEIGHBORS,
     NOT_FINITE,
     NOWHERE,
+    OFFSET,
     OUTSIDE,
     OUTSIDE_HULL,
     ROUNDING,
@@ -40,7 +41,6 @@ from ikns._kernels.voronoi.diagram import (
     SITES,
     SMOOTH,
     START,
-    TOWARD,
     UNSURE,
     VALUE,
     VALUES,
@@ -50,16 +50,16 @@ from ikns._kernels.voronoi.diagram import (
 from ikns._kernels.voronoi.double_double import Triple, difference
 from ikns._kernels.voronoi.hull import hull_depths, scaled
 from ikns._kernels.voronoi.hull_projection import nearest_on_hull
-from ikns._kernels.voronoi.sibson import add_polygons
+from ikns._kernels.voronoi.sibson import add_faces
 
 __all__ = ["NEGATIVE", "answer_many", "answer_one", "natural_weights"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: Queries nearer to the hull than this part of the way to the middle are moved in to
-#: there. The hull of a box whose corners are rounded is uneven by 1e-16, and this near
-#: to it weights would tell which way.
+#: Queries closer to the hull than this part of the way to the middle are moved in to
+#: there. The hull of a box whose corners are rounded is uneven by 1e-16, and closer to
+#: it the weights would depend on how.
 _SKIN = 1e-11
 #: Squared distance to a site below which nothing could be told apart.
 _AT_SITE = 1e-36
@@ -86,7 +86,7 @@ def _nearest(numbers: Floats, indices: Indices, x: Triple) -> tuple[int, float]:
 def _one_site(indices: Indices, site: int, work: Floats) -> int:
     """Give a site all the weight."""
     work[place(indices[VOLUME] + site)] = 1.0
-    work[indices[NEAR] :].view(np.int64)[0] = site
+    work[indices[NEIGHBORS] :].view(np.int64)[0] = site
     return 1
 
 
@@ -101,19 +101,19 @@ def _inside_weights(
 ) -> tuple[bool, int]:
     """Write the weights of a point inside; return whether they are, and how many."""
     if start < 0:
-        corners, sites = try_all(numbers, indices, x, rest, work)
+        tetrahedra, sites = check_all_spheres(numbers, indices, x, rest, work)
     else:
-        corners, sites = find_cavity(numbers, indices, x, rest, start, work)
-    if corners == 0:
+        tetrahedra, sites = find_cavity(numbers, indices, x, rest, start, work)
+    if tetrahedra == 0:
         nearest, square = _nearest(numbers, indices, x)
         if square <= _AT_SITE:
             return True, _one_site(indices, nearest, work)
         return False, 0
-    near = work[indices[NEAR] :].view(np.int64)
-    toward, volume, at_site = indices[TOWARD], indices[VOLUME], -1
+    neighbors = work[indices[NEIGHBORS] :].view(np.int64)
+    offset, volume, at_site = indices[OFFSET], indices[VOLUME], -1
     for k in range(sites):
-        site = near[place(k)]
-        at, to = place(indices[SITE] + 3 * site), place(toward + 3 * site)
+        site = neighbors[place(k)]
+        at, to = place(indices[SITE] + 3 * site), place(offset + 3 * site)
         p = numbers[at] - x[0]
         q = numbers[at + place(1)] - x[1]
         r = numbers[at + place(2)] - x[2]
@@ -121,18 +121,18 @@ def _inside_weights(
         if p * p + q * q + r * r <= _AT_SITE:
             at_site = site
     if at_site < 0:
-        add_polygons(numbers, indices, corners, work)
+        add_faces(numbers, indices, tetrahedra, work)
     if start >= 0:
-        forget_cavity(indices, corners, sites, work)
+        clear_cavity(indices, tetrahedra, sites, work)
     if at_site >= 0:
         return True, _one_site(indices, at_site, work)
 
     total, positive, least = 0.0, 0.0, np.inf
     for k in range(sites):
-        site = near[place(k)]
+        site = neighbors[place(k)]
         weight = work[place(volume + site)]
         if indices[METHOD] == LAPLACE:
-            to = place(toward + 3 * site)
+            to = place(offset + 3 * site)
             p, q, r = work[to], work[to + place(1)], work[to + place(2)]
             weight /= p * p + q * q + r * r
         total += weight
@@ -140,7 +140,7 @@ def _inside_weights(
         positive += max(weight, 0.0)
         work[place(volume + site)] = max(weight, 0.0)
     for k in range(sites):
-        work[place(volume + near[place(k)])] /= positive
+        work[place(volume + neighbors[place(k)])] /= positive
     return least >= NEGATIVE * total and total > 0, sites
 
 
@@ -179,14 +179,16 @@ def _weights(
 
 
 @compiled
-def _shares(indices: Indices, count: int, work: Floats) -> tuple[float, float]:
+def _smooth_coefficients(
+    indices: Indices, count: int, work: Floats
+) -> tuple[float, float]:
     """Return a, b in Z1 = sum_i a w_i z_i + b w_i / |p_i| (z_i - gradient_i . p_i)."""
-    volume, toward = indices[VOLUME], indices[TOWARD]
-    near = work[indices[NEAR] :].view(np.int64)
+    volume, offset = indices[VOLUME], indices[OFFSET]
+    neighbors = work[indices[NEIGHBORS] :].view(np.int64)
     nearness, distance, square = 0.0, 0.0, 0.0
     for k in range(count):
-        site = near[place(k)]
-        to, weight = place(toward + 3 * site), work[place(volume + site)]
+        site = neighbors[place(k)]
+        to, weight = place(offset + 3 * site), work[place(volume + site)]
         p, q, r = work[to], work[to + place(1)], work[to + place(2)]
         length = np.sqrt(p * p + q * q + r * r)
         nearness += weight / length
@@ -197,7 +199,7 @@ def _shares(indices: Indices, count: int, work: Floats) -> tuple[float, float]:
 
 
 @compiled
-def _give(
+def _write_answer(
     numbers: Floats,
     indices: Indices,
     status: int,
@@ -207,17 +209,17 @@ def _give(
     out: Floats,
 ) -> None:
     """Move weights from scratch to an (N,) array, or add up the sites' values (M,)."""
-    volume, toward, m = indices[VOLUME], indices[TOWARD], indices[VALUES]
+    volume, offset, m = indices[VOLUME], indices[OFFSET], indices[VALUES]
     known = status >= 0 and count > 0
     for v in range(len(out)):
         out[v] = 0.0 if known else np.nan
     smooth = indices[METHOD] == SMOOTH and count > 1 and weigh == 0
     plain, tangent = 1.0, 0.0
     if smooth:
-        plain, tangent = _shares(indices, count, work)
-    near = work[indices[NEAR] :].view(np.int64)
+        plain, tangent = _smooth_coefficients(indices, count, work)
+    neighbors = work[indices[NEIGHBORS] :].view(np.int64)
     for k in range(count):
-        site = near[place(k)]
+        site = neighbors[place(k)]
         weight = work[place(volume + site)]
         work[place(volume + site)] = 0.0
         if not known or weight == 0:
@@ -227,7 +229,7 @@ def _give(
             continue
         steep = 0.0
         if smooth:
-            to = place(toward + 3 * site)
+            to = place(offset + 3 * site)
             p, q, r = work[to], work[to + place(1)], work[to + place(2)]
             steep = tangent * weight / np.sqrt(p * p + q * q + r * r)
             gradients = indices[GRADIENT] + 3 * m * site
@@ -251,7 +253,7 @@ def answer_one(diagram: Floats, x: Floats, out: Floats) -> bool:
         return False
     indices, at = diagram.view(np.int64), (x[0], x[1], x[2])
     status, count = _weights(diagram, indices, at, indices[MIDDLE], diagram)
-    _give(diagram, indices, status, count, diagram, 0, out)
+    _write_answer(diagram, indices, status, count, diagram, 0, out)
     return True
 
 
@@ -266,14 +268,14 @@ def answer_many(
 ) -> None:
     """Write weights (Q, N) or values (Q, M) and the status (Q,) of queries (Q, 3).
 
-    Only of those in the order, which walk from where the one before was.
+    Only of those in `order`; each walk starts where the one before ended.
     """
     indices = diagram.view(np.int64)
     indices[indices[START]] = indices[MIDDLE]
     for q in order:
         start, at = indices[indices[START]], (x[q, 0], x[q, 1], x[q, 2])
         status[q], count = _weights(diagram, indices, at, start, diagram)
-        _give(diagram, indices, status[q], count, diagram, weigh, out[q])
+        _write_answer(diagram, indices, status[q], count, diagram, weigh, out[q])
 
 
 @compiled
@@ -300,5 +302,5 @@ def natural_weights(
     """
     at = (x[0], x[1], x[2])
     status, count = _weights(numbers, indices, at, indices[MIDDLE], work)
-    _give(numbers, indices, status, count, work, 1, weights)
+    _write_answer(numbers, indices, status, count, work, 1, weights)
     return status
