@@ -168,7 +168,7 @@ def _kept_lengths(d, power, inside, depth):
 
 
 def _smooth(space, places, found, values, gradients):
-    """Sibson's Z1 (Q, M); the formula is in ikns._kernels.voronoi.query."""
+    """Sibson's Z1 (Q, M); the formula is in ikns._kernels.voronoi.answer."""
     p = space.sites - places[:, None]
     distance = np.linalg.norm(p, axis=2)
     one_site = (found == 1).any(axis=1)

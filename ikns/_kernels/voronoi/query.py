@@ -4,15 +4,6 @@ The query is scaled and brought near, projected onto the hull if it is outside a
 is the rule, moved away from the hull by a skin, and given its coordinates (`cavity`,
 `sibson`). A query whose coordinates cannot be trusted, for the walk to it failed or a
 weight came out negative, is `UNSURE` and has NaN for weights and value.
-
-Sibson's smooth interpolant joins his weights w_i and the tangent planes at the sites,
-with p_i = site - query (R. Sibson, A brief description of natural neighbour
-interpolation, 1981):
-
-    Z0 = sum_i w_i z_i
-    xi = sum_i w_i / |p_i| (z_i - gradient_i . p_i) / sum_i w_i / |p_i|
-    alpha = sum_i w_i |p_i| / sum_i w_i / |p_i|,    beta = sum_i w_i |p_i|^2
-    Z1 = (alpha Z0 + beta xi) / (alpha + beta)
 """
 
 from __future__ import annotations
@@ -21,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
+from ikns._kernels.voronoi.answer import write_answer
 from ikns._kernels.voronoi.cavity import check_all_spheres, clear_cavity, find_cavity
 from ikns._kernels.voronoi.diagram import (
     CENTER,
-    GRADIENT,
     INSIDE_HULL,
     LAPLACE,
     METHOD,
@@ -39,11 +30,8 @@ from ikns._kernels.voronoi.diagram import (
     ROUNDING,
     SITE,
     SITES,
-    SMOOTH,
     START,
     UNSURE,
-    VALUE,
-    VALUES,
     VOLUME,
     place,
 )
@@ -179,81 +167,13 @@ def _weights(
 
 
 @compiled
-def _smooth_coefficients(
-    indices: Indices, count: int, work: Floats
-) -> tuple[float, float]:
-    """Return a, b in Z1 = sum_i a w_i z_i + b w_i / |p_i| (z_i - gradient_i . p_i)."""
-    volume, offset = indices[VOLUME], indices[OFFSET]
-    neighbors = work[indices[NEIGHBORS] :].view(np.int64)
-    nearness, distance, square = 0.0, 0.0, 0.0
-    for k in range(count):
-        site = neighbors[place(k)]
-        to, weight = place(offset + 3 * site), work[place(volume + site)]
-        p, q, r = work[to], work[to + place(1)], work[to + place(2)]
-        length = np.sqrt(p * p + q * q + r * r)
-        nearness += weight / length
-        distance += weight * length
-        square += weight * length * length
-    alpha = distance / nearness
-    return alpha / (alpha + square), square / (alpha + square) / nearness
-
-
-@compiled
-def _write_answer(
-    numbers: Floats,
-    indices: Indices,
-    status: int,
-    count: int,
-    work: Floats,
-    weigh: int,
-    out: Floats,
-) -> None:
-    """Move weights from scratch to an (N,) array, or add up the sites' values (M,)."""
-    volume, offset, m = indices[VOLUME], indices[OFFSET], indices[VALUES]
-    known = status >= 0 and count > 0
-    for v in range(len(out)):
-        out[v] = 0.0 if known else np.nan
-    smooth = indices[METHOD] == SMOOTH and count > 1 and weigh == 0
-    plain, tangent = 1.0, 0.0
-    if smooth:
-        plain, tangent = _smooth_coefficients(indices, count, work)
-    neighbors = work[indices[NEIGHBORS] :].view(np.int64)
-    for k in range(count):
-        site = neighbors[place(k)]
-        weight = work[place(volume + site)]
-        work[place(volume + site)] = 0.0
-        if not known or weight == 0:
-            continue
-        if weigh != 0:
-            out[site] = weight
-            continue
-        steep = 0.0
-        if smooth:
-            to = place(offset + 3 * site)
-            p, q, r = work[to], work[to + place(1)], work[to + place(2)]
-            steep = tangent * weight / np.sqrt(p * p + q * q + r * r)
-            gradients = indices[GRADIENT] + 3 * m * site
-            for v in range(m):
-                g = place(gradients + 3 * v)
-                out[v] -= steep * (
-                    numbers[g] * p
-                    + numbers[g + place(1)] * q
-                    + numbers[g + place(2)] * r
-                )
-        weight = plain * weight + steep
-        values = indices[VALUE] + m * site
-        for v in range(m):
-            out[v] += weight * numbers[place(values + v)]
-
-
-@compiled
 def answer_one(diagram: Floats, x: Floats, out: Floats) -> bool:
     """Write the value (M,) at a query (3,), m; return whether it has three numbers."""
     if len(x) != 3:
         return False
     indices, at = diagram.view(np.int64), (x[0], x[1], x[2])
     status, count = _weights(diagram, indices, at, indices[MIDDLE], diagram)
-    _write_answer(diagram, indices, status, count, diagram, 0, out)
+    write_answer(diagram, indices, status, count, diagram, 0, out)
     return True
 
 
@@ -275,7 +195,7 @@ def answer_many(
     for q in order:
         start, at = indices[indices[START]], (x[q, 0], x[q, 1], x[q, 2])
         status[q], count = _weights(diagram, indices, at, start, diagram)
-        _write_answer(diagram, indices, status[q], count, diagram, weigh, out[q])
+        write_answer(diagram, indices, status[q], count, diagram, weigh, out[q])
 
 
 @compiled
@@ -302,5 +222,5 @@ def natural_weights(
     """
     at = (x[0], x[1], x[2])
     status, count = _weights(numbers, indices, at, indices[MIDDLE], work)
-    _write_answer(numbers, indices, status, count, work, 1, weights)
+    write_answer(numbers, indices, status, count, work, 1, weights)
     return status

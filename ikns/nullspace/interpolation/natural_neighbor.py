@@ -91,9 +91,6 @@ class NaturalNeighborInterpolator:
         Triangles of the convex hull, counterclockwise from outside.
     gradients : (N, ..., 3) array or None
         Those in use.
-    packed : tuple of a float array and an integer array
-        All that compiled code needs: ``natural_weights`` in
-        :mod:`ikns._kernels.voronoi.query`. Not to be changed.
 
     Raises
     ------
@@ -118,7 +115,6 @@ class NaturalNeighborInterpolator:
 
     One interpolator can be used by many threads at once.
 
-    R. Sibson, A brief description of natural neighbour interpolation (1981).
     V. V. Belikov et al., The non-Sibsonian interpolation (1997).
 
     Examples
@@ -188,7 +184,7 @@ class NaturalNeighborInterpolator:
     def packed(self) -> tuple[Floats, NDArray[np.int64]]:
         """All that compiled code needs, one array read as floats and as integers.
 
-        For ``natural_weights`` in :mod:`ikns._kernels.voronoi.query`.
+        For :func:`ikns._kernels.voronoi.query.natural_weights`; not to be changed.
         """
         return self._diagram, self._diagram.view(np.int64)
 
