@@ -1,7 +1,7 @@
 """The Voronoi diagram of a triangulation in integers: every number rounded once.
 
-Every number is a ratio of integers times square roots of integers: a corner 1e15 away
-and an angle of 1e-15 keep all their digits.
+Every number is a ratio of integers times square roots of integers: a circumcenter 1e15
+away and an angle of 1e-15 keep all their digits.
 """
 
 import math
@@ -21,10 +21,10 @@ OUTWARD = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 _STEP = 2.0**-100  # of the integer lattice, in units of the set's size
 
 
-class _Line(NamedTuple):
-    """A Delaunay facet with its normal, and the tetrahedra that its line connects."""
+class _Facet(NamedTuple):
+    """A facet: normal, tetrahedra on both sides, length of its Voronoi edge."""
 
-    facet: tuple[int, int, int]
+    sites: tuple[int, int, int]
     normal: list[int]
     behind: int
     ahead: int
@@ -32,9 +32,9 @@ class _Line(NamedTuple):
 
 
 class _Side(NamedTuple):
-    """A line on its way about an edge: from which tetrahedron to which."""
+    """A facet in the ring around an edge: from which tetrahedron to which."""
 
-    line: int
+    facet: int
     entering: int
     leaving: int
 
@@ -44,35 +44,35 @@ def voronoi(points, simplices, neighbors):
     sites = on_lattice(points)
     outside = len(simplices)
     centers = [_circumcenter(sites, simplex) for simplex in simplices]
-    lines = _lines(sites, simplices, neighbors, centers)
-    rings = _rings(lines, outside)
+    facets = _facets(sites, simplices, neighbors, centers)
+    rings = _rings(facets, outside)
     edges = sorted(rings)
     sides = [(e, *side) for e, edge in enumerate(edges) for side in rings[edge]]
     side_edge, side_facet, entering, leaving = map(np.array, zip(*sides, strict=True))
-    corner = np.array([[_rounded(v, below) for v in above] for above, below in centers])
-    ahead = np.array([line.ahead for line in lines])
+    center = np.array([[_rounded(v, below) for v in above] for above, below in centers])
+    ahead = np.array([facet.ahead for facet in facets])
     hull = np.flatnonzero(ahead == outside)
-    normal = np.array([_direction(line.normal) for line in lines])
+    normal = np.array([_direction(facet.normal) for facet in facets])
     axes = np.array([_direction(between(sites[i], sites[j])) for i, j in edges])
     return Voronoi(
         simplices=np.array(simplices),
         neighbors=np.array(neighbors),
-        corner=corner[..., 0] * _STEP,
-        corner_rest=corner[..., 1] * _STEP,
-        behind=np.array([line.behind for line in lines]),
+        circumcenter=center[..., 0] * _STEP,
+        circumcenter_rest=center[..., 1] * _STEP,
+        behind=np.array([facet.behind for facet in facets]),
         ahead=ahead,
-        length=np.array([line.length for line in lines]) * _STEP,
+        length=np.array([facet.length for facet in facets]) * _STEP,
         normal=normal[..., 0].copy(),
         normal_rest=normal[..., 1].copy(),
         hull=hull,
-        hull_facets=np.array([lines[k].facet for k in hull]),
+        hull_facets=np.array([facets[k].sites for k in hull]),
         edges=np.array(edges),
         axis=axes[..., 0].copy(),
         side_facet=side_facet,
         side_edge=side_edge,
         entering=entering,
         leaving=leaving,
-        **_pairs(sites, lines, rings, edges),
+        **_pairs(sites, facets, rings, edges),
     )
 
 
@@ -88,9 +88,9 @@ def _circumcenter(sites, simplex):
     return numerator, 2 * dot(u, vw)
 
 
-def _lines(sites, simplices, neighbors, centers):
+def _facets(sites, simplices, neighbors, centers):
     """Every facet once, turned away from the tetrahedron behind it."""
-    lines = []
+    facets = []
     for here, simplex in enumerate(simplices):
         for there, places in zip(neighbors[here], OUTWARD, strict=True):
             if 0 <= there < here:
@@ -98,29 +98,29 @@ def _lines(sites, simplices, neighbors, centers):
             a, b, c = (simplex[k] for k in places)
             n = cross(between(sites[a], sites[b]), between(sites[a], sites[c]))
             if there < 0:
-                lines.append(_Line((a, b, c), n, here, len(simplices), math.inf))
+                facets.append(_Facet((a, b, c), n, here, len(simplices), math.inf))
                 continue
-            # From corner to corner, as a fraction; each is seen from its first site.
+            # From center to center, as a fraction; each is seen from its first site.
             u, p = centers[here]
             v, q = centers[there]
             shift = between(sites[simplex[0]], sites[simplices[there][0]])
             ascent = dot(v, n) * p - dot(u, n) * q + dot(shift, n) * p * q
             length = ascent / (p * q) / _length(n)
-            lines.append(_Line((a, b, c), n, here, there, length))
-    return lines
+            facets.append(_Facet((a, b, c), n, here, there, length))
+    return facets
 
 
-def _rings(lines, outside):
-    """Sides of each edge's polygon, counterclockwise; from the ray, if there is one."""
+def _rings(facets, outside):
+    """Sides of each edge's face, counterclockwise; from the ray, if there is one."""
     starts = {}
-    for k, line in enumerate(lines):
-        a, b, c = line.facet
+    for k, facet in enumerate(facets):
+        a, b, c = facet.sites
         for i, j in ((a, b), (b, c), (c, a)):
-            # Counterclockwise about an edge that runs along the facet's turn, the line
-            # leads ahead; about the opposite edge it leads back.
-            edge, side = (i, j), _Side(k, line.behind, line.ahead)
+            # Counterclockwise about an edge in the direction of the facet's turn, its
+            # Voronoi edge leads ahead; about the opposite edge it leads back.
+            edge, side = (i, j), _Side(k, facet.behind, facet.ahead)
             if i > j:
-                edge, side = (j, i), _Side(k, line.ahead, line.behind)
+                edge, side = (j, i), _Side(k, facet.ahead, facet.behind)
             starts.setdefault(edge, {})[side.entering] = side
     rings = {}
     for edge, onward in starts.items():
@@ -133,15 +133,15 @@ def _rings(lines, outside):
     return rings
 
 
-def _pairs(sites, lines, rings, edges):
-    """Pairs of sides of one polygon, and the sines of the angles between them."""
+def _pairs(sites, facets, rings, edges):
+    """Pairs of sides of one face, and the sines of the angles between them."""
     first, second, sine, pairs = [], [], [], []
-    start = 0  # number of the polygon's first side
+    start = 0  # number of the face's first side
     for i, j in edges:
         pairs.append(len(first))
         axis = between(sites[i], sites[j])
         seen = [
-            between(sites[i], sites[sum(lines[side.line].facet) - i - j])
+            between(sites[i], sites[sum(facets[side.facet].sites) - i - j])
             for side in rings[i, j]
         ]  # the third sites of the facets around this edge
         across = [cross(axis, w) for w in seen]

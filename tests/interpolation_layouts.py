@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 
-from ikns._kernels.voronoi.diagram import ANGLE, EDGE, EDGES, HULL, LINES, PLANE
+from ikns._kernels.voronoi.diagram import ANGLE, EDGE, EDGES, FACETS, HULL, PLANE
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
 CUBE = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
@@ -85,6 +85,6 @@ def make_weights_negative(net):
 def lead_astray(net):
     """Damage a diagram: no facet leads on, so that every walk fails that is needed."""
     numbers, indices = net.packed
-    inner = indices[LINES] - indices[HULL]
+    inner = indices[FACETS] - indices[HULL]
     numbers[indices[PLANE] :][: 10 * inner] = 0
     net._idle.clear()

@@ -110,13 +110,13 @@ def _powers(d, sites, x, x_rest):
     """Squared radius less squared distance to the query, (Q, T)."""
     site = sites[d.simplices[:, 0]]
     p = x[:, None] - site
-    power = np.einsum("qtk,qtk->qt", 2 * d.corner - p, p)
-    scale = 1 + np.abs(d.corner).max(axis=1)
+    power = np.einsum("qtk,qtk->qt", 2 * d.circumcenter - p, p)
+    scale = 1 + np.abs(d.circumcenter).max(axis=1)
     q, t = np.nonzero(np.abs(power) < CANCELED * scale)
     p, p_rest = difference(x[q], site[t])
     p_rest = p_rest + x_rest[q]
-    reach, reach_rest = difference(2 * d.corner[t], p)
-    reach_rest = reach_rest + 2 * d.corner_rest[t] - p_rest
+    reach, reach_rest = difference(2 * d.circumcenter[t], p)
+    reach_rest = reach_rest + 2 * d.circumcenter_rest[t] - p_rest
     power[q, t] = double_double_dot(reach, reach_rest, p, p_rest)
     return power
 
@@ -139,7 +139,7 @@ def _coordinates(d, sites, x, x_rest, depth, laplace):
 
 
 def _kept_areas(d, sites, x, x_rest, depth):
-    """Twice the area of each polygon on the query's side, (Q, E)."""
+    """Twice the area of each Voronoi face on the query's side, (Q, E)."""
     power = np.empty((len(x), len(d.simplices) + 1))
     power[:, :-1] = _powers(d, sites, x, x_rest)
     power[:, -1] = -np.inf
@@ -155,7 +155,7 @@ def _kept_areas(d, sites, x, x_rest, depth):
 
 
 def _kept_lengths(d, power, inside, depth):
-    """Length of each line on the query's side, (Q, F)."""
+    """Length of each facet's Voronoi edge on the query's side, (Q, F)."""
     behind, ahead = power[:, d.behind], power[:, d.ahead]
     share = np.zeros_like(behind)
     from_behind = inside[:, d.behind] & ~inside[:, d.ahead]
@@ -168,7 +168,7 @@ def _kept_lengths(d, power, inside, depth):
 
 
 def _smooth(space, places, found, values, gradients):
-    """Sibson's Z1 (Q, M); the formula is in ikns._kernels.voronoi.query."""
+    """Sibson's Z1 (Q, M); the formula is in ikns._kernels.voronoi.answer."""
     p = space.sites - places[:, None]
     distance = np.linalg.norm(p, axis=2)
     one_site = (found == 1).any(axis=1)
@@ -187,9 +187,9 @@ def _smooth(space, places, found, values, gradients):
 def nearest_on_hull(sites, facets, x):
     """Project queries (Q, 3) outside a convex hull with facets (H, 3) onto it.
 
-    The nearest point y is the one behind whose plane, at a right angle to x - y, all
-    sites lie. Comparing distances alone would tell y only to 1e-8, because they are
-    stationary there; so distances choose a few candidates and the sites choose y.
+    All sites lie behind the plane through the nearest point y that is normal to x - y.
+    Comparing distances alone would give y only to 1e-8, because they are stationary
+    there; so distances choose a few candidates and the sites choose y.
     """
     a, b, c = (sites[facets[:, k]] for k in range(3))
     candidates = np.concatenate(
@@ -218,7 +218,7 @@ def _on_segments(a, b, x):
 
 
 def _on_planes(a, b, c, x):
-    """Feet of Q points on H triangles, (Q, H, 3); a corner where the foot is off."""
+    """Feet of Q points on H triangles, (Q, H, 3); a vertex where the foot is off."""
     u, v = b - a, c - a
     normal = np.cross(u, v)
     square = (normal * normal).sum(axis=1)

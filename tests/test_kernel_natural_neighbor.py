@@ -28,12 +28,12 @@ from interpolation_layouts import (
 from natural_neighbor_oracle import weights as oracle_weights
 
 from ikns._kernels.voronoi.diagram import (
-    CORNERS,
     INSIDE_HULL,
     MARK,
     NOT_FINITE,
     OUTSIDE_HULL,
     POWER,
+    TETRAHEDRA,
     UNKNOWN,
     UNSURE,
     VOLUME,
@@ -43,7 +43,7 @@ from ikns._kernels.voronoi.query import natural_weights
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.interpolation.morton import morton_order
-from ikns.nullspace.interpolation.packed import FEW
+from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT
 
 TOLERANCE = {"sibson": 1e-14, "laplace": 1e-12}
 BAD = [[np.nan, 0.5, 0.5], [np.inf, 0, 0], [0.5, -np.inf, np.nan], [1e308, 0, 0]]
@@ -158,8 +158,8 @@ def test_scratch_memory_is_left_as_it_was_found(name):
         natural_weights(numbers, indices, x, work, weights)
     for block, size in ((VOLUME, len(net.points)), (MARK, len(net.points))):
         assert not work[indices[block] : indices[block] + size].any()
-    if indices[CORNERS] > FEW:
-        assert (work[indices[POWER] :][: indices[CORNERS] + 1] == UNKNOWN).all()
+    if indices[TETRAHEDRA] > BRUTE_FORCE_LIMIT:
+        assert (work[indices[POWER] :][: indices[TETRAHEDRA] + 1] == UNKNOWN).all()
     # Nor is the diagram touched when other memory is brought along.
     assert (numbers.view(np.int64) == before).all()
 
@@ -204,7 +204,7 @@ def test_a_walk_that_fails_gives_nan_and_leaves_other_queries_alone(method):
 
 def test_a_negative_weight_gives_nan():
     net = NaturalNeighborInterpolator(BOX, BOX)
-    assert net.packed[1][CORNERS] <= FEW  # all corners are tried, many side by side
+    assert net.packed[1][TETRAHEDRA] <= BRUTE_FORCE_LIMIT  # so many are a batch
     make_weights_negative(net)
     queries = inside_queries(BOX, 20, np.random.default_rng(9))
     assert (one_by_one(net, queries)[1] == UNSURE).all()
@@ -216,7 +216,7 @@ def test_a_negative_weight_gives_nan():
 def test_sites_found_by_walking_have_all_the_weight():
     points = CLOUDS["60 at random"]
     net = NaturalNeighborInterpolator(points)
-    assert net.packed[1][CORNERS] > FEW
+    assert net.packed[1][TETRAHEDRA] > BRUTE_FORCE_LIMIT
     assert (net.weights(points) == np.eye(len(points))).all()
     assert (one_by_one(net, points)[0] == np.eye(len(points))).all()
 

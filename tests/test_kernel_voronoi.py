@@ -54,16 +54,16 @@ def compare(points):
         np.testing.assert_allclose(
             getattr(found, name), getattr(true, name), rtol=16 * 1.1e-16, atol=0
         )
-    # A corner is off by 2**-100 (numerator) + 2**-100 (denominator) + a few times
+    # A circumcenter is off by 2**-100 (numerator) + 2**-100 (denominator) + a few times
     # 2**-106 (their ratio), a normal's direction by as much. (Measured: 6e-32.)
-    for name in ("corner", "normal"):
+    for name in ("circumcenter", "normal"):
         a, b = double_double(found, name), double_double(true, name)
         for x, y in zip(a, b, strict=True):
             k = max(range(3), key=lambda i: abs(y[i]))
             scale = x[k] / y[k] if name == "normal" else 1
             for p, q in zip(x, y, strict=True):
                 assert abs(p - q * scale) <= abs(q) * 2**-97
-    for name in ("corner", "normal"):
+    for name in ("circumcenter", "normal"):
         high, rest = getattr(found, name), getattr(found, name + "_rest")
         assert (np.abs(rest) <= np.abs(high) * 2.0**-53).all()
 

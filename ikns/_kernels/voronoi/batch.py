@@ -1,8 +1,8 @@
-"""Many queries in a small set side by side: the sums of `cavity` and `sibson` in rows.
+"""Batch queries of small sets: the sums of `cavity` and `sibson`, vectorized.
 
-Every corner and polygon is tried, each for a whole row of queries at a time, which
-processors do for several in one instruction. Only plain queries are answered: inside,
-and where no product cancels. The others are left for `natural_neighbor`.
+Every tetrahedron and face is checked for a whole row of queries at a time, which
+processors do for several in one instruction. Only plain queries are answered: inside
+the hull, and where no product cancels. The others are left for `query`.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.cavity import kept_length
 from ikns._kernels.voronoi.diagram import (
     ANGLE,
-    CORNER,
-    CORNERS,
+    CIRCUMCENTER,
     EDGE,
     EDGES,
+    FACET_ENDS,
+    FACETS,
     HULL,
     INSIDE_HULL,
     LAPLACE,
     LENGTH,
-    LINE_ENDS,
-    LINES,
     LONGEST,
     METHOD,
     PLANE,
     SCALE,
     SITE,
     SITES,
+    TETRAHEDRA,
     UNKNOWN,
     UNSURE,
     VALUE,
@@ -39,20 +39,20 @@ from ikns._kernels.voronoi.diagram import (
 from ikns._kernels.voronoi.hull import CANCELED
 from ikns._kernels.voronoi.query import NEGATIVE
 
-__all__ = ["answer_rows", "rows_of_work"]
+__all__ = ["answer_batch", "batch_scratch_rows"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-def rows_of_work(indices: Indices) -> int:
-    """Rows of scratch memory that `answer_rows` needs."""
-    n = indices[LONGEST] + indices[CORNERS] + indices[LINES] + indices[HULL]
+def batch_scratch_rows(indices: Indices) -> int:
+    """Rows of scratch memory that `answer_batch` needs."""
+    n = indices[LONGEST] + indices[TETRAHEDRA] + indices[FACETS] + indices[HULL]
     return int(n + 4 * indices[SITES] + 7)
 
 
 @compiled
-def answer_rows(
+def answer_batch(
     numbers: Floats,
     indices: Indices,
     x: Floats,
@@ -63,16 +63,16 @@ def answer_rows(
 ) -> None:
     """Write weights (Q, N) or values (Q, M) and the status (Q,) of queries (Q, 3).
 
-    UNSURE where a query is not plain. Scratch is an array of `rows_of_work` by as many
-    queries as are answered at a time.
+    UNSURE where a query is not plain. Scratch is an array of `batch_scratch_rows` by as
+    many queries as are answered at a time.
     """
-    n, t = indices[SITES], indices[CORNERS]
+    n, t = indices[SITES], indices[TETRAHEDRA]
     places, plain, turn, area = work[0:3], work[3], work[4], work[5]
     power = work[6 : 7 + t]
     rows = work[7 + t :]
     volume, toward, rows = rows[:n], rows[n : 4 * n], rows[4 * n :]
     depth, rows = rows[: indices[HULL]], rows[indices[HULL] :]
-    kept, ring = rows[: indices[LINES]], rows[indices[LINES] :]
+    kept, ring = rows[: indices[FACETS]], rows[indices[FACETS] :]
     width = work.shape[1]
     for first in range(0, len(x), width):
         count = min(width, len(x) - first)
@@ -84,7 +84,7 @@ def answer_rows(
         power[t] = UNKNOWN
         _depths(numbers, indices, places, plain, depth)
         _powers(numbers, indices, places, plain, power)
-        _keep(numbers, indices, power, depth, kept)
+        _kept_lengths(numbers, indices, power, depth, kept)
         for k in range(3 * n):
             site, here, there = numbers[indices[SITE] + k], places[k % 3], toward[k]
             for q in range(width):
@@ -92,12 +92,12 @@ def answer_rows(
         edge = indices[EDGE]
         for _ in range(indices[EDGES]):
             _areas(numbers, indices, edge, power, kept, ring, turn, area)
-            _share(numbers, indices, edge, toward, area, volume)
+            _add_face(numbers, indices, edge, toward, area, volume)
             edge += 4 + 2 * indices[place(edge + 2)]
         _normalize(indices, toward, volume, plain, area, turn)
         for q in range(count):
             status[first + q] = INSIDE_HULL if plain[q] > 0 else UNSURE
-        _give(numbers, indices, volume, weigh, area, out[first : first + count])
+        _write_answer(numbers, indices, volume, weigh, area, out[first : first + count])
 
 
 @compiled
@@ -105,7 +105,7 @@ def _depths(
     numbers: Floats, indices: Indices, x: Floats, plain: Floats, depth: Floats
 ) -> None:
     """Write depths behind the hull's facets; a small one is not plain."""
-    plane = indices[PLANE] + 10 * (indices[LINES] - indices[HULL])
+    plane = indices[PLANE] + 10 * (indices[FACETS] - indices[HULL])
     x0, x1, x2 = x[0], x[1], x[2]
     for k in range(indices[HULL]):
         n = numbers[plane + 10 * k : plane + 10 * k + 9]
@@ -120,10 +120,11 @@ def _depths(
 def _powers(
     numbers: Floats, indices: Indices, x: Floats, plain: Floats, power: Floats
 ) -> None:
-    """Write powers to all corners; a small one is not plain."""
+    """Write the powers of all circumspheres; a small one is not plain."""
     x0, x1, x2 = x[0], x[1], x[2]
-    for k in range(indices[CORNERS]):
-        c = numbers[indices[CORNER] + 10 * k : indices[CORNER] + 10 * k + 10]
+    for k in range(indices[TETRAHEDRA]):
+        at = indices[CIRCUMCENTER] + 10 * k
+        c = numbers[at : at + 10]
         c0, c1, c2, a0, a1, a2 = 2 * c[0], 2 * c[1], 2 * c[2], c[6], c[7], c[8]
         sure, row = c[9], power[k]
         for q in range(len(row)):
@@ -133,20 +134,20 @@ def _powers(
 
 
 @compiled
-def _keep(
+def _kept_lengths(
     numbers: Floats, indices: Indices, power: Floats, depth: Floats, kept: Floats
 ) -> None:
-    """Write what is kept of all lines."""
-    hull = indices[LINES] - indices[HULL]
-    for line in range(indices[LINES]):
-        ends = indices[LINE_ENDS] + 2 * line
-        behind, row = power[indices[ends]], kept[line]
-        if line < hull:
-            ahead, length = power[indices[ends + 1]], numbers[indices[LENGTH] + line]
+    """Write the kept lengths of all facets."""
+    hull = indices[FACETS] - indices[HULL]
+    for facet in range(indices[FACETS]):
+        ends = indices[FACET_ENDS] + 2 * facet
+        behind, row = power[indices[ends]], kept[facet]
+        if facet < hull:
+            ahead, length = power[indices[ends + 1]], numbers[indices[LENGTH] + facet]
             for q in range(len(row)):
                 row[q] = kept_length(length, behind[q], ahead[q])
         else:
-            below = depth[line - hull]
+            below = depth[facet - hull]
             for q in range(len(row)):
                 row[q] = max(behind[q], 0.0) / (2 * below[q])
 
@@ -162,7 +163,7 @@ def _areas(
     turn: Floats,
     area: Floats,
 ) -> None:
-    """Write twice the area on the query's side of the polygon of an edge.
+    """Write twice the area on the query's side of the face of an edge.
 
     The sum starts where the ring does. Where that is on the query's side, the first
     sides follow upon the last, and angles from them to those turn around.
@@ -172,12 +173,12 @@ def _areas(
     turn[:] = -1.0
     area[:] = 0.0
     for k in range(sides):
-        corner = power[indices[place(edge + 4 + sides + k)]]
-        line, row = kept[indices[place(edge + 4 + k)]], ring[k]
+        before = power[indices[place(edge + 4 + sides + k)]]
+        facet, row = kept[indices[place(edge + 4 + k)]], ring[k]
         for q in range(len(area)):
-            turned = turn[q] if corner[q] > 0 else 1.0
+            turned = turn[q] if before[q] > 0 else 1.0
             turn[q] = turned
-            row[q] = line[q] * turned
+            row[q] = facet[q] * turned
     for k in range(sides - 1):
         row = ring[k]
         for m in range(k + 1, sides):
@@ -187,7 +188,7 @@ def _areas(
 
 
 @compiled
-def _share(
+def _add_face(
     numbers: Floats,
     indices: Indices,
     edge: int,
@@ -195,7 +196,7 @@ def _share(
     area: Floats,
     volume: Floats,
 ) -> None:
-    """Add what a polygon contributes to its two sites."""
+    """Add what a face contributes to its two sites."""
     angle = indices[ANGLE] + indices[place(edge + 3)]
     i, j = indices[place(edge)], indices[place(edge + 1)]
     u, v, w = numbers[angle], numbers[angle + 1], numbers[angle + 2]
@@ -240,7 +241,7 @@ def _normalize(
 
 
 @compiled
-def _give(
+def _write_answer(
     numbers: Floats,
     indices: Indices,
     volume: Floats,

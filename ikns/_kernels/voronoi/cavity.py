@@ -1,13 +1,16 @@
-"""What a query takes from a Voronoi diagram: the corners nearer to it than to any site.
+"""The cavity of a query: the tetrahedra whose circumspheres hold it (Bowyer-Watson).
 
-A corner is the center of the sphere through a tetrahedron's sites. Its power is its
-squared radius less its squared distance to the query: positive inside the sphere, where
-the query takes it. The tetrahedra of these corners, the cavity, hang together. A walk
-toward the query, through facets with the query beyond them, meets one of them, and the
-others are its neighbors (A. Bowyer, Computing Dirichlet tessellations, 1981; D. F.
-Watson, Computing the n-dimensional Delaunay tessellation, 1981). The walk ends because
-a Delaunay triangulation, seen from anywhere, has no cycles (H. Edelsbrunner, An
-acyclicity theorem for cell complexes in d dimensions, 1990).
+The power of a circumsphere is its squared radius less the squared distance of query and
+circumcenter: positive where the query is inside. These tetrahedra are connected. A
+visibility walk toward the query, through facets with the query beyond them, meets one
+of them, and the others are found from neighbor to neighbor (A. Bowyer, Computing
+Dirichlet tessellations, 1981; D. F. Watson, Computing the n-dimensional Delaunay
+tessellation, 1981). The walk ends because a Delaunay triangulation, seen from anywhere,
+has no cycles (H. Edelsbrunner, An acyclicity theorem for cell complexes in d
+dimensions, 1990).
+
+The circumcenters of the cavity are the vertices of the Voronoi diagram that lie in the
+query's cell. "Kept" of a Voronoi edge is the part in that cell.
 """
 
 from __future__ import annotations
@@ -17,29 +20,35 @@ from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import (
-    CORNER,
-    CORNER_ROWS,
-    CORNERS,
+    CAVITY,
+    CIRCUMCENTER,
     DEPTH,
-    FOUND,
+    FACET_ENDS,
+    FACETS,
     HULL,
     KEPT,
     LENGTH,
-    LINE_ENDS,
-    LINES,
     MARK,
-    NEAR,
+    NEIGHBORS,
     PLANE,
     POWER,
     SITES,
     START,
+    TETRAHEDRA,
+    TETRAHEDRON,
     UNKNOWN,
     place,
 )
 from ikns._kernels.voronoi.double_double import Triple, difference, double_double_dot
 from ikns._kernels.voronoi.hull import CANCELED, depth_behind, exact_depth
 
-__all__ = ["find_cavity", "forget_cavity", "kept_length", "power_to", "try_all"]
+__all__ = [
+    "check_all_spheres",
+    "clear_cavity",
+    "find_cavity",
+    "kept_length",
+    "power_to",
+]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -49,9 +58,9 @@ _NOTHING = 1e-300
 
 
 @compiled
-def power_to(numbers: Floats, corner: int, x: Triple) -> float:
-    """Power of a query to the corner packed at a place."""
-    at = place(corner)
+def power_to(numbers: Floats, center: int, x: Triple) -> float:
+    """Power of the circumsphere packed at a place."""
+    at = place(center)
     p = x[0] - numbers[at + place(6)]
     q = x[1] - numbers[at + place(7)]
     r = x[2] - numbers[at + place(8)]
@@ -63,9 +72,9 @@ def power_to(numbers: Floats, corner: int, x: Triple) -> float:
 
 
 @compiled
-def _exact_power(numbers: Floats, corner: int, x: Triple, rest: Triple) -> float:
-    """Power of a query in double-double arithmetic, to 1e-30 of its terms."""
-    c = numbers[corner : corner + 9]
+def _exact_power(numbers: Floats, center: int, x: Triple, rest: Triple) -> float:
+    """Power for a double-double query, to 1e-30 of its terms."""
+    c = numbers[center : center + 9]
     p, p_rest = difference(x[0], c[6])
     q, q_rest = difference(x[1], c[7])
     r, r_rest = difference(x[2], c[8])
@@ -87,9 +96,9 @@ def _exact_power(numbers: Floats, corner: int, x: Triple, rest: Triple) -> float
 
 @compiled
 def kept_length(length: float, behind: float, ahead: float) -> float:
-    """Length of a line on the query's side, from the powers of its ends.
+    """Kept length of a Voronoi edge, from the powers of its ends.
 
-    The power falls linearly along the line: 1, behind / (behind - ahead), or 0.
+    The power changes linearly along it: all, behind / (behind - ahead) of it, or none.
     """
     return length * (
         (max(behind, 0.0) + max(ahead, 0.0)) / (abs(behind) + abs(ahead) + _NOTHING)
@@ -97,70 +106,71 @@ def kept_length(length: float, behind: float, ahead: float) -> float:
 
 
 @compiled
-def try_all(
+def check_all_spheres(
     numbers: Floats, indices: Indices, x: Triple, rest: Triple, work: Floats
 ) -> tuple[int, int]:
-    """Write the powers of all corners and what is kept of all lines.
+    """Write the powers of all tetrahedra and the kept lengths of all facets.
 
     Returns
     -------
-    corners, sites : int
-        How many are listed: the corners that are taken, and all sites.
+    tetrahedra, sites : int
+        How many are listed: the cavity, and all sites.
     """
-    corners, powers = indices[CORNER], indices[POWER]
+    centers, powers = indices[CIRCUMCENTER], indices[POWER]
     unsure = False
-    for t in range(indices[CORNERS]):
-        power = power_to(numbers, corners + 10 * t, x)
+    for t in range(indices[TETRAHEDRA]):
+        power = power_to(numbers, centers + 10 * t, x)
         work[place(powers + t)] = power
-        unsure |= abs(power) < numbers[place(corners + 10 * t + 9)]
+        unsure |= abs(power) < numbers[place(centers + 10 * t + 9)]
     if unsure:
-        for t in range(indices[CORNERS]):
-            if abs(work[place(powers + t)]) < numbers[place(corners + 10 * t + 9)]:
-                power = _exact_power(numbers, corners + 10 * t, x, rest)
+        for t in range(indices[TETRAHEDRA]):
+            if abs(work[place(powers + t)]) < numbers[place(centers + 10 * t + 9)]:
+                power = _exact_power(numbers, centers + 10 * t, x, rest)
                 work[place(powers + t)] = power
     lists = work[indices[START] :].view(np.int64)
-    found, near = indices[FOUND] - indices[START], indices[NEAR] - indices[START]
+    cavity = indices[CAVITY] - indices[START]
+    neighbors = indices[NEIGHBORS] - indices[START]
     count = 0
-    for t in range(indices[CORNERS]):
-        lists[place(found + count)] = t
+    for t in range(indices[TETRAHEDRA]):
+        lists[place(cavity + count)] = t
         count += work[place(powers + t)] > 0
     for i in range(indices[SITES]):
-        lists[place(near + i)] = i
+        lists[place(neighbors + i)] = i
     kept, depths, lengths = indices[KEPT], indices[DEPTH], indices[LENGTH]
-    ends, hull = indices[LINE_ENDS], indices[LINES] - indices[HULL]
-    for line in range(hull):
-        behind = work[place(powers + indices[place(ends + 2 * line)])]
-        ahead = work[place(powers + indices[place(ends + 2 * line + 1)])]
-        length = numbers[place(lengths + line)]
-        work[place(kept + line)] = kept_length(length, behind, ahead)
-    for line in range(hull, indices[LINES]):
-        behind = work[place(powers + indices[place(ends + 2 * line)])]
-        depth = work[place(depths + line - hull)]
-        work[place(kept + line)] = max(behind, 0.0) / (2 * depth)
+    ends, hull = indices[FACET_ENDS], indices[FACETS] - indices[HULL]
+    for facet in range(hull):
+        behind = work[place(powers + indices[place(ends + 2 * facet)])]
+        ahead = work[place(powers + indices[place(ends + 2 * facet + 1)])]
+        length = numbers[place(lengths + facet)]
+        work[place(kept + facet)] = kept_length(length, behind, ahead)
+    for facet in range(hull, indices[FACETS]):
+        behind = work[place(powers + indices[place(ends + 2 * facet)])]
+        depth = work[place(depths + facet - hull)]
+        work[place(kept + facet)] = max(behind, 0.0) / (2 * depth)
     return count, indices[SITES]
 
 
 @compiled
-def _meet(
+def _walk(
     numbers: Floats, indices: Indices, x: Triple, rest: Triple, start: int
 ) -> tuple[int, float]:
-    """Walk to a corner that the query takes; also its power. -1 where none is met."""
-    rows, corners, planes = indices[CORNER_ROWS], indices[CORNER], indices[PLANE]
-    infinity, ends, t = indices[CORNERS], indices[LINE_ENDS], start
+    """Walk to a tetrahedron of the cavity; also its power. -1 where the walk fails."""
+    rows, centers, planes = indices[TETRAHEDRON], indices[CIRCUMCENTER], indices[PLANE]
+    infinity, ends, t = indices[TETRAHEDRA], indices[FACET_ENDS], start
     for _ in range(infinity):
-        corner = corners + 10 * t
-        power = power_to(numbers, corner, x)
-        if abs(power) < numbers[place(corner + 9)]:
-            power = _exact_power(numbers, corner, x, rest)
+        center = centers + 10 * t
+        power = power_to(numbers, center, x)
+        if abs(power) < numbers[place(center + 9)]:
+            power = _exact_power(numbers, center, x, rest)
         if power > 0:
             return t, power
         onward = infinity
         for k in range(4):
-            line = indices[place(rows + 30 * t + k)]
-            depth = depth_behind(numbers, planes + 10 * line, x)
+            facet = indices[place(rows + 30 * t + k)]
+            depth = depth_behind(numbers, planes + 10 * facet, x)
             if abs(depth) < CANCELED:
-                depth = exact_depth(numbers, planes + 10 * line, x, rest)
-            beyond = depth < 0 if indices[place(ends + 2 * line)] == t else depth > 0
+                depth = exact_depth(numbers, planes + 10 * facet, x, rest)
+            beyond = depth < 0 if indices[place(ends + 2 * facet)] == t else depth > 0
             if beyond:
                 onward = indices[place(rows + 30 * t + 4 + k)]
                 break
@@ -179,69 +189,72 @@ def find_cavity(
     start: int,
     work: Floats,
 ) -> tuple[int, int]:
-    """Write the powers of the cavity and around it, and what is kept of its lines.
+    """Write the powers in and around the cavity, and the kept lengths of its facets.
 
     Returns
     -------
-    corners, sites : int
-        How many are listed; no corners when the walk failed.
+    tetrahedra, sites : int
+        How many are listed; no tetrahedra when the walk failed.
     """
-    t, height = _meet(numbers, indices, x, rest, start)
+    t, height = _walk(numbers, indices, x, rest, start)
     if t < 0:
         return 0, 0
-    infinity, hull = indices[CORNERS], indices[LINES] - indices[HULL]
+    infinity, hull = indices[TETRAHEDRA], indices[FACETS] - indices[HULL]
     powers, kept, depths = indices[POWER], indices[KEPT], indices[DEPTH]
-    rows, corners, lengths = indices[CORNER_ROWS], indices[CORNER], indices[LENGTH]
+    rows, lengths = indices[TETRAHEDRON], indices[LENGTH]
+    centers = indices[CIRCUMCENTER]
     lists = work[indices[START] :].view(np.int64)
-    found, near = indices[FOUND] - indices[START], indices[NEAR] - indices[START]
+    cavity = indices[CAVITY] - indices[START]
+    neighbors = indices[NEIGHBORS] - indices[START]
     mark = indices[MARK] - indices[START]
     work[place(powers + t)] = height
-    lists[0] = lists[place(found)] = t
+    lists[0] = lists[place(cavity)] = t
     count, sites, reached = 1, 0, 0
     while reached < count:
-        t = lists[place(found + reached)]
+        t = lists[place(cavity + reached)]
         mine, row = work[place(powers + t)], rows + 30 * t
         reached += 1
         for k in range(4):
-            line, other = indices[place(row + k)], indices[place(row + 4 + k)]
+            facet, other = indices[place(row + k)], indices[place(row + 4 + k)]
             if other == infinity:
                 # The power falls by twice the query's depth for each unit of length.
-                depth = work[place(depths + line - hull)]
-                work[place(kept + line)] = mine / (2 * depth)
+                depth = work[place(depths + facet - hull)]
+                work[place(kept + facet)] = mine / (2 * depth)
                 continue
             height = work[place(powers + other)]
             if height == UNKNOWN:
-                corner = corners + 10 * other
-                height = power_to(numbers, corner, x)
-                if abs(height) < numbers[place(corner + 9)]:
-                    height = _exact_power(numbers, corner, x, rest)
+                center = centers + 10 * other
+                height = power_to(numbers, center, x)
+                if abs(height) < numbers[place(center + 9)]:
+                    height = _exact_power(numbers, center, x, rest)
                 work[place(powers + other)] = height
                 if height > 0:
-                    lists[place(found + count)] = other
+                    lists[place(cavity + count)] = other
                     count += 1
-            length = numbers[place(lengths + line)]
-            work[place(kept + line)] = kept_length(length, mine, height)
+            length = numbers[place(lengths + facet)]
+            work[place(kept + facet)] = kept_length(length, mine, height)
         for k in range(8, 12):
             site = indices[place(row + k)]
             if lists[place(mark + site)] == 0:
                 lists[place(mark + site)] = 1
-                lists[place(near + sites)] = site
+                lists[place(neighbors + sites)] = site
                 sites += 1
     return count, sites
 
 
 @compiled
-def forget_cavity(indices: Indices, corners: int, sites: int, work: Floats) -> None:
+def clear_cavity(indices: Indices, tetrahedra: int, sites: int, work: Floats) -> None:
     """Leave the scratch memory as it was found."""
-    rows, powers = indices[CORNER_ROWS], indices[POWER]
+    rows, powers = indices[TETRAHEDRON], indices[POWER]
     lists = work[indices[START] :].view(np.int64)
-    found, near = indices[FOUND] - indices[START], indices[NEAR] - indices[START]
+    cavity = indices[CAVITY] - indices[START]
+    neighbors = indices[NEIGHBORS] - indices[START]
     mark = indices[MARK] - indices[START]
-    for c in range(corners):
-        t = lists[place(found + c)]
+    for c in range(tetrahedra):
+        t = lists[place(cavity + c)]
         work[place(powers + t)] = UNKNOWN
         for k in range(4, 8):
             other = indices[place(rows + 30 * t + k)]
             work[place(powers + other)] = UNKNOWN
     for c in range(sites):
-        lists[place(mark + lists[place(near + c)])] = 0
+        lists[place(mark + lists[place(neighbors + c)])] = 0

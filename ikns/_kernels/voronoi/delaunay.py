@@ -1,10 +1,11 @@
-"""Delaunay triangulation in space, one site after another, however degenerate.
+"""Delaunay triangulation in space by incremental insertion, exact for any sites.
 
-A new site takes the place of all tetrahedra whose spheres hold it. They leave a cavity,
-and each facet of it becomes the base of a tetrahedron with the site as its apex
-(A. Bowyer and D. F. Watson, The Computer Journal 24, 1981). A vertex at infinity stands
-on every facet of the hull, so that outside is nothing special. Predicates are exact and
-never tie: cavities are star-shaped and no tetrahedron is flat.
+A new site removes all tetrahedra whose circumspheres hold it. They leave a cavity, and
+each facet of its boundary becomes the base of a tetrahedron with the site as its apex
+(A. Bowyer and D. F. Watson, The Computer Journal 24, 1981). Facets of the hull are
+joined with a vertex at infinity, so that sites outside the hull need no rules of their
+own. Predicates are exact and never tie: cavities are star-shaped and no tetrahedron is
+flat.
 
 A cell is a row of eight integers: four vertices of positive orientation, infinity (-1)
 only in place 0, and four links across the facets that leave out each vertex,
@@ -28,9 +29,9 @@ _INFINITY = -1
 _FREE = -2  # in place 0 of a row that holds no cell
 #: Vertices of a facet in turn, seen from outside.
 OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-# Columns of notes: the mark of the step that last saw a cell, plus one if the cell was
-# beside that step's cavity; list of the cavity's cells; list of free rows.
-_SEEN, _CAVITY, _SPARE = 0, 1, 2
+# Columns of scratch: the mark of the step that last saw a cell, plus one if the cell
+# was next to that step's cavity; list of the cavity's cells; list of free rows.
+_SEEN, _CAVITY, _FREE_ROWS = 0, 1, 2
 
 
 def triangulate(sites: Sites, order: Integers) -> tuple[Integers, Integers]:
@@ -51,14 +52,15 @@ def triangulate(sites: Sites, order: Integers) -> tuple[Integers, Integers]:
         The tetrahedron across the facet that leaves out each vertex; -1 on the hull.
     """
     cells = first = _first_cells(sites, order)
-    room = 4 * len(order) + 32  # at first half; random sites need 7 times their number
+    # At first half; random sites need 7 times their number.
+    capacity = 4 * len(order) + 32
     used = 0
     while len(first) and not used:
-        room *= 2
-        cells = np.empty((room, 8), dtype=np.int64)
+        capacity *= 2
+        cells = np.empty((capacity, 8), dtype=np.int64)
         cells[:5] = first
         others = order[~np.isin(order, first[0, :4])]
-        used = insert(sites, others, cells, np.zeros((room, 3), dtype=np.int64))
+        used = insert(sites, others, cells, np.zeros((capacity, 3), dtype=np.int64))
     finite = cells[:used, 0] >= 0
     number = np.where(finite, finite.cumsum() - 1, -1)
     cells = cells[:used][finite]
@@ -91,17 +93,17 @@ def _first_cells(sites: Sites, order: Integers) -> Integers:
 
 
 @compiled
-def insert(sites: Sites, order: Integers, cells: Integers, notes: Integers) -> int:
-    """Insert sites one by one; the number of rows used, or 0 if they do not suffice."""
+def insert(sites: Sites, order: Integers, cells: Integers, scratch: Integers) -> int:
+    """Insert sites one by one; return the rows used, or 0 if there are too few."""
     R = np.empty(SCRATCH, dtype=np.int64)
     used, spare, last = np.int64(5), np.int64(0), np.int64(0)
     for step in range(len(order)):
         site, mark = order[step], 2 * step + 2
         last = _locate(sites, R, cells, last, site)
-        size, rim = _find_cavity(sites, R, cells, notes, last, site, mark)
-        if used + rim > len(cells):
+        size, boundary = _find_cavity(sites, R, cells, scratch, last, site, mark)
+        if used + boundary > len(cells):
             return 0
-        used, spare, last = _fill(cells, notes, size, used, spare, site, mark)
+        used, spare, last = _fill_cavity(cells, scratch, size, used, spare, site, mark)
     return int(used)
 
 
@@ -134,19 +136,19 @@ def _find_cavity(
     sites: Sites,
     R: Integers,
     cells: Integers,
-    notes: Integers,
+    scratch: Integers,
     cell: int,
     site: int,
     mark: int,
 ) -> tuple[int, int]:
-    """List the cells whose spheres hold a site; their number and that of the facets."""
-    notes[cell, _SEEN] = mark
-    notes[0, _CAVITY] = cell
-    size, rim, i = 1, 0, 0
+    """List the cells whose spheres hold a site; return their number and the facets'."""
+    scratch[cell, _SEEN] = mark
+    scratch[0, _CAVITY] = cell
+    size, boundary, i = 1, 0, 0
     while i < size:
         for k in range(4):
-            other = cells[notes[i, _CAVITY], 4 + k] >> 2
-            if notes[other, _SEEN] < mark:
+            other = cells[scratch[i, _CAVITY], 4 + k] >> 2
+            if scratch[other, _SEEN] < mark:
                 side, finite = 0, other
                 if cells[other, 0] == _INFINITY:
                     v, w = cells[other, 2], cells[other, 3]
@@ -157,40 +159,40 @@ def _find_cavity(
                     w, z = cells[finite, 2], cells[finite, 3]
                     side = 1 if in_sphere(sites, R, u, v, w, z, site) else -1
                 if side > 0:
-                    notes[other, _SEEN] = mark
-                    notes[size, _CAVITY] = other
+                    scratch[other, _SEEN] = mark
+                    scratch[size, _CAVITY] = other
                     size += 1
                 else:
-                    notes[other, _SEEN] = mark + 1
-            rim += notes[other, _SEEN] - mark
+                    scratch[other, _SEEN] = mark + 1
+            boundary += scratch[other, _SEEN] - mark
         i += 1
-    return size, rim
+    return size, boundary
 
 
 @compiled
-def _fill(
+def _fill_cavity(
     cells: Integers,
-    notes: Integers,
+    scratch: Integers,
     size: int,
     used: int,
     spare: int,
     site: int,
     mark: int,
 ) -> tuple[int, int, int]:
-    """Fill the cavity with cells around the site; rows used, free rows, a finite cell.
+    """Fill the cavity with cells at the site; rows used, free rows, a finite cell.
 
     Meanwhile a cavity's link to the outside is ~(new cell on that facet).
     """
     last = -1
     for i in range(size):
-        cell = notes[i, _CAVITY]
+        cell = scratch[i, _CAVITY]
         for k in range(4):
             link = cells[cell, 4 + k]
-            if notes[link >> 2, _SEEN] == mark:
+            if scratch[link >> 2, _SEEN] == mark:
                 continue
             if spare > 0:
                 spare -= 1
-                new = notes[spare, _SPARE]
+                new = scratch[spare, _FREE_ROWS]
             else:
                 new = used
                 used += 1
@@ -201,12 +203,12 @@ def _fill(
             cells[new, 4 + k] = link
             cells[link >> 2, 4 + (link & 3)] = 4 * new + k
             cells[cell, 4 + k] = ~new
-            notes[new, _SEEN] = 0
+            scratch[new, _SEEN] = 0
             if cells[new, 0] >= 0:
                 last = new
     for i in range(size):
         for k in range(4):
-            cell = notes[i, _CAVITY]
+            cell = scratch[i, _CAVITY]
             new = ~cells[cell, 4 + k]
             for j in range(4):
                 if new >= 0 and cells[new, 4 + j] < 0:
@@ -214,15 +216,15 @@ def _fill(
                     cells[new, 4 + j] = 4 * other + m
                     cells[other, 4 + m] = 4 * new + j
     for i in range(size):
-        cells[notes[i, _CAVITY], 0] = _FREE
-        notes[spare, _SPARE] = notes[i, _CAVITY]
+        cells[scratch[i, _CAVITY], 0] = _FREE
+        scratch[spare, _FREE_ROWS] = scratch[i, _CAVITY]
         spare += 1
     return used, spare, last
 
 
 @compiled
 def _around_edge(cells: Integers, cell: int, k: int, j: int) -> tuple[int, int]:
-    """Turn about a cell's edge without k and j, through the cavity, from facet k on.
+    """Rotate around the edge of a cell opposite to k and j, within the cavity.
 
     Returns the new cell on the facet where this ends, and the place in that cell of the
     vertex that is neither the site nor on the edge.

@@ -1,11 +1,11 @@
-"""Signs and values of determinants of sites, without rounding.
+"""Exact arithmetic: signs and values of determinants of sites, without rounding.
 
-Floats are dyadic fractions, so determinants of them are integers in steps of some power
+Floats are dyadic fractions, so their determinants are integers in steps of some power
 of two. Here an integer is a row of digits, lowest first,
 
     sum_i digit_i 2**(30 i),    -2**29 <= digit_i < 2**29,
 
-whose highest digit other than zero tells the sign. A product of digits takes 58 bits,
+whose highest nonzero digit has its sign. A product of digits takes 58 bits,
 and no sum below has more than 24 of them at one place before digits are carried. The
 rows lie in one array of scratch memory, and functions name them by number.
 """
@@ -139,7 +139,7 @@ def determinants(
 ) -> tuple[float, int]:
     """Compute the rows of all stages up to the last one, for five sites.
 
-    Those that the stages do not see had best be some of the others again.
+    Sites that the stages do not use should repeat some of the others.
 
     Returns
     -------

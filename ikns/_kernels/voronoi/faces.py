@@ -1,7 +1,7 @@
-"""How large the polygons between Voronoi cells look from their sites.
+"""Solid angles of Voronoi faces, seen from their sites.
 
-A polygon is a fan of triangles from the axis through both sites; seen from a site, a
-triangle with the unit vectors a, b, c to its corners fills the solid angle
+A face is a fan of triangles from the axis through both sites; seen from a site, a
+triangle with the unit vectors a, b, c to its vertices has the solid angle
 
     2 atan2(a . (b x c), 1 + a . b + b . c + c . a)
 
@@ -36,13 +36,13 @@ def solid_angles(
     entering: Integers,
     leaving: Integers,
 ) -> Floats:
-    """Solid angles of polygons from the first sites of their edges, (E,) steradian.
+    """Solid angles of faces from the first sites of their edges, (E,) steradian.
 
     Parameters
     ----------
     points : (N, 3) array
     place : (T, 3) array
-        Of the corners.
+        Of the circumcenters.
     normal, edges, axis, side_facet, side_edge, entering, leaving
         As in a Voronoi diagram.
     """
@@ -57,21 +57,21 @@ def solid_angles(
         angle[e] += _solid_angle(a, start, end)
         if entering[s] == len(place):
             first = start
-        if leaving[s] == len(place):  # back along the horizon to the first ray
+        if leaving[s] == len(place):  # back at infinity to the first ray
             angle[e] += _solid_angle(a, end, first)
     return angle
 
 
 @compiled
 def _toward(
-    points: Floats, place: Floats, normal: Floats, site: int, corner: int, f: int
+    points: Floats, place: Floats, normal: Floats, site: int, center: int, f: int
 ) -> Vector:
-    """Return the unit vector from a site to a corner, or along the ray of facet f."""
-    if corner == len(place):
+    """Return the unit vector from a site to a circumcenter, or along f's ray."""
+    if center == len(place):
         return normal[f, 0], normal[f, 1], normal[f, 2]
-    x = place[corner, 0] - points[site, 0]
-    y = place[corner, 1] - points[site, 1]
-    z = place[corner, 2] - points[site, 2]
+    x = place[center, 0] - points[site, 0]
+    y = place[center, 1] - points[site, 1]
+    z = place[center, 2] - points[site, 2]
     r = sqrt(x * x + y * y + z * z)
     return x / r, y / r, z / r
 

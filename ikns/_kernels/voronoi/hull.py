@@ -1,4 +1,4 @@
-"""Where a point is to the facets of a convex hull: exactly, also where almost on one.
+"""Depths of points behind the facets of a convex hull, exact also close to a facet.
 
 A plane is packed as its unit normal, what that rounds off, and a point in it.
 """
@@ -12,8 +12,8 @@ from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import (
     CENTER,
     DEPTH,
+    FACETS,
     HULL,
-    LINES,
     PLANE,
     ROUNDING,
     SCALE,
@@ -83,7 +83,7 @@ def hull_depths(
         may be less than CANCELED.
     """
     depths, facets = indices[DEPTH], indices[HULL]
-    planes = indices[PLANE] + 10 * (indices[LINES] - facets)
+    planes = indices[PLANE] + 10 * (indices[FACETS] - facets)
     least, part = np.inf, np.inf
     for h in range(facets):
         depth = depth_behind(numbers, planes + 10 * h, x)

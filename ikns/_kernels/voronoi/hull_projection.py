@@ -1,9 +1,9 @@
 """The point of a convex hull that is nearest to a query.
 
-The nearest point y is the one behind whose plane, at a right angle to x - y, all sites
-lie. Comparing distances alone would tell y only to 1e-8, because they are stationary
-there; so distances choose a few candidates and the sites choose y. Candidates are the
-feet of x on the facets' planes, where they are in the facet, and on their sides.
+All sites lie behind the plane through the nearest point y that is normal to x - y.
+Comparing distances alone would give y only to 1e-8, because they are stationary there;
+so distances choose a few candidates and the sites choose y. Candidates are the feet of
+x on the facets' planes, where they are in the facet, and on their edges.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def _along(a: Triple, s: float, u: Triple, t: float, v: Triple) -> Triple:
 def _candidate(
     numbers: Floats, indices: Indices, facet: int, kind: int, x: Triple
 ) -> Triple:
-    """Foot of x on a facet's plane (kind 3) or on one of its sides (0, 1, 2)."""
+    """Foot of x on a facet's plane (kind 3) or on one of its edges (0, 1, 2)."""
     if kind < 3:
         a = _site(numbers, indices, facet, kind)
         u = _minus(_site(numbers, indices, facet, (kind + 1) % 3), a)

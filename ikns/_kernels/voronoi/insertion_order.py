@@ -1,4 +1,4 @@
-"""In which order to insert sites into a triangulation, so that it takes little time."""
+"""The order in which sites are inserted into a triangulation, for speed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Integers = NDArray[np.int64]
 
 
 def insertion_order(points: Floats) -> Integers:
-    """Order of sites in which most are near the one before.
+    """Biased randomized insertion order: most sites are close to the one before.
 
     First four far apart. Then random rounds, each of half of what is left, so that no
     layout makes large cavities (N. Amenta, S. Choi and G. Rote, Incremental

@@ -1,4 +1,4 @@
-"""Which side a site is on, of a plane and of a sphere: never wrong.
+"""Exact orientation and in-sphere predicates.
 
 What rounding surely cannot change is decided in floats, with the bounds of
 J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric
@@ -63,10 +63,10 @@ def in_sphere(
 ) -> bool:
     """Whether site e lies inside the sphere of a positive tetrahedron; never a tie.
 
-    On the sphere itself decide vanishing lifts of the sites, those of earlier ones
-    larger. There e stands above the lifted tetrahedron by lift_e - sum_v mu_v lift_v,
-    where mu are its barycentric coordinates; the first lift with a coefficient other
-    than zero outweighs all later ones.
+    On the sphere itself a symbolic perturbation decides: vanishing lifts of the sites'
+    squared norms, those of earlier sites larger. There e is above the lifted
+    tetrahedron by lift_e - sum_v mu_v lift_v, where mu are its barycentric coordinates;
+    the first lift with a nonzero coefficient outweighs all later ones.
     """
     x = sites.x
     ax, ay, az = x[a, 0] - x[e, 0], x[a, 1] - x[e, 1], x[a, 2] - x[e, 2]
@@ -89,11 +89,11 @@ def in_sphere(
     sign = sign_of(R, POWER, n)
     if sign != 0:
         return sign < 0
-    return _lifts_decide(sites, R, (a, b, c, d), e)
+    return _perturbed_in_sphere(sites, R, (a, b, c, d), e)
 
 
 @compiled
-def _lifts_decide(
+def _perturbed_in_sphere(
     sites: Sites, R: Integers, simplex: tuple[int, int, int, int], e: int
 ) -> bool:
     a, b, c, d = simplex

@@ -1,18 +1,9 @@
-"""One query for natural neighbors: from where it is to weights of the sites or a value.
+"""One natural-neighbor query: from its position to weights of the sites or a value.
 
-The query is scaled and brought near, placed in or on the hull by the rule for queries
-outside it, moved away from the hull by a skin, and given its coordinates (`cavity`,
+The query is scaled and brought near, projected onto the hull if it is outside and that
+is the rule, moved away from the hull by a skin, and given its coordinates (`cavity`,
 `sibson`). A query whose coordinates cannot be trusted, for the walk to it failed or a
 weight came out negative, is `UNSURE` and has NaN for weights and value.
-
-Sibson's smooth interpolant joins his weights w_i and the tangent planes at the sites,
-with p_i = site - query (R. Sibson, A brief description of natural neighbour
-interpolation, 1981):
-
-    Z0 = sum_i w_i z_i
-    xi = sum_i w_i / |p_i| (z_i - gradient_i . p_i) / sum_i w_i / |p_i|
-    alpha = sum_i w_i |p_i| / sum_i w_i / |p_i|,    beta = sum_i w_i |p_i|^2
-    Z1 = (alpha Z0 + beta xi) / (alpha + beta)
 """
 
 from __future__ import annotations
@@ -21,45 +12,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
-from ikns._kernels.voronoi.cavity import find_cavity, forget_cavity, try_all
+from ikns._kernels.voronoi.answer import write_answer
+from ikns._kernels.voronoi.cavity import check_all_spheres, clear_cavity, find_cavity
 from ikns._kernels.voronoi.diagram import (
     CENTER,
-    GRADIENT,
     INSIDE_HULL,
     LAPLACE,
     METHOD,
     MIDDLE,
-    NEAR,
     NEAREST,
+    NEIGHBORS,
     NOT_FINITE,
     NOWHERE,
+    OFFSET,
     OUTSIDE,
     OUTSIDE_HULL,
     ROUNDING,
     SITE,
     SITES,
-    SMOOTH,
     START,
-    TOWARD,
     UNSURE,
-    VALUE,
-    VALUES,
     VOLUME,
     place,
 )
 from ikns._kernels.voronoi.double_double import Triple, difference
 from ikns._kernels.voronoi.hull import hull_depths, scaled
 from ikns._kernels.voronoi.hull_projection import nearest_on_hull
-from ikns._kernels.voronoi.sibson import add_polygons
+from ikns._kernels.voronoi.sibson import add_faces
 
 __all__ = ["NEGATIVE", "answer_many", "answer_one", "natural_weights"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: Queries nearer to the hull than this part of the way to the middle are moved in to
-#: there. The hull of a box whose corners are rounded is uneven by 1e-16, and this near
-#: to it weights would tell which way.
+#: Queries closer to the hull than this part of the way to the middle are moved in to
+#: there. The hull of a box whose corners are rounded is uneven by 1e-16, and closer to
+#: it the weights would depend on how.
 _SKIN = 1e-11
 #: Squared distance to a site below which nothing could be told apart.
 _AT_SITE = 1e-36
@@ -86,7 +74,7 @@ def _nearest(numbers: Floats, indices: Indices, x: Triple) -> tuple[int, float]:
 def _one_site(indices: Indices, site: int, work: Floats) -> int:
     """Give a site all the weight."""
     work[place(indices[VOLUME] + site)] = 1.0
-    work[indices[NEAR] :].view(np.int64)[0] = site
+    work[indices[NEIGHBORS] :].view(np.int64)[0] = site
     return 1
 
 
@@ -101,19 +89,19 @@ def _inside_weights(
 ) -> tuple[bool, int]:
     """Write the weights of a point inside; return whether they are, and how many."""
     if start < 0:
-        corners, sites = try_all(numbers, indices, x, rest, work)
+        tetrahedra, sites = check_all_spheres(numbers, indices, x, rest, work)
     else:
-        corners, sites = find_cavity(numbers, indices, x, rest, start, work)
-    if corners == 0:
+        tetrahedra, sites = find_cavity(numbers, indices, x, rest, start, work)
+    if tetrahedra == 0:
         nearest, square = _nearest(numbers, indices, x)
         if square <= _AT_SITE:
             return True, _one_site(indices, nearest, work)
         return False, 0
-    near = work[indices[NEAR] :].view(np.int64)
-    toward, volume, at_site = indices[TOWARD], indices[VOLUME], -1
+    neighbors = work[indices[NEIGHBORS] :].view(np.int64)
+    offset, volume, at_site = indices[OFFSET], indices[VOLUME], -1
     for k in range(sites):
-        site = near[place(k)]
-        at, to = place(indices[SITE] + 3 * site), place(toward + 3 * site)
+        site = neighbors[place(k)]
+        at, to = place(indices[SITE] + 3 * site), place(offset + 3 * site)
         p = numbers[at] - x[0]
         q = numbers[at + place(1)] - x[1]
         r = numbers[at + place(2)] - x[2]
@@ -121,18 +109,18 @@ def _inside_weights(
         if p * p + q * q + r * r <= _AT_SITE:
             at_site = site
     if at_site < 0:
-        add_polygons(numbers, indices, corners, work)
+        add_faces(numbers, indices, tetrahedra, work)
     if start >= 0:
-        forget_cavity(indices, corners, sites, work)
+        clear_cavity(indices, tetrahedra, sites, work)
     if at_site >= 0:
         return True, _one_site(indices, at_site, work)
 
     total, positive, least = 0.0, 0.0, np.inf
     for k in range(sites):
-        site = near[place(k)]
+        site = neighbors[place(k)]
         weight = work[place(volume + site)]
         if indices[METHOD] == LAPLACE:
-            to = place(toward + 3 * site)
+            to = place(offset + 3 * site)
             p, q, r = work[to], work[to + place(1)], work[to + place(2)]
             weight /= p * p + q * q + r * r
         total += weight
@@ -140,7 +128,7 @@ def _inside_weights(
         positive += max(weight, 0.0)
         work[place(volume + site)] = max(weight, 0.0)
     for k in range(sites):
-        work[place(volume + near[place(k)])] /= positive
+        work[place(volume + neighbors[place(k)])] /= positive
     return least >= NEGATIVE * total and total > 0, sites
 
 
@@ -179,79 +167,13 @@ def _weights(
 
 
 @compiled
-def _shares(indices: Indices, count: int, work: Floats) -> tuple[float, float]:
-    """Return a, b in Z1 = sum_i a w_i z_i + b w_i / |p_i| (z_i - gradient_i . p_i)."""
-    volume, toward = indices[VOLUME], indices[TOWARD]
-    near = work[indices[NEAR] :].view(np.int64)
-    nearness, distance, square = 0.0, 0.0, 0.0
-    for k in range(count):
-        site = near[place(k)]
-        to, weight = place(toward + 3 * site), work[place(volume + site)]
-        p, q, r = work[to], work[to + place(1)], work[to + place(2)]
-        length = np.sqrt(p * p + q * q + r * r)
-        nearness += weight / length
-        distance += weight * length
-        square += weight * length * length
-    alpha = distance / nearness
-    return alpha / (alpha + square), square / (alpha + square) / nearness
-
-
-@compiled
-def _give(
-    numbers: Floats,
-    indices: Indices,
-    status: int,
-    count: int,
-    work: Floats,
-    weigh: int,
-    out: Floats,
-) -> None:
-    """Move weights from scratch to an (N,) array, or add up the sites' values (M,)."""
-    volume, toward, m = indices[VOLUME], indices[TOWARD], indices[VALUES]
-    known = status >= 0 and count > 0
-    for v in range(len(out)):
-        out[v] = 0.0 if known else np.nan
-    smooth = indices[METHOD] == SMOOTH and count > 1 and weigh == 0
-    plain, tangent = 1.0, 0.0
-    if smooth:
-        plain, tangent = _shares(indices, count, work)
-    near = work[indices[NEAR] :].view(np.int64)
-    for k in range(count):
-        site = near[place(k)]
-        weight = work[place(volume + site)]
-        work[place(volume + site)] = 0.0
-        if not known or weight == 0:
-            continue
-        if weigh != 0:
-            out[site] = weight
-            continue
-        steep = 0.0
-        if smooth:
-            to = place(toward + 3 * site)
-            p, q, r = work[to], work[to + place(1)], work[to + place(2)]
-            steep = tangent * weight / np.sqrt(p * p + q * q + r * r)
-            gradients = indices[GRADIENT] + 3 * m * site
-            for v in range(m):
-                g = place(gradients + 3 * v)
-                out[v] -= steep * (
-                    numbers[g] * p
-                    + numbers[g + place(1)] * q
-                    + numbers[g + place(2)] * r
-                )
-        weight = plain * weight + steep
-        values = indices[VALUE] + m * site
-        for v in range(m):
-            out[v] += weight * numbers[place(values + v)]
-
-
-@compiled
 def answer_one(diagram: Floats, x: Floats, out: Floats) -> bool:
     """Write the value (M,) at a query (3,), m; return whether it has three numbers."""
     if len(x) != 3:
         return False
     indices, at = diagram.view(np.int64), (x[0], x[1], x[2])
     status, count = _weights(diagram, indices, at, indices[MIDDLE], diagram)
-    _give(diagram, indices, status, count, diagram, 0, out)
+    write_answer(diagram, indices, status, count, diagram, 0, out)
     return True
 
 
@@ -266,14 +188,14 @@ def answer_many(
 ) -> None:
     """Write weights (Q, N) or values (Q, M) and the status (Q,) of queries (Q, 3).
 
-    Only of those in the order, which walk from where the one before was.
+    Only of those in `order`; each walk starts where the one before ended.
     """
     indices = diagram.view(np.int64)
     indices[indices[START]] = indices[MIDDLE]
     for q in order:
         start, at = indices[indices[START]], (x[q, 0], x[q, 1], x[q, 2])
         status[q], count = _weights(diagram, indices, at, start, diagram)
-        _give(diagram, indices, status[q], count, diagram, weigh, out[q])
+        write_answer(diagram, indices, status[q], count, diagram, weigh, out[q])
 
 
 @compiled
@@ -300,5 +222,5 @@ def natural_weights(
     """
     at = (x[0], x[1], x[2])
     status, count = _weights(numbers, indices, at, indices[MIDDLE], work)
-    _give(numbers, indices, status, count, work, 1, weights)
+    write_answer(numbers, indices, status, count, work, 1, weights)
     return status

@@ -1,8 +1,6 @@
-"""Which lines of the Voronoi diagram are sides of which polygon, and in which order.
+"""The facets of a triangulation, and the rings of facets around its edges.
 
-A line is at a right angle to a facet of the Delaunay triangulation; the polygon that
-two cells share is at a right angle to the edge between their sites, and its sides are
-the lines of all facets around that edge.
+The Voronoi face of an edge has the Voronoi edges of these facets as its sides.
 """
 
 from __future__ import annotations
@@ -13,12 +11,12 @@ from numpy.typing import NDArray
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.delaunay import OUTWARD
 
-__all__ = ["lines", "rings"]
+__all__ = ["list_facets", "list_sides"]
 
 Integers = NDArray[np.int64]
 
 
-def lines(
+def list_facets(
     simplices: Integers, neighbors: Integers
 ) -> tuple[Integers, Integers, Integers]:
     """Every facet once, turned away from the tetrahedron behind it.
@@ -38,13 +36,13 @@ def lines(
     return facets, behind, ahead[owned]
 
 
-def rings(
+def list_sides(
     facets: Integers, behind: Integers, ahead: Integers, outside: int
 ) -> tuple[Integers, Integers, Integers, Integers, Integers, Integers]:
-    """Sides of each edge's polygon, counterclockwise; from the ray, if there is one.
+    """Sides of each edge's face, counterclockwise; from the ray, if there is one.
 
-    Counterclockwise about an edge that runs along its facet's turn, the line leads
-    ahead; about the opposite edge it leads back.
+    Counterclockwise about an edge in the direction of the facet's turn, its Voronoi
+    edge leads ahead; about the opposite edge it leads back.
 
     Returns
     -------
@@ -62,20 +60,20 @@ def rings(
     side_facet, side_edge = order // 3, new.cumsum() - 1
     entering = np.where(along, behind[side_facet], ahead[side_facet])
     leaving = np.where(along, ahead[side_facet], behind[side_facet])
-    in_turn(begin, outside, side_facet, entering, leaving)
+    sort_sides(begin, outside, side_facet, entering, leaving)
     edges = np.column_stack([low, high])[new]
     return edges, begin, side_facet, side_edge, entering, leaving
 
 
 @compiled
-def in_turn(
+def sort_sides(
     begin: Integers,
     outside: int,
     side_facet: Integers,
     entering: Integers,
     leaving: Integers,
 ) -> None:
-    """Put the sides of each polygon in turn: each starts where the last one ends."""
+    """Sort the sides of each face: each starts where the last one ends."""
     for e in range(len(begin) - 1):
         at = entering[begin[e]]
         for s in range(begin[e], begin[e + 1]):

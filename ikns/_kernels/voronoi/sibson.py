@@ -1,9 +1,9 @@
-"""Natural-neighbor coordinates from polygons that a query cuts: Sibson's, Laplace's.
+"""Natural-neighbor coordinates from the Voronoi faces that a query's cell cuts.
 
-Between neighbors i and j stands a polygon of the Voronoi diagram, at a right angle to
-the unit vector axis_ij. Let A_ij be twice its area on the query's side and p = site -
-query. The part that the query takes of cell i is closed by these polygons and by one in
-the bisector of p_i. So its volume V_i and that closing face's area F_i are (Gauss)
+Sites i and j that are neighbors share a Voronoi face, normal to the unit vector
+axis_ij. Let A_ij be twice its area in the query's cell and p = site - query. The part
+that the query takes of cell i is bounded by these faces and by one in the bisector of
+query and site i. So its volume V_i and that face's area F_i are (divergence theorem)
 
     V_i = sum_j A_ij (axis_ij . p_j) / 12
     F_i = -sum_j A_ij (axis_ij . p_i) / (2 |p_i|)
@@ -15,7 +15,7 @@ new local coordinates, 1999). Twice the area is
 
     A = sum_{k < l} length_k length_l sin(angle from side k to side l)
 
-over the kept parts of the sides in their order, from where the cut enters the polygon.
+over the kept parts of the sides in their order, from where the cut enters the face.
 Positions do not appear, only lengths and angles, each accurate to its last digit.
 """
 
@@ -27,42 +27,42 @@ from numpy.typing import NDArray
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import (
     ANGLE,
-    CORNER_ROWS,
+    CAVITY,
     EDGE,
-    FOUND,
     KEPT,
     LAPLACE,
     METHOD,
+    OFFSET,
     POWER,
     RING,
-    TOWARD,
+    TETRAHEDRON,
     VOLUME,
     place,
 )
 
-__all__ = ["add_polygons"]
+__all__ = ["add_faces"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
 @compiled
-def add_polygons(numbers: Floats, indices: Indices, corners: int, work: Floats) -> None:
-    """Add up V, or F times 12 |p|, of the sites around a cavity of so many corners.
+def add_faces(numbers: Floats, indices: Indices, tetrahedra: int, work: Floats) -> None:
+    """Add up V, or F times 12 |p|, of the sites around a cavity of so many tetrahedra.
 
-    The corners that the query takes of a polygon follow each other. So each polygon is
-    met once at the first of them, or at its first corner where all are taken. One long
-    loop, because calls that pass arrays cost as much as a polygon.
+    The tetrahedra of a cavity around an edge follow each other. So each edge is met
+    once at the first of them, or at its first tetrahedron where all are in the cavity.
+    One long loop, because calls that pass arrays cost as much as a face.
     """
-    toward, volume, power = indices[TOWARD], indices[VOLUME], indices[POWER]
-    kept, lengths, rows = indices[KEPT], indices[RING], indices[CORNER_ROWS]
+    offset, volume, power = indices[OFFSET], indices[VOLUME], indices[POWER]
+    kept, lengths, rows = indices[KEPT], indices[RING], indices[TETRAHEDRON]
     edges, angles = indices[EDGE], indices[ANGLE]
-    found = work[indices[FOUND] :].view(np.int64)
+    cavity = work[indices[CAVITY] :].view(np.int64)
     laplace = indices[METHOD] == LAPLACE
-    for c in range(corners):
-        row = rows + 30 * found[place(c)]
-        for corner_edge in range(12, 30, 3):
-            slot = place(row + corner_edge)
+    for c in range(tetrahedra):
+        row = rows + 30 * cavity[place(c)]
+        for k_edge in range(12, 30, 3):
+            slot = place(row + k_edge)
             edge, start = place(edges + indices[slot]), indices[slot + place(1)]
             sides = indices[edge + place(2)]
             whole = work[place(power + indices[slot + place(2)])] > 0
@@ -71,8 +71,8 @@ def add_polygons(numbers: Floats, indices: Indices, corners: int, work: Floats) 
             ring = edge + place(4)
             k, n = start, 0
             while n < sides:
-                line = indices[ring + place(k)]
-                work[place(lengths + n)] = work[place(kept + line)]
+                facet = indices[ring + place(k)]
+                work[place(lengths + n)] = work[place(kept + facet)]
                 k, n = k + 1 if k < sides - 1 else 0, n + 1
                 if not work[place(power + indices[ring + place(sides + k)])] > 0:
                     break
@@ -94,7 +94,7 @@ def add_polygons(numbers: Floats, indices: Indices, corners: int, work: Floats) 
                     k = k + 1 if k < sides - 1 else 0
 
             i, j = indices[edge], indices[edge + place(1)]
-            to_i, to_j = place(toward + 3 * i), place(toward + 3 * j)
+            to_i, to_j = place(offset + 3 * i), place(offset + 3 * j)
             u, v, w = (
                 numbers[angle],
                 numbers[angle + place(1)],

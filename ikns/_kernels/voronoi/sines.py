@@ -1,9 +1,9 @@
-"""Sines of the angles between the sides of Voronoi polygons.
+"""Sines of the angles between the sides of Voronoi faces.
 
-A side is at a right angle to a facet around the polygon's edge, so two sides are at as
-much of an angle as their facets. With the edge a, a facet's unit normal n, and y from
-the edge's first site to the other facet's third, that is how high y is over the facet,
-for its distance from the edge:
+A side is normal to a facet around the edge, so the angle between two sides is that
+between their facets. With the edge a, a facet's unit normal n, and y from the edge's
+first site to the other facet's third, the sine is the height of y over the facet by its
+distance from the edge:
 
     sine = n . y |a| / |a x y|
 """
@@ -41,7 +41,7 @@ def sines(
     second: Integers,
     sine: Floats,
 ) -> None:
-    """Write the pairs of sides of one polygon, edge by edge, and their sines.
+    """Write the pairs of sides of each face, edge by edge, and their sines.
 
     A height below the part `canceled` of |y|_1 is left out: the sine is NaN.
 

@@ -5,8 +5,8 @@ circumcenter, seen from its first site, is
 
     c = (|u|^2 v x w + |v|^2 w x u + |w|^2 u x v) / (2 d)
 
-Across a facet with normal n, |n| twice its area, to a tetrahedron with d', the line has
-the length
+Across a facet with normal n, |n| twice its area, to a tetrahedron with d', the Voronoi
+edge has the length
 
     L = p |n| / (2 d')
 
@@ -26,7 +26,7 @@ from ikns._kernels.voronoi import exact
 from ikns._kernels.voronoi.delaunay import triangulate
 from ikns._kernels.voronoi.exact import Sites, on_lattice
 from ikns._kernels.voronoi.insertion_order import insertion_order
-from ikns._kernels.voronoi.rings import lines, rings
+from ikns._kernels.voronoi.rings import list_facets, list_sides
 from ikns._kernels.voronoi.sines import sines
 from ikns.nullspace.interpolation.double_double import (
     difference,
@@ -57,18 +57,18 @@ def diagram(points: Floats) -> Voronoi:
     sites = on_lattice(points)
     simplices, neighbors = triangulate(sites, insertion_order(points))
     outside = len(simplices)
-    facets, behind, ahead = lines(simplices, neighbors)
-    edges, begin, side_facet, side_edge, entering, leaving = rings(
+    facets, behind, ahead = list_facets(simplices, neighbors)
+    edges, begin, side_facet, side_edge, entering, leaving = list_sides(
         facets, behind, ahead, outside
     )
-    corner, corner_rest, volume = _corners(sites, simplices)
+    center, center_rest, volume = _circumcenters(sites, simplices)
     normal, normal_rest, area = _normals(sites, facets)
 
     inner = np.flatnonzero(ahead < outside)
     here, there = behind[inner], ahead[inner]
     place = (neighbors[there] == here[:, None]).argmax(axis=1)
     fives = np.column_stack([simplices[here], simplices[there, place]])
-    power = _powers(sites, fives, corner[here], corner_rest[here], volume[here])
+    power = _powers(sites, fives, center[here], center_rest[here], volume[here])
     length = np.full(len(facets), np.inf)
     length[inner] = power / 2 * area[inner] / volume[there]
 
@@ -81,8 +81,8 @@ def diagram(points: Floats) -> Voronoi:
     return Voronoi(
         simplices=simplices,
         neighbors=neighbors,
-        corner=corner,
-        corner_rest=corner_rest,
+        circumcenter=center,
+        circumcenter_rest=center_rest,
         behind=behind,
         ahead=ahead,
         length=length,
@@ -123,8 +123,8 @@ def _ratio(
     return total, rest - (total - value)
 
 
-def _corners(sites: Sites, simplices: Indices) -> tuple[Floats, Floats, Floats]:
-    """Return corners, what these round off, and six times the volumes."""
+def _circumcenters(sites: Sites, simplices: Indices) -> tuple[Floats, Floats, Floats]:
+    """Return circumcenters, what these round off, and six times the volumes."""
     fives = simplices.take([0, 1, 2, 3, 3], axis=1)
     value, rest = _determinants(sites, fives, exact.SPHERE, exact.DETERMINANT, 4)
     below, below_rest = 2 * value[:, :1], 2 * rest[:, :1]
@@ -154,7 +154,7 @@ def _powers(
 
 
 def _pairs_before(begin: Indices) -> Indices:
-    """Count pairs of sides of one polygon, before each polygon and in all."""
+    """Count pairs of sides of one face, before each face and in total."""
     sides = np.diff(begin)
     return np.append(0, (sides * (sides - 1) // 2).cumsum())
 
@@ -172,7 +172,7 @@ def _sines(
     side_edge: Indices,
     entering: Indices,
 ) -> tuple[Indices, Indices, Floats]:
-    """Pairs of sides of one polygon, and the sines of the angles between them."""
+    """Pairs of sides of one face, and the sines of the angles between them."""
     count = _pairs_before(begin)[-1]
     first, second = np.empty((2, count), dtype=np.int64)
     sine = np.empty(count)

@@ -1,4 +1,4 @@
-"""How large the faces between Voronoi cells look from their sites."""
+"""Solid angles of Voronoi faces."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ Floats = NDArray[np.float64]
 
 
 def solid_angles(diagram: Voronoi, points: Floats) -> Floats:
-    """How much of site i's view the face that it shares with site j fills.
+    """Solid angle of the face of each edge, seen from either of its sites.
 
-    Diagonals of co-spherical sites are chosen by chance or by rounding; their polygons
-    have no area, or hardly any, or they are far away. This tells them from the others
-    on any scale.
+    Diagonals of co-spherical sites are chosen by chance or by rounding; their faces
+    have no area, or hardly any, or they are far away. Their solid angle
+    is small on any scale.
 
     Parameters
     ----------
@@ -29,12 +29,12 @@ def solid_angles(diagram: Voronoi, points: Floats) -> Floats:
     Returns
     -------
     (E,) array
-        Steradian, to about 1e-15; the whole view is 4 pi.
+        Steradian, to about 1e-15; all faces of a cell add up to 4 pi.
     """
     d = diagram
     return faces.solid_angles(
         points,
-        d.corner + points[d.simplices[:, 0]],
+        d.circumcenter + points[d.simplices[:, 0]],
         d.normal,
         d.edges,
         d.axis,

@@ -14,13 +14,14 @@ import numpy as np
 from numpy import empty, ndarray
 from numpy.typing import ArrayLike, NDArray
 
-from ikns._kernels.voronoi.batch import answer_rows, rows_of_work
-from ikns._kernels.voronoi.diagram import CORNERS, UNSURE
+from ikns._kernels.voronoi.batch import answer_batch, batch_scratch_rows
+from ikns._kernels.voronoi.diagram import TETRAHEDRA, UNSURE
 from ikns._kernels.voronoi.hull import inside_many
 from ikns._kernels.voronoi.query import answer_many, answer_one
 from ikns.errors import InvalidInput
 from ikns.nullspace.interpolation.domain import domain
 from ikns.nullspace.interpolation.faces import solid_angles
+from ikns.nullspace.interpolation.gradients import scaled_gradients
 from ikns.nullspace.interpolation.inputs import (
     checked_out,
     checked_points,
@@ -28,8 +29,7 @@ from ikns.nullspace.interpolation.inputs import (
     checked_values,
 )
 from ikns.nullspace.interpolation.morton import morton_order
-from ikns.nullspace.interpolation.packed import FEW, packed
-from ikns.nullspace.interpolation.smooth import slopes
+from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT, packed
 
 __all__ = ["Method", "NaturalNeighborInterpolator", "Outside"]
 
@@ -38,12 +38,12 @@ Outside = Literal["nearest", "project", "nan"]
 Floats = NDArray[np.float64]
 
 _FLOAT = np.dtype(np.float64)
-#: Faces that fill less than this much of a site's view, steradian, make no neighbors.
-_GLIMPSE = 1e-9
-#: Queries that are answered side by side: enough for vectors, few enough for a cache.
-_ROW = 64
-#: Fewer queries are not worth bringing in order or side by side (measured).
-_BATCH = 8
+#: Sites whose face has a smaller solid angle are no neighbors, steradian.
+_MIN_SOLID_ANGLE = 1e-9
+#: Queries of a batch: enough for vector instructions, few enough for the cache.
+_BATCH = 64
+#: For fewer queries neither a batch nor an order pays (measured).
+_MIN_BATCH = 8
 
 
 class NaturalNeighborInterpolator:
@@ -83,7 +83,7 @@ class NaturalNeighborInterpolator:
     edges : (E, 2) integer array
         Pairs of sites whose Voronoi cells share a face: the Delaunay edges. Together
         they connect all sites. Cells that only touch in a point or a line do not count
-        (a face must fill 1e-9 sr of its site's view), so there are no accidental
+        (a face needs a solid angle of 1e-9 sr), so there are no accidental
         diagonals: a box has 12 edges however its corners are rounded.
     simplices : (T, 4) integer array
         A Delaunay triangulation; ties are broken by the order of the sites.
@@ -91,9 +91,6 @@ class NaturalNeighborInterpolator:
         Triangles of the convex hull, counterclockwise from outside.
     gradients : (N, ..., 3) array or None
         Those in use.
-    packed : tuple of a float array and an integer array
-        All that compiled code needs: ``natural_weights`` in
-        :mod:`ikns._kernels.voronoi.query`. Not to be changed.
 
     Raises
     ------
@@ -118,7 +115,6 @@ class NaturalNeighborInterpolator:
 
     One interpolator can be used by many threads at once.
 
-    R. Sibson, A brief description of natural neighbour interpolation (1981).
     V. V. Belikov et al., The non-Sibsonian interpolation (1997).
 
     Examples
@@ -159,23 +155,27 @@ class NaturalNeighborInterpolator:
         diagram, n = self._space.diagram, len(self.points)
         self.simplices = diagram.simplices
         self.hull_facets = diagram.hull_facets
-        view = solid_angles(diagram, self._space.sites)
-        self.edges = diagram.edges[view >= _GLIMPSE]
+        angle = solid_angles(diagram, self._space.sites)
+        self.edges = diagram.edges[angle >= _MIN_SOLID_ANGLE]
 
         there = np.empty((n, 0)) if self.values is None else self.values
         self._flat = there.reshape(n, -1)
         self._each = there.shape[1:], (n,)  # shapes of a value and of weights
         self._width, self._is_row = self._flat.shape[1], there.ndim == 2
-        self._slopes = np.empty((n, 0, 3))
+        self._gradients = np.empty((n, 0, 3))
         self.gradients: Floats | None = None
         if method == "sibson_c1":
-            self._slopes = slopes(self._space, view, self.values, gradients)
-            self.gradients = self._slopes * self._space.scale
+            self._gradients = scaled_gradients(
+                self._space, angle, self.values, gradients
+            )
+            self.gradients = self._gradients * self._space.scale
             self.gradients = self.gradients.reshape(*there.shape, 3)
         elif gradients is not None:
             raise InvalidInput("gradients are only for method='sibson_c1'.")
-        self._diagram = packed(self._space, self._flat, self._slopes, method, outside)
-        # Copies that no thread is using: queries write to the one that they take.
+        self._diagram = packed(
+            self._space, self._flat, self._gradients, method, outside
+        )
+        # Copies that no thread is using: queries write to the one they take.
         self._idle: list[Floats] = []
         for array in (self.points, self.simplices, self.hull_facets, self.edges):
             array.flags.writeable = False
@@ -184,7 +184,7 @@ class NaturalNeighborInterpolator:
     def packed(self) -> tuple[Floats, NDArray[np.int64]]:
         """All that compiled code needs, one array read as floats and as integers.
 
-        For ``natural_weights`` in :mod:`ikns._kernels.voronoi.query`.
+        For :func:`ikns._kernels.voronoi.query.natural_weights`; not to be changed.
         """
         return self._diagram, self._diagram.view(np.int64)
 
@@ -206,7 +206,7 @@ class NaturalNeighborInterpolator:
         -------
         (..., value shape) array
         """
-        # Live, a point at a time: nothing that is not needed.
+        # The live loop asks one query at a time: nothing here that is not needed.
         if type(x) is ndarray and x.dtype is _FLOAT and x.ndim == 1 and out is None:
             if self._width and x.flags.carray:
                 found = empty(self._width)
@@ -245,8 +245,8 @@ class NaturalNeighborInterpolator:
         """
         if self.method == "sibson_c1":
             raise InvalidInput(
-                "weights do not tell the values of method 'sibson_c1', which also have "
-                "gradients; method='sibson' has weights."
+                "values of method 'sibson_c1' depend on gradients too, not on weights "
+                "alone; method='sibson' has weights."
             )
         return self._answer(x, 1, out)
 
@@ -282,11 +282,11 @@ class NaturalNeighborInterpolator:
         """Write the weights or values of (Q, 3) queries."""
         diagram, indices = self.packed
         state = np.full(len(x), UNSURE)
-        if len(x) < _BATCH:
+        if len(x) < _MIN_BATCH:
             order = np.arange(len(x))
-        elif indices[CORNERS] <= FEW and self.method != "sibson_c1":
-            work = np.empty((rows_of_work(indices), min(_ROW, len(x))))
-            answer_rows(diagram, indices, x, work, weigh, found, state)
+        elif indices[TETRAHEDRA] <= BRUTE_FORCE_LIMIT and self.method != "sibson_c1":
+            work = np.empty((batch_scratch_rows(indices), min(_BATCH, len(x))))
+            answer_batch(diagram, indices, x, work, weigh, found, state)
             order = np.flatnonzero(state == UNSURE)
         else:
             order = morton_order(x, self.points.min(axis=0), self.points.max(axis=0))

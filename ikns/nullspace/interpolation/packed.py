@@ -1,7 +1,7 @@
 """A Voronoi diagram and values at its sites as one flat array, for compiled queries.
 
-The layout is told in ikns._kernels.voronoi.diagram. Tetrahedra, lines and edges are
-numbered anew, so that those that are close in space are close in memory.
+The layout is described in ikns._kernels.voronoi.diagram. Tetrahedra, facets and edges
+are renumbered, so that those that are close in space are close in memory.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from ikns.nullspace.interpolation.domain import Domain
 from ikns.nullspace.interpolation.morton import morton_order
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["FEW", "packed"]
+__all__ = ["BRUTE_FORCE_LIMIT", "packed"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: Up to so many tetrahedra trying all is faster than walking (measured).
-FEW = 60
+#: Up to so many tetrahedra checking all is faster than walking (measured).
+BRUTE_FORCE_LIMIT = 60
 
 _METHODS = {"sibson": at.SIBSON, "laplace": at.LAPLACE, "sibson_c1": at.SMOOTH}
 _RULES = {"nearest": at.NEAREST, "project": at.PROJECT, "nan": at.NOWHERE}
 
 
 def packed(
-    space: Domain, values: Floats, slopes: Floats, method: str, outside: str
+    space: Domain, values: Floats, gradients: Floats, method: str, outside: str
 ) -> Floats:
     """Pack what queries need.
 
@@ -36,7 +36,7 @@ def packed(
     ----------
     space : Domain
     values : (N, M) array
-    slopes : (N, M, 3) array
+    gradients : (N, M, 3) array
         Of the values, per scaled unit of length, for "sibson_c1" only.
     method : {"sibson", "laplace", "sibson_c1"}
     outside : {"nearest", "project", "nan"}
@@ -49,34 +49,36 @@ def packed(
     n, t = len(space.sites), len(d.simplices)
     f, h = len(d.length), len(d.hull)
     middle = space.sites[d.simplices].mean(axis=1)
-    corners = morton_order(middle, space.sites.min(axis=0), space.sites.max(axis=0))
-    number = np.append(_turns(corners), t)  # of each tetrahedron; infinity stays last
-    lines = np.argsort(np.where(d.ahead < t, number[d.behind], t), kind="stable")
-    lines[f - h :] = d.hull  # the hull's come last
-    ends = number[np.concatenate([d.behind[lines], d.ahead[lines]])]
-    slots, rings, angles = _edges(d, number, _turns(lines))
+    order = morton_order(middle, space.sites.min(axis=0), space.sites.max(axis=0))
+    number = np.append(_inverse(order), t)  # of each tetrahedron; infinity stays last
+    facets = np.argsort(np.where(d.ahead < t, number[d.behind], t), kind="stable")
+    facets[f - h :] = d.hull  # the hull's come last
+    ends = number[np.concatenate([d.behind[facets], d.ahead[facets]])]
+    slots, rings, angles = _edges(d, number, _inverse(facets))
     integers = {
-        at.CORNER_ROWS: np.column_stack(
+        at.TETRAHEDRON: np.column_stack(
             [
-                *_by_corner(ends, np.tile(np.arange(f), 2), np.roll(ends, f)),
-                d.simplices[corners],
+                *_by_tetrahedron(ends, np.tile(np.arange(f), 2), np.roll(ends, f)),
+                d.simplices[order],
                 slots,
             ]
         ),
-        at.LINE_ENDS: ends.reshape(2, -1).T,
+        at.FACET_ENDS: ends.reshape(2, -1).T,
         at.HULL_SITES: d.hull_facets,
         at.EDGE: rings,
     }
     first = space.sites[d.simplices[:, 0]]
-    sure = CANCELED * (1 + np.abs(d.corner).max(axis=1))
+    sure = CANCELED * (1 + np.abs(d.circumcenter).max(axis=1))
     floats = {
         at.SITE: space.sites,
-        at.CORNER: np.column_stack([d.corner, d.corner_rest, first, sure])[corners],
-        at.LENGTH: np.where(np.isfinite(d.length), d.length, 0)[lines],
-        at.PLANE: _planes(space)[lines],
+        at.CIRCUMCENTER: np.column_stack(
+            [d.circumcenter, d.circumcenter_rest, first, sure]
+        )[order],
+        at.LENGTH: np.where(np.isfinite(d.length), d.length, 0)[facets],
+        at.PLANE: _planes(space)[facets],
         at.ANGLE: angles,
         at.VALUE: values,
-        at.GRADIENT: slopes,
+        at.GRADIENT: gradients,
     }
     longest = int(np.bincount(d.side_edge).max())
     scratch = {
@@ -84,18 +86,18 @@ def packed(
         at.KEPT: f,
         at.DEPTH: h,
         at.VOLUME: n,
-        at.TOWARD: 3 * n,
+        at.OFFSET: 3 * n,
         at.RING: longest,
         at.START: 1,
-        at.FOUND: t + 1,
-        at.NEAR: n,
+        at.CAVITY: t + 1,
+        at.NEIGHBORS: n,
         at.MARK: n,
     }
-    start = int(((middle[corners] - space.center) ** 2).sum(axis=1).argmin())
+    start = int(((middle[order] - space.center) ** 2).sum(axis=1).argmin())
     header = np.zeros(at.HEADER, dtype=np.int64)
     header[: at.MIDDLE + 1] = [
         *(n, t, f, h, len(d.edges), longest, values.shape[1]),
-        *(_METHODS[method], _RULES[outside], start if t > FEW else -1),
+        *(_METHODS[method], _RULES[outside], start if t > BRUTE_FORCE_LIMIT else -1),
     ]
     header[at.SCALE : at.ROUNDING + 1] = np.array(
         [space.scale, *space.center, space.rounding]
@@ -113,19 +115,19 @@ def packed(
     )
 
 
-def _turns(order: Indices) -> Indices:
-    """Tell for each item when its turn comes in an order."""
-    turn = np.empty(len(order), dtype=np.int64)
-    turn[order] = np.arange(len(order))
-    return turn
+def _inverse(order: Indices) -> Indices:
+    """Return the inverse of a permutation."""
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return rank
 
 
-def _by_corner(corner: Indices, *items: Indices) -> list[Indices]:
+def _by_tetrahedron(tetrahedron: Indices, *items: Indices) -> list[Indices]:
     """Items of each tetrahedron, a row each; those of infinity are left out."""
-    order = np.argsort(corner, kind="stable")
-    corners = int(corner.max())
-    order = order[: np.searchsorted(corner[order], corners)]
-    return [item[order].reshape(corners, -1) for item in items]
+    order = np.argsort(tetrahedron, kind="stable")
+    count = int(tetrahedron.max())
+    order = order[: np.searchsorted(tetrahedron[order], count)]
+    return [item[order].reshape(count, -1) for item in items]
 
 
 def _planes(space: Domain) -> Floats:
@@ -140,25 +142,27 @@ def _planes(space: Domain) -> Floats:
 
 
 def _edges(
-    d: Voronoi, number: Indices, line: Indices
+    d: Voronoi, number: Indices, facet: Indices
 ) -> tuple[Indices, Indices, Floats]:
-    """Edges as their tetrahedra know them, their integers and their floats."""
+    """Slots of the tetrahedra's edges, integers and floats of the edges."""
     e, sides = d.side_edge, np.bincount(d.side_edge)
     first = np.cumsum(sides) - sides
-    corner, k = number[d.entering], np.arange(len(e)) - first[e]
-    order = np.argsort(np.minimum.reduceat(corner, first), kind="stable")
+    tetrahedron, k = number[d.entering], np.arange(len(e)) - first[e]
+    order = np.argsort(np.minimum.reduceat(tetrahedron, first), kind="stable")
     begin = np.empty((2, len(sides)), dtype=np.int64)
     for row, width in zip(begin, (4 + 2 * sides, 3 + sides * (sides - 1)), strict=True):
         row[order] = np.cumsum(width[order]) - width[order]
     edge, angle = begin
 
     before = first[e] + (k - 1) % sides[e]
-    slots = _by_corner(corner, edge[e], before - first[e], corner[before])
+    slots = _by_tetrahedron(
+        tetrahedron, edge[e], before - first[e], tetrahedron[before]
+    )
     integers = np.empty((4 + 2 * sides).sum(), dtype=np.int64)
     for place, item in enumerate((*d.edges.T, sides, angle)):
         integers[edge + place] = item
-    integers[edge[e] + 4 + k] = line[d.side_facet]
-    integers[edge[e] + 4 + sides[e] + k] = corner
+    integers[edge[e] + 4 + k] = facet[d.side_facet]
+    integers[edge[e] + 4 + sides[e] + k] = tetrahedron
 
     floats = np.empty((3 + sides * (sides - 1)).sum())
     for place in range(3):

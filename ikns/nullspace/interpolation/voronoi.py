@@ -1,12 +1,13 @@
-"""The Voronoi diagram of some sites, laid out so that one half-space cuts it fast.
+"""The Delaunay triangulation of some sites and its dual, the Voronoi diagram.
 
-- corner: a Voronoi vertex, the center of the sphere through a tetrahedron;
-- line: a Voronoi edge, at a right angle to a Delaunay facet, from the corner behind the
-  facet to the corner ahead of it, or on to infinity where the facet is on the hull;
-- edge: two sites i < j that are neighbors. Their cells share a polygon, at a right
-  angle to the edge;
-- side: one line of one polygon. The sides follow each other counterclockwise about the
-  edge; the polygon of an edge of the hull is open, from ray to ray.
+Tetrahedra, facets and edges are those of the triangulation. Each has its dual:
+
+- of a tetrahedron its circumcenter, a vertex of the Voronoi diagram;
+- of a facet a Voronoi edge, normal to it, from the circumcenter behind the facet to the
+  one ahead of it; from a facet of the hull a ray to infinity;
+- of an edge, two sites i < j, the Voronoi face that their cells share, normal to it.
+  Its sides are the Voronoi edges of the facets around the edge, counterclockwise; the
+  face of an edge of the hull is open, from ray to ray.
 """
 
 from __future__ import annotations
@@ -27,21 +28,21 @@ class Voronoi:
     """Delaunay triangulation and Voronoi diagram of N sites.
 
     T tetrahedra, F facets of which H are on the hull, E edges, S = 3 F sides, P pairs
-    of sides of one polygon. Arrays are contiguous, of float64 and int64.
+    of sides of one face. Arrays are contiguous, of float64 and int64.
 
     Parameters
     ----------
     simplices : (T, 4) integer array
     neighbors : (T, 4) integer array
         The tetrahedron across the facet that leaves out each vertex; -1 on the hull.
-    corner, corner_rest : (T, 3) array
-        Corner seen from its tetrahedron's first site: float, and what it rounds off.
+    circumcenter, circumcenter_rest : (T, 3) array
+        Seen from the tetrahedron's first site: floats, and what these round off.
     behind, ahead : (F,) integer array
         Tetrahedra on the two sides of a facet; `ahead` is T on the hull.
     length : (F,) array
-        Length of the line; infinite on the hull.
+        Of the facet's Voronoi edge; infinite on the hull.
     normal, normal_rest : (F, 3) array
-        Unit vector along the line: floats, and what these round off.
+        Unit vector from behind to ahead: floats, and what these round off.
     hull : (H,) integer array
         Which facets are on the hull.
     hull_facets : (H, 3) integer array
@@ -58,13 +59,13 @@ class Voronoi:
     sine : (P,) array
         Sine of the angle by which the second side turns from the first.
     pairs : (E,) integer array
-        Where the pairs of an edge's polygon begin; they follow each other.
+        Where the pairs of an edge's face begin; they follow each other.
     """
 
     simplices: Indices
     neighbors: Indices
-    corner: Floats
-    corner_rest: Floats
+    circumcenter: Floats
+    circumcenter_rest: Floats
     behind: Indices
     ahead: Indices
     length: Floats

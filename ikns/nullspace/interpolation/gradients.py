@@ -8,21 +8,21 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.errors import InvalidInput
 from ikns.nullspace.interpolation.domain import Domain
 
-__all__ = ["slopes"]
+__all__ = ["scaled_gradients"]
 
 Floats = NDArray[np.float64]
 
 
-def slopes(
-    space: Domain, view: Floats, values: Floats | None, gradients: ArrayLike | None
+def scaled_gradients(
+    space: Domain, angle: Floats, values: Floats | None, gradients: ArrayLike | None
 ) -> Floats:
     """Gradients at the sites: those that are given, or estimated from the values.
 
     Parameters
     ----------
     space : Domain
-    view : (E,) array
-        How large the faces of edges look from their sites.
+    angle : (E,) array
+        Solid angles of the edges' faces.
     values : (N, ...) array
     gradients : (N, ..., 3) array, optional
         Per m.
@@ -35,7 +35,7 @@ def slopes(
     if values is None:
         raise InvalidInput("method 'sibson_c1' needs values.")
     if gradients is None:
-        return _estimated(space, view, values.reshape(len(values), -1))
+        return _estimated(space, angle, values.reshape(len(values), -1))
     given = np.array(gradients, dtype=np.float64)
     if given.shape != (*values.shape, 3):
         raise InvalidInput(
@@ -47,24 +47,23 @@ def slopes(
     return given.reshape(len(values), -1, 3) / space.scale
 
 
-def _estimated(space: Domain, view: Floats, values: Floats) -> Floats:
-    """Slopes of the planes through the sites that are nearest to their neighbors.
+def _estimated(space: Domain, angle: Floats, values: Floats) -> Floats:
+    """Least-squares gradients: of the plane through a site's value that fits others.
 
-    In the mean of squares, each weighted with how large the neighbor's face looks over
-    its squared distance. So values that are linear in space have their own gradients.
+    Each neighbor is weighted with the solid angle of the face between over the squared
+    distance. Values that are linear in space have their own gradients.
     """
     edges = space.diagram.edges
     mine = np.concatenate([edges[:, 0], edges[:, 1]])
     other = np.concatenate([edges[:, 1], edges[:, 0]])
-    way = space.sites[other] - space.sites[mine]
-    seen = np.tile(view.clip(0, None), 2)
-    trust = np.sqrt(seen / (way**2).sum(axis=1))[:, None]
-    way, rise = trust * way, trust * (values[other] - values[mine])
+    step = space.sites[other] - space.sites[mine]
+    weight = np.sqrt(np.tile(angle.clip(0, None), 2) / (step**2).sum(axis=1))[:, None]
+    step, rise = weight * step, weight * (values[other] - values[mine])
     order, neighbors = np.argsort(mine, kind="stable"), np.bincount(mine)
     first = np.cumsum(neighbors) - neighbors
     found = np.empty((len(neighbors), values.shape[1], 3))
     for count in np.unique(neighbors):
         sites = np.flatnonzero(neighbors == count)
         rows = order[first[sites, None] + np.arange(count)]
-        found[sites] = (np.linalg.pinv(way[rows]) @ rise[rows]).transpose(0, 2, 1)
+        found[sites] = (np.linalg.pinv(step[rows]) @ rise[rows]).transpose(0, 2, 1)
     return found
