@@ -103,7 +103,7 @@ def test_time_left_is_told_where_there_is_no_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(command, "_EVERY", 0.0)
-    with command._told() as report:
+    with command._progress_or_lines() as report:
         report("compiling", 1, 2)
         for done in (4, 5, 6):  # four were there before
             report("simulating", done, 8)
