@@ -8,7 +8,7 @@ from scipy.signal import savgol_filter
 
 __all__ = ["slope"]
 
-#: Width of the fit: voluntary motion of the arm stays below about 5 Hz, s.
+#: Width of the fit, s; voluntary motion of the arm is below about 5 Hz.
 WINDOW = 0.2
 
 

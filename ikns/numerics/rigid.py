@@ -1,4 +1,4 @@
-"""The rigid motion that carries points onto points."""
+"""The rigid motion that maps points to points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["rigid_transform"]
 def rigid_transform(
     source: NDArray[np.float64], target: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rotation and shift that carry points onto points best (Kabsch 1976).
+    """Rotation and translation that best map points to points (Kabsch 1976).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the paper's printed means and deviations leave open about its differences.
+"""Spread of the paper's differences that its printed means and deviations allow.
 
 10 subjects x 3 trajectories make 30 differences d of RMSE, IKNS minus gamepad. Printed
 are, per trajectory and condition, mean and standard deviation over subjects.
@@ -41,7 +41,7 @@ def difference_range() -> tuple[float, float, float]:
 
 
 def _between(rounding: float) -> float:
-    """Sum of squares of differences that the trajectories' means alone make, least."""
+    """Least sum of squares of the differences between the trajectories' means."""
     d, _ = _means()
     deviations = np.abs(d - d.mean())
     # Rounding moves a mean by at most this, and its deviation by 4/3 of that.
@@ -52,9 +52,9 @@ def _between(rounding: float) -> float:
 def spread_range() -> tuple[float, float]:
     """Least and most standard deviation of the pooled differences.
 
-    Least: subjects do not differ within a trajectory. Most: what is much with one
-    condition is little with the other in every subject, so that deviations add up
-    (rounded figures taken at their upper ends).
+    Least: subjects do not differ within a trajectory. Most: the conditions are
+    perfectly negatively correlated over subjects, so that deviations add up (rounded
+    figures at their upper ends).
     """
     _, rounding = _means()
     n, k = PAPER.subjects, len(PAPER.trajectories)
@@ -81,8 +81,8 @@ def standard_error() -> tuple[float, float]:
 def subject_spread_limit() -> float:
     """Largest standard deviation of the subjects' mean differences, given the p.
 
-    What the trajectories' means do not take of the sum of squares belongs to the
-    subjects at most.
+    At most, the whole sum of squares not between the trajectories' means is between
+    subjects.
     """
     n, k = PAPER.subjects, len(PAPER.trajectories)
     total = PAPER.degrees * standard_error()[0] ** 2 * (PAPER.degrees + 1)

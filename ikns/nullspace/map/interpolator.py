@@ -1,7 +1,7 @@
-"""Between the points: natural neighbors, or the nearest point where those mean nothing.
+"""Interpolation between points: natural neighbors, or the nearest point.
 
-Natural neighbors need a volume. One to three points, or points that are not in space,
-have none.
+Natural neighbors need a volume, which one to three points, or points that are not in
+space, do not have.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["NearestPoint", "make_interpolator"]
 def make_interpolator(
     points: NDArray[np.float64], outside: Literal["nearest", "project", "nan"]
 ) -> NaturalNeighborInterpolator | NearestPoint:
-    """Interpolator between points (P, d): natural neighbors from 4 points in space on.
+    """Interpolator between points (P, d): natural neighbors for 4 or more in space.
 
     Raises
     ------
@@ -36,7 +36,8 @@ def make_interpolator(
 class NearestPoint:
     """Weights of 1 for the nearest point, in any dimension.
 
-    Stands in for :class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`.
+    Same methods as
+    :class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`.
 
     Parameters
     ----------
@@ -66,5 +67,5 @@ class NearestPoint:
         return weights.reshape(*queries.shape[:-1], -1)
 
     def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Nowhere: these points enclose no volume; (...) for queries (..., d)."""
+        """Return false for queries (..., d), (...): the points enclose no volume."""
         return np.zeros(np.shape(x)[:-1], dtype=bool)
