@@ -1,4 +1,4 @@
-"""The errors a user can meet: one sentence with what, where and what would be right."""
+"""Errors: one sentence with what is wrong, where, and what would be right."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,11 +19,11 @@ class IknsError(Exception):
 
 
 class FileError(IknsError, ValueError):
-    """A file is missing, empty, damaged, or not what its name promises."""
+    """A file is missing, empty, damaged, or not of the expected format."""
 
 
 class MarkerMismatch(IknsError, ValueError):
-    """A recording lacks markers that the skeleton wears."""
+    """A recording and a marker set do not match."""
 
 
 class NotEnoughData(IknsError, ValueError):
@@ -35,7 +35,7 @@ class InvalidInput(IknsError, ValueError):
 
 
 class StreamError(IknsError, OSError):
-    """A live source does not answer, sends something else, or broke off."""
+    """A live source does not answer, sends unexpected data, or disconnected."""
 
 
 @contextmanager

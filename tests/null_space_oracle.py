@@ -58,3 +58,10 @@ def mixed_pair(rng):
     b = cosine[:, None] * frame[:6] + np.sin(MIXED)[:, None] * frame[6:]
     mix = ortho_group.rvs(6, 2, random_state=rng) * rng.uniform(0.1, 1, (2, 6, 1))
     return mix[0] @ frame[:6], mix[1] @ b
+
+
+def of_singular_values(rng, k, n, values):
+    """A random (k, n) matrix with these singular values, and zeros."""
+    u = ortho_group.rvs(k, random_state=rng) if k > 1 else np.eye(1)
+    v = ortho_group.rvs(n, random_state=rng) if n > 1 else np.eye(1)
+    return u[:, : len(values)] * values @ v[: len(values)]

@@ -178,7 +178,7 @@ def test_holding_the_position_alone_leaves_several_degrees_of_freedom(exploratio
     assert np.abs(product - np.eye(2)).max() < 1e-13
 
 
-def test_a_center_where_nobody_was_is_named(exploration):
+def test_a_center_where_no_one_was_is_named(exploration):
     motion, places = exploration
     with pytest.raises(NotEnoughData, match=r"point \(9.000, .* found none"):
         analytic_map(Body(), motion, np.vstack([places, [9.0, 0, 0]]))

@@ -95,7 +95,7 @@ def test_forearm_and_hand_residuals_correlate_as_the_table_says(people):
     )
 
 
-def test_nobody_is_implausible(people):
+def test_no_one_is_implausible(people):
     sex, adults = people
     stature = row("ansur2", "stature", sex=sex)
     heights = _values(adults, "stature")

@@ -53,7 +53,7 @@ def test_markers_that_the_static_trial_lacks_are_left_out_and_named() -> None:
     points = run.points.recording
     worn = points.select([la for la in points.labels if la != "LUPA"])
     subject = calibrate(static.select(shown), [worn], min_still=0.2)
-    named = [w for w in subject.report["warnings"] if "left out, as nobody" in w]
+    named = [w for w in subject.report["warnings"] if "left out, as their places" in w]
     # The left one is not worn, the wrist's place is known.
     assert len(named) == 1
     assert "none of RUPA:" in named[0]
@@ -207,7 +207,7 @@ def test_a_recording_without_a_segment_is_refused_by_name() -> None:
         calibrate(run.static.recording, [recording.select(labels)])
 
 
-def test_a_hand_that_never_rests_is_told_with_its_slowest_speed() -> None:
+def test_a_hand_that_never_rests_is_reported_with_its_slowest_speed() -> None:
     run = small_person.protocol()
     exploration = small_person.cut(run.points.recording, 0, 20)
     with pytest.raises(NotEnoughData, match=r"points trial: .* slower than 1e-06 m/s"):
@@ -233,7 +233,9 @@ def test_progress_ends_at_the_number_of_frames() -> None:
     assert calls[-1][1:] == (20, 20)
 
 
-def test_natural_reaching_of_a_real_person_runs_through_and_is_told(data: Path) -> None:
+def test_natural_reaching_of_a_real_person_runs_through_and_is_reported(
+    data: Path,
+) -> None:
     folder = data / "ue_adl" / "ADL005"
     subject = calibrate(
         read(folder / "ADL005_static.csv"),

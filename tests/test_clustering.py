@@ -199,7 +199,7 @@ def test_places_exist_in_any_dimension(d, n):
     assert (np.abs((places - box.center) @ box.axes.T) < box.half_lengths + 1e-12).all()
 
 
-def test_nearest_center_cuts_off_stragglers_and_keeps_a_normal_cloud():
+def test_nearest_center_removes_outliers_and_keeps_a_normal_cloud():
     rng = np.random.default_rng(4)
     cloud = rng.normal(scale=0.01, size=(4000, 3))
     far = rng.normal(size=(400, 3))

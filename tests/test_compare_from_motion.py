@@ -188,7 +188,7 @@ def test_crosstalk_is_that_of_the_map_on_the_reaches(learned):
     assert len(found.change) == 9  # between ten points
 
 
-def test_chains_and_maps_that_do_not_fit_are_told(learned):
+def test_chains_and_maps_that_do_not_fit_are_reported(learned):
     with pytest.raises(InvalidInput, match="ends in the right hand"):
         compare_motion(learned, BODY, TRUTH, analyzed="left_arm")
     with pytest.raises(InvalidInput, match="unknown chain 'leg'"):
@@ -207,7 +207,7 @@ def test_chains_and_maps_that_do_not_fit_are_told(learned):
         compare_motion(far, BODY, TRUTH)
 
 
-def test_a_joint_that_no_marker_shows_is_told(learned):
+def test_a_joint_that_no_marker_shows_is_reported(learned):
     q = np.array(TRUTH.q)
     joint = chain_joints("right_arm_clavicle")[0]
     q[:, 7 + TRUTH.joint_names.index(joint)] = 0.1
@@ -280,6 +280,6 @@ def test_a_real_arm_that_holds_its_tool_neither_leaks_nor_turns():
     assert position.mean_posture_angles[0, 0] <= pose.mean_posture_angles[0, 0]
 
 
-def test_a_robot_frame_that_no_joint_moves_is_told():
+def test_a_robot_frame_that_no_joint_moves_is_reported():
     with pytest.raises(InvalidInput, match="found none"):
         Robot(planar(3), "l0")

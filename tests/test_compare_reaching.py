@@ -80,7 +80,7 @@ def test_intervals_hold_the_mean_of_random_places():
     assert hit >= 86
 
 
-def test_a_recording_without_reaches_is_told():
+def test_a_recording_without_reaches_is_reported():
     _, speed, position = moving([0, 0.02])
     with pytest.raises(NotEnoughData, match=r"reaches of 0.05 m or more"):
         crosstalk(speed, speed, position)

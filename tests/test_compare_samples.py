@@ -322,7 +322,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("what", BAD)
-def test_what_cannot_be_compared_is_told_in_one_sentence(what):
+def test_what_cannot_be_compared_is_refused_in_one_sentence(what):
     case = planted(0.1, np.random.default_rng(11))
     change, error, sentence = BAD[what]
     change(case)

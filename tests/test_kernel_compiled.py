@@ -76,7 +76,7 @@ def calls(node: ast.AST) -> set[str]:
 
 
 @pytest.mark.parametrize("path", sorted(KERNELS.rglob("*.py")), ids=lambda p: p.stem)
-def test_python_never_calls_a_kernel_that_has_no_way_in(path):
+def test_python_never_calls_a_kernel_without_a_wrapper(path):
     # It would end the process without a word.
     private, plain = set(), []
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
@@ -89,7 +89,7 @@ def test_python_never_calls_a_kernel_that_has_no_way_in(path):
     assert not any(calls(node) & private for node in plain)
 
 
-def test_nobody_else_imports_a_kernel_that_has_no_way_in():
+def test_no_other_module_imports_a_kernel_without_a_wrapper():
     root = KERNELS.parents[1]
     for path in (
         p for d in ("ikns", "tests", "benchmarks") for p in root.glob(f"{d}/**/*.py")

@@ -380,7 +380,7 @@ def test_a_recording_is_its_frames_one_by_one(skeleton):
     np.testing.assert_array_equal(batch.residual, [pose.residual for pose in poses])
 
 
-def test_threads_do_not_meet(skeleton):
+def test_threads_do_not_share_memory(skeleton):
     rng = np.random.default_rng(1)
     solver, truth, found = MarkerIK(skeleton), [], {}
     for _ in range(2):

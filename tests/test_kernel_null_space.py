@@ -10,10 +10,10 @@ from null_space_oracle import (
     MIXED,
     exact_projector,
     mixed_pair,
+    of_singular_values,
     svd_angles,
     svd_projector,
 )
-from scipy.stats import ortho_group
 
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
@@ -26,13 +26,6 @@ from ikns.numerics.subspace import (
 
 EPS = np.finfo(float).eps
 seeds = st.integers(0, 2**32 - 1)
-
-
-def of_rank(rng, k, n, values):
-    """Matrices (k, n) with these singular values and zeros."""
-    u = ortho_group.rvs(k, random_state=rng) if k > 1 else np.eye(1)
-    v = ortho_group.rvs(n, random_state=rng) if n > 1 else np.eye(1)
-    return u[:, : len(values)] * values @ v[: len(values)]
 
 
 @pytest.mark.parametrize(("k", "n"), [(6, 7), (3, 7), (6, 9), (12, 14), (1, 3), (4, 4)])
@@ -66,7 +59,7 @@ def test_bases_agree_with_singular_vectors_at_every_shape_rank_and_scale(
 ):
     rng = np.random.default_rng(seed)
     ranks = [data.draw(st.integers(0, min(k, n))) for _ in range(3)]
-    J = np.stack([of_rank(rng, k, n, rng.uniform(0.1, 2, r)) for r in ranks])
+    J = np.stack([of_singular_values(rng, k, n, rng.uniform(0.1, 2, r)) for r in ranks])
     basis, rank = null_spaces(J * scale)
     assert rank.tolist() == ranks
     assert basis.shape == (3, n - min(ranks), n)
@@ -86,7 +79,7 @@ def test_a_singular_value_near_the_tolerance_is_judged_as_the_svd_judges_it(
 ):
     rng = np.random.default_rng(seed)
     values = np.append(rng.uniform(0.1, 2, 6 - small), np.full(small, 10.0**power))
-    J = of_rank(rng, 6, 7, values)
+    J = of_singular_values(rng, 6, 7, values)
     projector, rank = svd_projector(J)
     s = np.linalg.svd(J, compute_uv=False)
     if np.abs(s / s[0] / 1e-9 - 1).min() < 1e-5:
@@ -173,7 +166,7 @@ def test_arrays_that_are_frozen_strided_or_of_integers_are_taken_as_they_are():
         np.testing.assert_array_equal(null_spaces(other)[0], basis)
 
 
-def test_threads_do_not_meet():
+def test_threads_do_not_share_memory():
     rng = np.random.default_rng(0)
     batches = rng.normal(size=(16, 500, 6, 7))
     with ThreadPoolExecutor(4) as pool:

@@ -74,7 +74,7 @@ def test_too_few_points_with_samples_are_refused_and_all_named():
     assert sentence.count(" has ") == 5
 
 
-def test_points_that_overlap_are_said():
+def test_points_that_overlap_are_reported():
     x = rng.normal(scale=0.005, size=(800, 3))  # the hand never went anywhere
     q = rng.uniform(-0.5, 0.5, (800, 1)) * [1.0, 0.0, 0.0]
     with pytest.warns(MapWarning, match="hardly farther apart"):
@@ -120,7 +120,7 @@ def test_points_with_too_few_samples_are_left_out_and_named():
     assert learned.labels_[120] == -1
 
 
-def test_a_point_where_no_joint_moves_has_no_say():
+def test_a_point_where_no_joint_moves_has_no_influence():
     x, q = samples()
     q[:40] = [0.3, 0.2, 0.1]
     with pytest.warns(MapWarning, match=r"no joint moves at \("):
@@ -134,7 +134,7 @@ def test_a_point_where_no_joint_moves_has_no_say():
     assert np.isfinite(middle).all()
 
 
-def test_more_freedom_than_wanted_is_said():
+def test_more_freedom_than_wanted_is_reported():
     x, q = samples()
     q[:40, 1] += rng.uniform(-0.5, 0.5, 40)
     with pytest.warns(MapWarning, match="took 2 components"):
@@ -180,7 +180,7 @@ def test_neighbors_opposed_in_spite_of_the_tree_are_named():
         NullSpaceMap(n_points=8).fit(x, q)
 
 
-def test_a_reference_that_decides_nothing_is_said():
+def test_an_almost_orthogonal_reference_is_reported():
     x, q = samples()
     with pytest.warns(MapWarning, match="which way c rises is uncertain"):
         NullSpaceMap(n_points=8, reference=[0.0, 1.0, 0.0]).fit(x, q)

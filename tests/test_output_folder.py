@@ -55,7 +55,7 @@ def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
     assert (tmp_path / "real" / "a.txt").read_text() == "new"
 
 
-def test_what_the_system_refuses_is_told_by_name(tmp_path: Path) -> None:
+def test_what_the_system_refuses_is_reported_by_name(tmp_path: Path) -> None:
     with (
         pytest.raises(FileError, match="new: cannot be written"),
         output_folder(tmp_path / "new") as part,

@@ -150,7 +150,7 @@ def test_static_only_markers_are_dropped_and_named(generic):
 CLUSTER = ["RUPA", "RFRM"]
 
 
-def test_markers_that_nobody_has_placed_are_dropped_and_named(generic):
+def test_markers_that_no_one_has_placed_are_dropped_and_named(generic):
     recording = standing(person(generic, 1), 1)
     hidden = [*CLUSTER, "RWRA"]
     shown = [label for label in recording.labels if label not in hidden]
@@ -162,7 +162,7 @@ def test_markers_that_nobody_has_placed_are_dropped_and_named(generic):
     assert set(CLUSTER).isdisjoint(skeleton.marker_set.labels)
 
 
-def test_a_marker_that_nobody_has_placed_would_mislead(generic, record_property):
+def test_a_marker_that_no_one_has_placed_would_mislead(generic, record_property):
     # Elbow and forearm in other postures, with such markers where the set has them, and
     # without, as the tool does it: root mean square error over five people. Cluster
     # markers sit where they are stuck, as far off as the set says.

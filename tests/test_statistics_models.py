@@ -355,7 +355,7 @@ def test_statsmodels_and_pandas_are_loaded_only_when_asked() -> None:
                 assert "from statsmodels" not in text
 
 
-def test_without_statsmodels_one_is_told_what_to_install(
+def test_without_statsmodels_the_error_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "statsmodels.regression.mixed_linear_model", None)

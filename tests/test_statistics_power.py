@@ -110,7 +110,7 @@ def test_one_seed_one_answer() -> None:
     assert run(1) != run(2)
 
 
-def test_more_than_the_most_is_said() -> None:
+def test_more_than_the_most_is_reported() -> None:
     found = sample_size(Spread(1.0), difference=0.1, most=10, simulations=500)
     assert found.subjects is None
     assert "takes more than 10 subjects" in found.sentence()

@@ -238,7 +238,7 @@ def test_a_map_that_makes_no_sense_is_refused(
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(where=st.floats(0, 1), rubbish=st.binary(max_size=8))
-def test_damage_is_told_in_one_sentence_or_is_harmless(
+def test_damage_is_refused_in_one_sentence_or_is_harmless(
     folder: Path, tmp_path: Path, name: str, where: float, rubbish: bytes
 ) -> None:
     shutil.rmtree(tmp_path / "person", ignore_errors=True)

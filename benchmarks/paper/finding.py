@@ -30,5 +30,5 @@ class Finding:
     values: dict[str, float] = field(repr=False)
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         return f"{self.claim}: {self.verdict}, for {self.implies}."

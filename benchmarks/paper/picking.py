@@ -34,7 +34,7 @@ def _age() -> list[Finding]:
     rest = (n * nearest - low - high) / (n - 2)
     squares = (low - nearest) ** 2 + (high - nearest) ** 2
     least = math.sqrt((squares + (n - 2) * (rest - nearest) ** 2) / (n - 1))
-    # Most: everybody at one of the ends (Bhatia and Davis 2000).
+    # Most: everyone at one of the ends (Bhatia and Davis 2000).
     most = math.sqrt((high - mean.value) * (mean.value - low) * n / (n - 1))
     as_error = sd.value * math.sqrt(n)
     fits = least <= as_error <= most
@@ -90,7 +90,7 @@ def _success() -> list[Finding]:
     )
     return [
         Finding(
-            f"{fail} of {n} trials failed with IKNS, none is told of with the ring",
+            f"{fail} of {n} trials failed with IKNS, none is reported with the ring",
             f"if the ring had none, success differs (exact McNemar p = {p:.4f}), and "
             f"still does unless it had {allowed} or more",
             "incomplete",

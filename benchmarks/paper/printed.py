@@ -1,6 +1,6 @@
 """What the paper prints about its two experiments (arXiv 2012.03600), as printed.
 
-Numbers are text, for their last digit says how far they were rounded.
+Numbers are kept as text, as their last digit states how far they were rounded.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Printed:
 
     @property
     def half(self) -> float:
-        """Half a unit of the last digit: what rounding may have taken."""
+        """Half a unit of the last digit: the largest rounding error."""
         return 0.5 * 10.0 ** -len(self.text.partition(".")[2])
 
     @property

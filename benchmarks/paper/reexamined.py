@@ -1,7 +1,7 @@
 """The paper's own figures, examined again from nothing but what it prints.
 
-No raw data are published, so this asks what the printed numbers imply together, within
-their rounding. Everything is computed from `printed.PAPER`; nothing is typed in.
+No raw data are published, so this derives what the printed numbers imply together,
+within their rounding. Everything is computed from `printed.PAPER`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the paper's printed means and deviations leave open about its differences.
+"""Spread of the paper's differences that its printed means and deviations allow.
 
 10 subjects x 3 trajectories make 30 differences d of RMSE, IKNS minus gamepad. Printed
 are, per trajectory and condition, mean and standard deviation over subjects.
@@ -51,9 +51,9 @@ def _between() -> float:
 def spread_range() -> tuple[float, float]:
     """Least and most standard deviation of the pooled differences.
 
-    Least: subjects do not differ within a trajectory. Most: what is much with one
-    condition is little with the other in every subject, so that deviations add up
-    (rounded figures taken at their upper ends).
+    Least: subjects do not differ within a trajectory. Most: the conditions are
+    perfectly negatively correlated over subjects, so that deviations add up (rounded
+    figures at their upper ends).
     """
     d, rounding = _means()
     n, k = PAPER.subjects, len(PAPER.trajectories)

@@ -1,9 +1,8 @@
-"""The one way in which kernels are compiled: numba, kept on disk, free of the GIL.
+"""Compilation of kernels: numba, cached on disk, without the GIL.
 
-Numba keys its cache by the file that holds a function and knows nothing of the files
-that hold what it calls. So the cache lies in a folder named after the sources of a
-kernel and of all kernels that it imports, and machine code from another version of any
-of them is never loaded.
+Numba keys its cache by the file of a function and ignores the files of what it calls.
+So the cache is in a folder named after a hash of the sources of a kernel and of all
+kernels that it imports, and machine code of another version is never loaded.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function on its first call; division by zero gives inf or NaN.
 
     A function whose name begins with an underscore is called by kernels only and gets
-    no way in from Python, which takes a fifth of the time to compile.
+    no wrapper for Python, which takes a fifth of the time to compile.
     """
     folder = _cache_folder(function.__module__.removeprefix("ikns._kernels."))
     asked = config.CACHE_DIR
@@ -49,21 +48,21 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def on_disk(module: str) -> bool:
-    """Whether machine code of a kernel file, "body.step" say, is kept on disk."""
+    """Whether machine code of a kernel file, such as "body.step", is cached on disk."""
     folder = _cache_folder(module)
     return folder is not None and any(folder.rglob("*.nbc"))
 
 
 @functools.cache
 def _cache_folder(module: str) -> Path | None:
-    """Where machine code of these very sources is kept; None where nothing can be."""
+    """Cache folder for these sources; None where no folder is writable."""
     texts: dict[str, str] = {}
-    open_ends = [module]
-    while open_ends:
-        name = open_ends.pop()
+    pending = [module]
+    while pending:
+        name = pending.pop()
         path = _HERE.joinpath(*name.split(".")).with_suffix(".py")
         texts[name] = path.read_text(encoding="utf-8")
-        open_ends += set(_IMPORT.findall(texts[name])) - set(texts)
+        pending += set(_IMPORT.findall(texts[name])) - set(texts)
     sources = "".join(texts[name] for name in sorted(texts)) + numba.__version__
     name = f"{module}-{hashlib.sha256(sources.encode()).hexdigest()[:16]}"
     home = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()

@@ -1,7 +1,6 @@
-"""Orthonormal bases of null spaces, or of row spaces, one a matrix.
+"""Orthonormal bases of the null spaces or row spaces of matrices.
 
-The axes that the reflections of a matrix's rows reach, or those that they never reach;
-method and source: :mod:`ikns._kernels.row_space`.
+Method and source: :mod:`ikns._kernels.row_space`.
 """
 
 from __future__ import annotations
@@ -27,8 +26,8 @@ def write_bases(
 ) -> None:
     """Write bases of (N, k, n) matrices to rows (N, d, n), and their ranks (N,).
 
-    Of the row spaces or else of the null spaces: as much of each as fits, then zeros.
-    NaN and -1 where a matrix is not finite.
+    Of the row spaces if `of_rows`, else of the null spaces; cut to d rows, or filled
+    with zeros. NaN and -1 where a matrix is not finite.
     """
     count, k, n = matrices.shape
     work, factors = np.empty((k, n)), np.empty(k)

@@ -2,8 +2,7 @@
 
 With orthonormal rows a and b, the cosines are the singular values of ``b a'`` and the
 sines those of ``b - (b a') a`` (Bjorck and Golub 1973, Math Comput 27:579). Each is
-exact to rounding in absolute terms, and so is ``atan2(sine, cosine)`` on the whole
-quarter circle.
+exact to rounding in absolute terms, and so is ``atan2(sine, cosine)`` from 0 to pi/2.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ def write_principal_angles(A: Floats, B: Floats, angles: Floats) -> None:
 
 @compiled
 def _sort(values: Floats) -> None:
-    """Sort a few values upwards."""
+    """Sort a few values in increasing order."""
     for i in range(1, len(values)):
         j = i
         while j > 0 and values[j - 1] > values[j]:

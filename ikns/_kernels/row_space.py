@@ -5,10 +5,10 @@ form (QR of the transpose with column pivoting; Businger and Golub 1965, Numer M
 7:269). Axes 0 to rank - 1, reflected back, span the row space; the other axes span the
 null space. The smallest of m singular values is at least ``|r_mm| / 2^(m - 1)``, r_mm
 being the last length on the triangle's diagonal (Faddeev, Kublanovskaya and Faddeeva
-1968; Lawson and Hanson 1974, Solving Least Squares Problems, ch. 6). Where this cannot
-tell it from zero, plane rotations make the rows orthogonal, so that their lengths are
-the singular values (one-sided Jacobi; Hestenes 1958, J SIAM 6:51), and rows that count
-as zero are left out.
+1968; Lawson and Hanson 1974, Solving Least Squares Problems, ch. 6). Where this bound
+does not separate it from zero, plane rotations make the rows orthogonal, so that their
+lengths are the singular values (one-sided Jacobi; Hestenes 1958, J SIAM 6:51), and rows
+that count as zero are left out.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SWEEPS = 30
 
 @compiled
 def certain_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> int:
-    """Write the reflections of a (k, n) matrix and return its rank; -1 when unsure.
+    """Write the reflections of a (k, n) matrix and return its rank; -1 if uncertain.
 
     Singular values up to ``rtol * largest`` count as zero; `rtol` is 1e-16 or more.
     `work` (k, n) and `factors` (k,) get ``H_s = 1 - f_s w_s' w_s`` in their first rows,
@@ -52,7 +52,7 @@ def certain_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> in
 
 @compiled
 def careful_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> int:
-    """Do as :func:`certain_rank` by the singular values; -1 when not finite."""
+    """Do the same by the singular values; -1 when the matrix is not finite."""
     largest = 0.0
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
@@ -60,8 +60,7 @@ def careful_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> in
                 return -1
             if abs(rows[i, j]) > largest:
                 largest = abs(rows[i, j])
-    # A power of two rounds nothing. For an entry that is not a normal number it would
-    # be more than a double can hold.
+    # Scaling by a power of two is exact. For a subnormal entry it would overflow.
     scale = math.ldexp(1.0, min(-math.frexp(largest)[1], 1000))
     _copy(rows, scale, work, factors)
     rank = orthogonalize(work, rtol, factors)
@@ -91,7 +90,7 @@ def reflected_axis(
 def orthogonalize(rows: Floats, rtol: float, squares: Floats) -> int:
     """Rotate the rows (k, n) of a matrix until orthogonal; return its rank.
 
-    `squares` (k,) gets the squares of the singular values, in no order; those up to
+    `squares` (k,) gets the squared singular values, unsorted; singular values up to
     ``rtol * largest`` count as zero.
     """
     k, n = rows.shape
@@ -108,7 +107,7 @@ def orthogonalize(rows: Floats, rtol: float, squares: Floats) -> int:
                     ii += rows[i, m] * rows[i, m]
                     jj += rows[j, m] * rows[j, m]
                     ij += rows[i, m] * rows[j, m]
-                # Rows of mere rounding would be rotated without end.
+                # Rows that are only rounding errors would be rotated endlessly.
                 if ii <= noise or jj <= noise or ij * ij <= orthogonal * ii * jj:
                     continue
                 rotated = True
@@ -156,8 +155,8 @@ def _copy(rows: Floats, scale: float, work: Floats, squares: Floats) -> float:
 def _reflect(work: Floats, steps: int, squares: Floats) -> float:
     """Reflect, longest row first; return a bound below the last singular value.
 
-    `squares` holds the squared lengths of the rows, then of what is left of them; those
-    of rows that are done give way to the factors of :func:`certain_rank`.
+    `squares` holds the squared lengths of the rows, then of their remainders; those of
+    finished rows are replaced by the factors of :func:`certain_rank`.
     """
     k, n = work.shape
     length, share = 0.0, 2.0

@@ -1,7 +1,7 @@
-"""Which joints make up the chain of a task, and whose hands carry it out.
+"""Joints of the chain of a task, and the hands that perform it.
 
-Joint order within a chain is the order of the names in :data:`CHAINS`, never the
-order of a file or a model, so a direction learned today means the same tomorrow.
+Joint order within a chain is the order of the names in :data:`CHAINS`, never the order
+of a file or a model, so directions stay comparable.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _named(side: str, joints: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{side}_{joint}" for joint in joints)
 
 
-#: Joints that a task employs (the intrinsic part); all others are extrinsic.
+#: Joints that a task uses (the intrinsic part); all others are extrinsic.
 CHAINS: dict[str, tuple[str, ...]] = {
     "right_arm": _named("right", _ARM),
     "left_arm": _named("left", _ARM),
@@ -51,7 +51,7 @@ def chain_joints(chain: str) -> tuple[str, ...]:
 
 
 def chain_sides(chain: str) -> tuple[str, ...]:
-    """Return the sides whose hands carry out the chain's task."""
+    """Return the sides whose hands perform the chain's task."""
     joints = chain_joints(chain)
     return tuple(side for side in SIDES if any(j.startswith(side) for j in joints))
 

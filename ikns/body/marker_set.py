@@ -1,4 +1,4 @@
-"""Which marker sits on which segment: a TOML file beside the URDF.
+"""Which marker is on which segment: a TOML file next to the URDF.
 
 Positions are in the link's frame (X forward, Y up, Z right in the zero pose), in
 millimeters in the file and meters here, for the generic body.
@@ -34,18 +34,18 @@ class Marker:
     link : str
         The URDF link that carries it.
     position : (3,) tuple
-        Nominal place in the link's frame, meters.
+        Nominal position in the link's frame, meters.
     placement_sd : (3,) tuple
-        How far from the nominal place people put it along each axis, standard
-        deviation, meters: small on a bony landmark, large for a technical marker. One
-        number in the file stands for all three.
+        Standard deviation of its placement along each axis, meters: small on a bony
+        landmark, large for a technical marker. One number in the file is used for all
+        three.
     static_only : bool
-        Worn in the static trial only.
+        Used in the static trial only.
     aliases : tuple of str
         Other labels of the same marker.
     weight : float
-        How much inverse kinematics trusts it, relative to the others: less where soft
-        tissue moves under it.
+        Weight in inverse kinematics relative to the others: less where soft tissue
+        moves under it.
     """
 
     label: str
@@ -59,16 +59,16 @@ class Marker:
 
 @dataclass(frozen=True)
 class MarkerSet:
-    """Markers of a body, and the joints that they cannot observe.
+    """Markers of a body, and the joints that they do not observe.
 
     Parameters
     ----------
     name : str
         Short name.
     markers : tuple of Marker
-        In the order of every marker axis that a skeleton hands out.
+        In the order of every marker axis of a skeleton.
     held : tuple of str
-        Joints that these markers cannot tell apart from others.
+        Joints that these markers do not determine.
     source : str
         Where the layout is described.
 
@@ -186,7 +186,7 @@ class MarkerSet:
         return picked
 
     def without_static(self) -> MarkerSet:
-        """Return the set as it is worn after the static trial."""
+        """Return the set without the static-only markers."""
         return self.only(m.label for m in self.markers if not m.static_only)
 
     def all_tracked(self) -> MarkerSet:
@@ -195,12 +195,12 @@ class MarkerSet:
         return replace(self, markers=markers)
 
     def only(self, labels: Iterable[str]) -> MarkerSet:
-        """Return the set with these markers alone, in its own order."""
+        """Return the set with only these markers, in its own order."""
         kept = set(labels)
         return replace(self, markers=tuple(m for m in self.markers if m.label in kept))
 
     def at(self, positions: NDArray[np.float64]) -> MarkerSet:
-        """Return the set with the markers at these places, (M, 3) m in their links."""
+        """Return the set with markers at these positions, (M, 3) m in their links."""
         moved = tuple(
             replace(marker, position=(float(p[0]), float(p[1]), float(p[2])))
             for marker, p in zip(self.markers, positions, strict=True)

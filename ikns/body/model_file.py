@@ -1,7 +1,7 @@
-"""The body as a file: where the URDF lies and how it is resized, as text.
+"""The URDF of the body: its location, segment lengths and resizing, as text.
 
-A segment's size is one factor on everything that belongs to its link: the joints that
-hang on it, its center of mass, its shape. Joint axes and limits never change.
+A segment's size is one factor on everything that belongs to its link: its child joints,
+center of mass and shape. Joint axes and limits never change.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ __all__ = [
 
 #: Stature of the generic body: mean of the ANSUR II means of women and men, m.
 GENERIC_STATURE = (1.6285 + 1.7562) / 2
-#: The trunk's center of mass lies this far behind the sternal notch: midway between
-#: notch and C7, where ISB puts the thorax's long axis; m in the generic body.
+#: Distance of the trunk's center of mass behind the sternal notch: midway between notch
+#: and C7, where ISB has the thorax's long axis; m in the generic body.
 _TRUNK_DEPTH = 0.060
 #: Trunk length (sternal notch to hip) of the generic body, de Leva 1996, m.
 _TRUNK_LENGTH = 0.5166
@@ -99,7 +99,7 @@ def segment_ends(urdf: str) -> dict[str, NDArray[np.float64]]:
 def relative_sizes(urdf: str, reference: str) -> dict[str, float]:
     """Size of each segment over the same segment of a reference URDF."""
     ours, theirs = _joint_origins(urdf), _joint_origins(reference)
-    # The trunk grows with the place of the joint that hangs on it.
+    # The size of the trunk is the distance of its child joint.
     ends = {name: end or "right_clavicle_protraction" for name, end in SEGMENTS.items()}
     return {
         name: float(np.linalg.norm(ours[end]) / np.linalg.norm(theirs[end]))

@@ -1,7 +1,7 @@
-"""Calibration: a static trial and explorations in, a subject and an honest report out.
+"""Calibration: from a static trial and explorations to a subject and a report.
 
-Read `procedure` first; `elbow` says which way c rises, `sight` which marker has moved,
-`report` what is written down.
+`procedure` runs all steps. `scaling` fits the skeleton (`static_trial`, `size_fit`),
+`sight` tracks markers, `elbow` defines the sign of c, `report` the report.
 """
 
 from ikns.calibration.elbow import elbow_reference

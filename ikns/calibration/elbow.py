@@ -1,4 +1,4 @@
-"""Which way c rises: with the elbow."""
+"""The sign of c: it increases with the height of the elbow."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STEP = 1e-5
 def elbow_reference(
     skeleton: Skeleton, q: Array, chain: str, *, n_dof: int = 1
 ) -> Array | None:
-    """Return what should rise with c: the height of the elbow in the thorax frame.
+    """Gradient of the height of the elbow in the thorax frame, which c increases with.
 
     Parameters
     ----------
@@ -28,9 +28,9 @@ def elbow_reference(
     q : (25,) or (18,) array
         Posture, rad.
     chain : str
-        Of two arms both elbows count.
+        For two arms the heights of both elbows are summed.
     n_dof : int
-        With several degrees of freedom each elbow has its own row, then come forearm
+        With several degrees of freedom each elbow has its own row, followed by forearm
         pronation, wrist flexion and wrist deviation of each side.
 
     Returns

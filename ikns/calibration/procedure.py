@@ -1,4 +1,4 @@
-"""The line as one call: scale, track markers, keep still samples, fit the map."""
+"""The whole calibration: scale, track markers, select still samples, fit the map."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from ikns.recording.recording import Recording
 
 __all__ = ["calibrate"]
 
-#: Still samples that are kept to be drawn, at most; more would hide each other.
+#: Most still samples that are kept for pictures.
 _SHOWN = 3000
 
 
@@ -59,12 +59,12 @@ def calibrate(
     static : Recording
         The person standing or sitting still.
     explorations : sequence of Recording
-        The hand at the PCA points, the arm moving freely.
+        The hand held at the PCA points while the arm moves freely.
     generic : Skeleton, optional
         Body to start from; :meth:`Skeleton.from_anthropometry` when stature, mass and
         sex are known. Default: the generic adult.
     marker_set : str or Path
-        What the person wears.
+        The markers on the person.
     chain : str
         Joints of the task, see :data:`ikns.body.chains.CHAINS`. All others are
         extrinsic: how much they moved is reported.
@@ -75,16 +75,16 @@ def calibrate(
     min_static : float
         Shortest static trial to accept, s.
     min_still : float
-        A PCA point with less time of still samples is left out, s. The default is a
-        tenth of the 5 s that the protocol spends at each.
+        A PCA point with less still time is left out, s. The default is a tenth of the
+        5 s per point of the protocol.
     progress : callable, optional
         Called with (step, done, total).
 
     Returns
     -------
     Subject
-        Its report says for every PCA point how many still samples there were, and why
-        it was left out where it was.
+        Its report lists the still samples of every PCA point, and which points were
+        left out.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def calibrate(
         outside=outside,
         interpolation=interpolation,
         reference=elbow_reference(skeleton, posture.mean(axis=0), chain, n_dof=n_dof),
-        # With fewer samples than joints some joints could not show.
+        # Fewer samples than joints do not determine all components.
         min_samples=max(enough, len(chain_joints(chain)) + 1),
     )
     with warnings.catch_warnings(record=True) as caught:
@@ -195,7 +195,7 @@ def _left_out(
     marker_set: str | Path,
     explorations: Sequence[Recording],
 ) -> list[str]:
-    """Name markers that are worn, but that the static trial does not show."""
+    """Name markers seen in an exploration, but not in the static trial."""
     worn = MarkerSet.load(marker_set)
     seen = np.zeros(len(worn.labels), dtype=bool)
     for recording in explorations:
@@ -207,5 +207,5 @@ def _left_out(
         return []
     return [
         f"{static.source}: expected every marker in sight, found none of "
-        f"{', '.join(sorted(lost))}: left out, as nobody can tell where they sit."
+        f"{', '.join(sorted(lost))}: left out, as their places are unknown."
     ]

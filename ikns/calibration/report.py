@@ -1,4 +1,4 @@
-"""What a calibration writes down: plain text and numbers, ready for JSON."""
+"""The report of a calibration: text and numbers, ready for JSON."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = [
 
 
 def static_report(static: Recording, scaling: ScalingReport) -> dict[str, Any]:
-    """How well the static trial settled the body."""
+    """Results of the static trial."""
     return {
         "source": static.source,
         "duration_s": scaling.duration,
@@ -42,7 +42,7 @@ def static_report(static: Recording, scaling: ScalingReport) -> dict[str, Any]:
 def exploration_report(
     recording: Recording, motion: Motion, gate: NDArray[np.bool_]
 ) -> dict[str, Any]:
-    """How a recording was tracked and how much of it is still."""
+    """How well a recording was tracked and how much of it is still."""
     residual = motion.residual[np.isfinite(motion.residual)]
     return {
         "source": recording.source,
@@ -56,7 +56,7 @@ def exploration_report(
 
 
 def points_report(learned: NullSpaceMap, *, rate: float) -> list[dict[str, Any]]:
-    """Every PCA point asked for; `point` is its number in the map, from 1."""
+    """All PCA points, including those left out; `point` is the number in the map."""
     used = iter(range(len(learned.centers_)))
     rows: list[dict[str, Any]] = []
     for center, count in zip(learned.all_centers_, learned.all_counts_, strict=True):
@@ -85,9 +85,9 @@ def extrinsic_report(
     pairs: Sequence[tuple[Motion, NDArray[np.bool_]]],
     chain: str,
 ) -> dict[str, Any]:
-    """How far what is outside the chain moved while the hand was still.
+    """Motion of thorax and joints outside the chain while the hand was still.
 
-    The width that holds 90 % of the samples, for the exploration that moved it most;
+    Range from the 5th to the 95th percentile, in the exploration where it is largest;
     None for a joint that was never seen meanwhile.
     """
     span = np.full(skeleton.nv, np.nan)

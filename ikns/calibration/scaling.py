@@ -1,4 +1,4 @@
-"""From a static trial to the person's skeleton, and how well it is known."""
+"""Scaling of the skeleton to a person's static trial, with a report."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def scale(
     static : Recording
         Static trial.
     marker_set : str, path or MarkerSet
-        What the person wears.
+        The markers on the person.
     min_duration : float
         Shortest static trial to accept, s.
 
@@ -111,12 +111,12 @@ def scale(
     >>> abs(report.lengths["right_forearm"] - true) < 0.005
     True
     """
-    dressed, target, duration = static_posture(
+    reference, target, duration = static_posture(
         generic, static, marker_set=marker_set, min_duration=min_duration
     )
-    worn = dressed.marker_set
-    fit = fit_sizes(dressed, target)
-    sized = dressed.resized(size_factors(fit.log_sizes))
+    worn = reference.marker_set
+    fit = fit_sizes(reference, target)
+    sized = reference.resized(size_factors(fit.log_sizes))
     placed = worn.at(fit.positions)
     seen = seen_markers(target)
     skeleton = sized.with_markers(

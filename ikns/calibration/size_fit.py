@@ -130,8 +130,8 @@ def fit_sizes(generic: Skeleton, target: Array) -> SizeFit:
         places = sized.marker_positions + offsets
         return sized, sized.with_markers(worn.at(places))
 
-    sized, dressed = body(sizes, offsets)
-    positions, by_pose = dressed.marker_jacobian(q)
+    sized, placed = body(sizes, offsets)
+    positions, by_pose = placed.marker_jacobian(q)
     errors = residual(sizes, offsets, q, positions)
     converged = False
     for _ in range(_MAX_STEPS):
@@ -153,8 +153,8 @@ def fit_sizes(generic: Skeleton, target: Array) -> SizeFit:
                 offsets + length * d_offsets,
                 generic.integrate(q, length * d_pose),
             )
-            sized, dressed = body(trial[0], trial[1])
-            positions, by_pose = dressed.marker_jacobian(trial[2])
+            sized, placed = body(trial[0], trial[1])
+            positions, by_pose = placed.marker_jacobian(trial[2])
             trial_errors = residual(*trial, positions)
             if trial_errors @ trial_errors <= errors @ errors * (1 + 1e-12):
                 break

@@ -1,4 +1,4 @@
-"""The static trial: mean marker positions, and the body that wears them."""
+"""The static trial: mean marker positions, and the body with these markers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def static_posture(
 
     Returns
     -------
-    dressed : Skeleton
+    reference : Skeleton
         The generic body with the set at its nominal places; joints of an arm without
         any marker are held.
     target : (M, 3) array

@@ -30,17 +30,17 @@ __all__ = ["FILES", "FORMAT", "Subject"]
 FORMAT = 1
 _NEEDED = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
 _SAMPLES = "samples.csv"
-#: What a subject folder holds, and nothing else; the last is not needed to use it.
+#: All files of a subject folder; the last is optional.
 FILES = (*_NEEDED, _SAMPLES)
 
-#: Columns of the still samples: where the hand was, m in the thorax frame, and to which
-#: PCA point it counts, from 1; 0 to none.
+#: Columns of the still samples: hand position, m in the thorax frame, and number of the
+#: PCA point, from 1; 0 for none.
 _COLUMNS = "x_m,y_m,z_m,point"
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What a calibration found out about a person.
+    """The result of a person's calibration.
 
     Parameters
     ----------
@@ -80,12 +80,12 @@ class Subject:
     samples: NDArray[np.float64] | None = field(default=None, repr=False)
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Write the subject folder; it appears whole or not at all.
+        """Write the subject folder, completely or not at all.
 
         Parameters
         ----------
         folder : str or Path
-            Made when missing; its parent must exist.
+            Created when missing; its parent must exist.
         force : bool
             Whether to replace a subject folder that exists.
 
@@ -179,7 +179,7 @@ class Subject:
 
     def _map(self) -> dict[str, Any]:
         learned = self.null_space_map
-        # A map that was not fitted knows no postures.
+        # A map that was not fitted has no postures.
         known = getattr(learned, "cluster_means_", None)
         means: list[dict[str, Any]] = [{} for _ in learned.centers_]
         if known is not None:
@@ -219,7 +219,7 @@ def _write_json(path: Path, table: dict[str, Any]) -> None:
 
 
 def _read_xml(path: Path) -> str:
-    # Pinocchio's parser would print what it stumbles over to stderr.
+    # Pinocchio's parser would print errors to stderr.
     try:
         text = path.read_text(encoding="utf-8")
         ET.fromstring(text)

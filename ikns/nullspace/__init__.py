@@ -1,1 +1,1 @@
-"""The null space learned from samples: clustering, interpolation, the map."""
+"""The null space learned from samples: clustering, interpolation and the map."""

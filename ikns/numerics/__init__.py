@@ -1,1 +1,1 @@
-"""Numerics that know nothing of bodies: rigid motions, subspaces, derivatives."""
+"""Numerics without reference to bodies: rigid motions, subspaces, derivatives."""

@@ -1,11 +1,11 @@
-"""Confidence intervals of what is computed from a time series: the block bootstrap.
+"""Confidence intervals of statistics of a time series: the block bootstrap.
 
-Samples of a movement follow each other closely, so drawing them one by one would count
-each many times. Blocks of neighbors are drawn instead, around the end to the start
-(circular block bootstrap, Politis and Romano 1992), each as long as the series' own
-correlation asks for (:func:`block_length`).
+Samples of a movement are correlated in time, so drawing them one by one would
+overestimate their number. Blocks of neighbors are drawn instead, wrapping around the
+end (circular block bootstrap, Politis and Romano 1992), with a length that follows from
+the autocorrelation of the series (:func:`block_length`).
 
-A few seconds hold a few blocks only. Then a standard error from blocks is too small and
+A few seconds hold only a few blocks. Then a standard error from blocks is too small and
 itself uncertain, and percentiles of the replicates are too narrow. So replicates only
 give the standard error; it is corrected for its bias and used with Student's quantile:
 for k blocks the error's variance is ``1 - 1/k + 1/(3 k^2)`` of what it should be and
@@ -35,20 +35,20 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: At least this many blocks; fewer say next to nothing about their own spread.
+#: Least number of blocks; fewer hardly determine their own spread.
 _LEAST_BLOCKS = 3
-#: Share of the variance that the ends of blocks may cost: a twentieth of an interval.
+#: Share of the variance that may be lost at block ends: a twentieth of an interval.
 _BIAS = 0.1
 
 
 def block_length(series: ArrayLike) -> int:
-    """Length of the blocks that a series asks for, in samples.
+    """Block length for a series, in samples.
 
-    Blocks cut correlations at their ends. A variance from blocks of length b is
-    therefore off by the share ``-G / (g(0) b)``, where g(0) is the long-run variance,
+    Blocks cut correlations at their ends. The relative bias of a variance from blocks
+    of length b is therefore ``-G / (g(0) b)``, where g(0) is the long-run variance,
     the sum of all autocovariances R(k), and G the sum of ``|k| R(k)``. The length
-    returned makes that share a tenth. Both sums run over lags up to twice the one from
-    which on autocorrelations are no more than noise, with a flat-top window (Politis
+    returned makes that bias a tenth. Both sums run over lags up to twice the one beyond
+    which autocorrelations are only noise, with a flat-top window (Politis
     and White 2004, Econometric Reviews 23:53; corrected by Patton, Politis and White
     2009, 28:372). Their own length, which grows with the cube root of N, has the least
     mean squared error of the variance; intervals keep their level with longer blocks,
@@ -58,8 +58,8 @@ def block_length(series: ArrayLike) -> int:
     Parameters
     ----------
     series : (N,) or (N, m) array
-        What is averaged, finite; of several columns the longest length counts. For a
-        statistic that is not a mean: how much each sample moves it.
+        What is averaged, finite; the longest length of several columns counts. For a
+        statistic that is not a mean: the influence of each sample.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def _length_of_one(x: Array, most: int) -> int:
     noise = 2 * math.sqrt(math.log10(n) / n)
     small = np.abs(R[1:] / R[0]) < noise
     runs = [k for k in range(lags - quiet + 1) if small[k : k + quiet].all()]
-    # The first lag from which on all is noise; else the last that is not.
+    # The first lag beyond which all is noise; else the last that is not.
     last = runs[0] if runs else int(np.flatnonzero(~small).max(initial=0)) + 1
     reach = min(2 * max(last, 1), lags)
     k = np.arange(1, reach + 1)
@@ -118,7 +118,7 @@ def _length_of_one(x: Array, most: int) -> int:
 def block_rows(
     n: int, length: int, resamples: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Draw blocks of neighboring rows, around the end to the start.
+    """Draw blocks of neighboring rows, wrapping around the end.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def block_counts(
 ) -> Array:
     """How often each row is drawn by :func:`block_rows`, (resamples, n).
 
-    Sums over drawn rows are then products with this matrix.
+    Sums over the drawn rows are products with this matrix.
     """
     rows = block_rows(n, length, resamples, rng)
     rows = rows + n * np.arange(resamples)[:, None]
@@ -167,13 +167,13 @@ def block_counts(
 def student_interval(
     estimate: float, replicates: ArrayLike, blocks: float, *, level: float = 0.95
 ) -> tuple[float, float]:
-    """Interval of a number from the spread of its bootstrap replicates.
+    """Confidence interval of a number from the spread of its bootstrap replicates.
 
     Parameters
     ----------
     estimate : float
     replicates : (B,) array
-        Those that are not finite are left out.
+        Replicates that are not finite are ignored.
     blocks : float
         How many blocks fit into the series.
     level : float
@@ -201,20 +201,19 @@ def length_interval(
     rng: np.random.Generator,
     level: float = 0.95,
 ) -> tuple[float, float]:
-    """Interval of a vector's length, which noise makes longer.
+    """Confidence interval of a vector's length, which noise makes longer.
 
     The length of a noisy vector is never zero, even where that of the true one is; so
-    replicates scatter around too long a length. Instead all lengths r are collected for
-    which the length found would be nothing unusual: true vectors of length r in the
-    direction found, with errors as the replicates show them, widened as in
-    :func:`student_interval` (test inversion, Carpenter 1999, Statistics in Medicine
-    18:1).
+    replicates scatter around too long a length. The interval instead holds all lengths
+    r that a test does not reject: true vectors of length r in the direction found, with
+    the errors of the replicates, widened as in :func:`student_interval` (test
+    inversion, Carpenter 1999, Statistics in Medicine 18:1).
 
     Parameters
     ----------
     estimate : (m,) array
     replicates : (B, m) array
-        Of the vector; rows that are not finite are left out.
+        Of the vector; rows that are not finite are ignored.
     blocks : float
         How many blocks fit into the series.
     rng : numpy.random.Generator
@@ -244,7 +243,7 @@ def length_interval(
     root = np.sqrt(discriminant[discriminant >= 0])
     along = along[discriminant >= 0]
     first, last = np.sort(-along - root), np.sort(root - along)
-    # The share of vectors that come out shorter changes at these lengths only.
+    # The share of shorter vectors changes only at these lengths.
     lengths = np.unique(np.concatenate([[0.0], first, last]))
     lengths = lengths[lengths >= 0]
     shorter = np.searchsorted(first, lengths, "right") - np.searchsorted(last, lengths)
@@ -256,6 +255,6 @@ def length_interval(
 
 
 def _small_sample(blocks: float) -> tuple[float, float]:
-    """Degrees of freedom, and factor on a standard error, for so many blocks."""
+    """Degrees of freedom, and factor on a standard error, for a number of blocks."""
     k = max(float(blocks), 1.0)
     return 1.5 * k, (1 - 1 / k + 1 / (3 * k * k)) ** -0.5

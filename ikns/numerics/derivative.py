@@ -8,7 +8,7 @@ from scipy.signal import savgol_filter
 
 __all__ = ["slope"]
 
-#: Width of the fit: voluntary motion of the arm stays below about 5 Hz, s.
+#: Width of the fit, s; voluntary motion of the arm is below about 5 Hz.
 WINDOW = 0.2
 #: Most variance of a slope next to a gap, over that at the end of a recording, where
 #: the whole window lies on one side. Twice leaves out the 2 samples next to a long gap,

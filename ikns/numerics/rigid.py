@@ -12,7 +12,7 @@ __all__ = ["pose_steps", "rigid_transform"]
 def rigid_transform(
     source: NDArray[np.float64], target: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rotation and shift that carry points onto points best (Kabsch 1976).
+    """Rotation and translation that best map points to points (Kabsch 1976).
 
     Parameters
     ----------

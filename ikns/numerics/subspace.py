@@ -3,9 +3,9 @@
 A subspace is an array of rows that span it. A Jacobian maps joint rates (rad/s) to task
 rates; its rows may mix meters and radians. The null space itself does not depend on how
 rows are scaled (``J n = 0`` row by row), but singular values do, and with them the
-decision which of them are zero. The default ``rtol`` of 1e-9 stands far below the ratio
-that a change of unit or an almost straight arm makes (1e-3 each) and far above
-rounding (1e-16), so the decision is the same in meters and in millimeters.
+decision which of them are zero. The default ``rtol`` of 1e-9 is far below the ratios
+due to a change of unit or an almost straight arm (1e-3 each) and far above rounding
+(1e-16), so the decision is the same in meters and in millimeters.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ __all__ = [
     "principal_components",
 ]
 
-#: Rows count as dependent when their smallest singular value is this share of the
-#: largest or less: far above rounding (1e-16), on which their span then depends.
+#: Rows count as dependent when their smallest singular value is at most this share of
+#: the largest: far above rounding (1e-16), which would otherwise decide their span.
 _DEPENDENT = 1e-12
 
 
 def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
-    """Orthonormal basis of the joint motions that a task does not see.
+    """Orthonormal basis of the joint motions that leave a task unchanged.
 
     Parameters
     ----------
@@ -72,22 +72,22 @@ def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64
 def null_spaces(
     jacobians: ArrayLike, *, rtol: float = 1e-9
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Orthonormal bases of many null spaces, whatever the rank of each.
+    """Orthonormal bases of many null spaces, of any rank.
 
     Parameters
     ----------
     jacobians : (..., k, n) array
-        Task rates per joint rate, one Jacobian a posture.
+        Task rates per joint rate, one Jacobian per posture.
     rtol : float
-        Singular values up to ``rtol * largest`` (of the same posture) count as zero;
-        what is below rounding, 2e-16, always does.
+        Singular values up to ``rtol * largest`` (of the same posture) count as zero; an
+        `rtol` below rounding, 2e-16, is raised to it.
 
     Returns
     -------
     basis : (..., d, n) array
-        ``n - rank`` orthonormal rows ``b`` with ``jacobian @ b == 0``, d the most that
-        any posture has, and below them rows of zeros: ``basis.T @ basis`` is the
-        projector on each. NaN for postures whose Jacobian is not finite.
+        ``n - rank`` orthonormal rows ``b`` with ``jacobian @ b == 0``, then rows of
+        zeros; d is the largest such number, and ``basis.T @ basis`` the projector. NaN
+        for postures whose Jacobian is not finite.
     rank : (...) integer array
         Rank of each Jacobian; -1 where it is not finite.
 
@@ -120,7 +120,7 @@ def null_spaces(
 
 
 def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
-    """Orthogonal projectors onto null spaces, whatever the rank of each.
+    """Orthogonal projectors onto null spaces, of any rank.
 
     Parameters
     ----------
@@ -147,11 +147,11 @@ def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.flo
 
 
 def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
-    """Angles between two subspaces, accurate from tiny ones to right angles.
+    """Principal angles between two subspaces, accurate from tiny to right angles.
 
     Cosines are the singular values of ``Qa' Qb``, sines those of ``Qb - Qa Qa' Qb``
-    (Bjorck and Golub 1973). Each is exact to rounding in absolute terms, so
-    ``atan2(sine, cosine)`` is too, on the whole quarter circle.
+    (Bjorck and Golub 1973). Each is exact to rounding in absolute terms, and so is
+    ``atan2(sine, cosine)`` from 0 to pi/2.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def mean_null_direction(
     Parameters
     ----------
     jacobians : (N, k, n) array
-        One Jacobian a visited posture; those that are not finite are left out.
+        One Jacobian per visited posture; those that are not finite are ignored.
     d : int
         How many directions.
     rtol : float
@@ -213,7 +213,7 @@ def mean_null_direction(
         Leading eigenvectors as orthonormal rows, each with its largest entry positive.
     concentration : (n,) array
         All eigenvalues, decreasing; the first `d` belong to the directions. Where
-        entry ``d`` is close to entry ``d - 1`` the directions are one choice of many.
+        entry ``d`` is close to entry ``d - 1`` the directions are not unique.
 
     Raises
     ------
@@ -241,7 +241,7 @@ def mean_null_direction(
 def principal_components(
     rows: NDArray[np.float64], *, centered: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Directions in which vectors vary most.
+    """Principal components of vectors.
 
     Parameters
     ----------
@@ -253,10 +253,10 @@ def principal_components(
     Returns
     -------
     components : (n, n) array
-        Orthonormal rows of either sign, the one with most variance first.
+        Orthonormal rows of arbitrary sign, by decreasing variance.
     ratio : (n,) array
-        Part of the total variance that each explains, decreasing; zeros where there is
-        none but for rounding.
+        Share of the total variance that each explains; zeros where there is no variance
+        beyond rounding.
     """
     around = rows - rows.mean(axis=0) if centered else rows
     if np.abs(around).max() <= 1e-12 * np.abs(rows).max():
@@ -267,13 +267,13 @@ def principal_components(
 
 
 def largest_entry_positive(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows (d, n) turned over where their entry of largest magnitude is negative."""
+    """Rows (d, n), negated where their entry of largest magnitude is negative."""
     largest = np.take_along_axis(rows, np.abs(rows).argmax(axis=1)[:, None], axis=1)
     return np.where(largest < 0, -rows, rows)
 
 
 def _flat(matrices: NDArray[np.float64], batch: tuple[int, ...]) -> NDArray[np.float64]:
-    """Matrices as (N, k, n), in the one layout that kernels are compiled for."""
+    """Matrices as (N, k, n), in the memory layout that kernels are compiled for."""
     shape = matrices.shape[-2:]
     every = np.broadcast_to(matrices, (*batch, *shape))
     every = np.require(every, requirements=["C", "A", "W"])

@@ -1,4 +1,4 @@
-"""Folders of results: they appear whole or not at all and delete nothing foreign."""
+"""Folders of results, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ __all__ = ["check_output_folder", "output_folder"]
 def check_output_folder(
     folder: str | Path, files: Sequence[str], *, force: bool
 ) -> None:
-    """Make sure, before any work, that a folder may be written.
+    """Check, before any work, that a folder may be written.
 
     Parameters
     ----------
     folder : str or Path
-        Where results shall go.
+        Folder for the results.
     files : sequence of str
         Every file that such a folder may hold, relative to it.
     force : bool
@@ -30,8 +30,8 @@ def check_output_folder(
     Raises
     ------
     InvalidInput
-        When something is in the way that `force` does not cover: a file, the current
-        folder, or one that holds anything else. So no run deletes what no run wrote.
+        When the path is a file, the current folder, a folder with other files (which no
+        run may delete), or one with results and without `force`.
     """
     target = Path(folder)
     if not target.absolute().parent.is_dir():
@@ -57,15 +57,14 @@ def check_output_folder(
 
 @contextmanager
 def output_folder(folder: str | Path) -> Iterator[Path]:
-    """Give a hidden folder to write into; on leaving without error it takes its place.
+    """Provide a temporary folder that replaces the folder on exit without error.
 
-    A folder that was there before stays as it was until then, and for good when an
-    error comes first.
+    An existing folder is not changed until then, nor when there is an error.
 
     Parameters
     ----------
     folder : str or Path
-        Where the results shall be seen; cleared by :func:`check_output_folder`.
+        Folder for the results, checked by :func:`check_output_folder`.
 
     Raises
     ------

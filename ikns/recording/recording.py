@@ -1,7 +1,7 @@
-"""A recording: where the cameras saw each marker, over time.
+"""A recording: marker positions over time.
 
-Arrays put time first. Positions are meters in the laboratory's frame (world);
-NaN means that the cameras did not see the marker in that frame.
+Time is the first axis. Positions are in meters in the laboratory (world) frame; NaN
+means that the cameras did not see the marker in that frame.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Recording:
     labels : sequence of M str
         Marker names as the file has them, each once.
     source : str
-        Where the recording came from, for messages.
+        Name of the recording, for messages.
 
     Raises
     ------

@@ -1,11 +1,11 @@
-"""Statistics of the two experiments: the paper's own, and beside them the right ones.
+"""Statistics of the two experiments: the paper's tests, and more appropriate ones.
 
 `analysis` runs everything on a table of trials. Each test has a small frozen result
 with a ``sentence()`` in plain words, which never takes a difference that was not found
-for equality. `pairs` is what paired tests take; `paired_tests` repeats the paper;
-`equivalence`, `effects`, `mixed_model`, `within_subject_anova`, `success`, `times` and
-`learning` stand beside it; `power` and `sample_size` say how many participants. scipy
-and statsmodels compute.
+for equality. `pairs` prepares the data of paired tests; `paired_tests` repeats those of
+the paper; `equivalence`, `effects`, `mixed_model`, `within_subject_anova`, `success`,
+`times` and `learning` add to them; `power` and `sample_size` determine the number of
+participants. Computed by scipy and statsmodels.
 """
 
 from ikns.statistics.analysis import (

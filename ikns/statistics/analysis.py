@@ -1,4 +1,4 @@
-"""All tests of an experiment at once: the paper's, and what stands beside them."""
+"""All tests of an experiment at once: the paper's and the additional ones."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _MOST_ANOVA = 200
 
 @dataclass(frozen=True)
 class TrackingAnalysis:
-    """Experiment 1. ``paper`` repeats its tests; the rest is beside it.
+    """Experiment 1. ``paper`` repeats the paper's tests; the others are additional.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class TrackingAnalysis:
     learning: dict[str, LearningCurves]
 
     def sentences(self) -> list[str]:
-        """Everything, in order."""
+        """Return the results as sentences, in order."""
         said = [test.sentence() for test in self.paper]
         said += [self.subjects.sentence(), self.ranks.sentence()]
         said += [effect.sentence() for effect in self.effects]
@@ -91,7 +91,7 @@ class TrackingAnalysis:
 
 @dataclass(frozen=True)
 class PickAnalysis:
-    """Experiment 2. ``paper`` repeats its test; the rest is beside it.
+    """Experiment 2. ``paper`` repeats the paper's test; the others are additional.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class PickAnalysis:
     effects: tuple[Effect, ...]
 
     def sentences(self) -> list[str]:
-        """Everything, in order."""
+        """Return the results as sentences, in order."""
         said = [
             f"{counted(self.paper_left_out, 'pair')} with a failure left out, as the "
             "paper did, for the next test only."
@@ -141,7 +141,7 @@ def analyze_tracking(
     unit: str = "",
     unequal: Literal["refuse", "keep"] = "refuse",
 ) -> TrackingAnalysis:
-    """Run the paper's tests of tracking, and the right ones.
+    """Run the paper's tests of tracking, and the additional ones.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def _learning(
     names: tuple[str, str],
     unit: str,
 ) -> dict[str, LearningCurves]:
-    """Curves by condition, the trajectories' own difficulty taken out first."""
+    """Curves by condition, adjusted for the difficulty of the trajectories."""
     if trial is None:
         return {}
     condition, place = labels(table, "condition"), labels(table, level)
@@ -227,7 +227,7 @@ def analyze_picking(
     conditions: Sequence[str] | None = None,
     unequal: Literal["refuse", "keep"] = "refuse",
 ) -> PickAnalysis:
-    """Run the paper's test of pick and place, and the right ones.
+    """Run the paper's test of pick and place, and the additional ones.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def analyze_picking(
         ``subject``, ``condition``, ``object``, ``time`` (s) and ``success``; a row is a
         trial, one per subject, condition and object.
     limit : float
-        When a trial was ended, s.
+        Time limit of a trial, s.
     time, success, level, conditions
         Columns, and the order of the difference.
     unequal : "refuse" or "keep"

@@ -1,7 +1,7 @@
-"""How much differences are taken to spread when a study is planned, and who says so.
+"""Assumed spread of differences for planning a study, with its source.
 
-Power rests on this more than on anything else, so it never comes without its source:
-the paper's printed figures, taken at their worst, or the trials of a pilot study.
+Power depends on this more than on anything else, so the source is always stated: the
+paper's printed figures in the worst case, or the trials of a pilot study.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class AssumedSpread:
-    """Standard deviations to plan with, and where they are from.
+    """Standard deviations to plan with, and their source.
 
     Parameters
     ----------
     spread : Spread
     source : str
-        A clause that names it, with its assumptions.
+        A clause that names the source, with its assumptions.
     deviation : float
         Of the subjects' mean differences where it was found.
     low, high : float
@@ -52,11 +52,11 @@ class AssumedSpread:
 
 
 def paper_spread(experiment: Literal["tracking", "picking"]) -> AssumedSpread:
-    """Take the most that the paper's printed figures allow, all between subjects.
+    """Largest spread that the paper's printed figures allow, all between subjects.
 
-    How far the subjects' mean differences spread is not printed. At most is therefore
-    what is taken: a study planned with it has too many participants, not too few, and
-    more trials of each do not help.
+    The spread of the subjects' mean differences is not printed, so the largest possible
+    one is assumed: a study planned with it has too many participants, not too few, and
+    more trials per participant do not help.
 
     Parameters
     ----------
@@ -96,11 +96,12 @@ def pilot_spread(
     conditions: Sequence[str] | None = None,
     simulated: bool = False,
 ) -> AssumedSpread:
-    """Take the spread apart that a pilot study found.
+    """Estimate the components of the spread from a pilot study.
 
-    The parts of :class:`Spread` by the mean squares of subjects, of subjects x levels
-    and of repeats; what comes out below 0 counts as 0. What all subjects have in common
-    at a level is no spread. Without repeats their part is in that of the levels.
+    The components of :class:`Spread` follow from the mean squares of subjects, of
+    subjects x levels and of repeats; negative estimates become 0. An effect of the
+    level that all subjects share is no spread. Without repeats their component is part
+    of that of the levels.
 
     Parameters
     ----------
@@ -113,7 +114,7 @@ def pilot_spread(
     conditions : (str, str), optional
         First and second of the difference.
     simulated : bool
-        Whether the subjects are virtual; the source says so.
+        Whether the subjects are virtual, which the source then states.
 
     Raises
     ------
@@ -184,7 +185,7 @@ def _complete(pairs: Pairs) -> tuple[Array, list[str]]:
 def _repeats(
     table: Table, value: str, level: str, pairs: Pairs, people: list[str]
 ) -> tuple[float, float]:
-    """Variance of repeats, and how much of it a difference of means over them has."""
+    """Variance of repeats, and the factor on it in a difference of their means."""
     values = numbers(column(table, value), value)
     cell = zip(
         labels(table, "subject").tolist(),

@@ -1,4 +1,4 @@
-"""How large a difference is: effect sizes over subject means, with intervals."""
+"""Effect sizes over subject means, with intervals."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Effect:
     unit : str
         Empty for standardized ones.
     method : str
-        Where the interval is from.
+        Method of the interval.
     subjects : int
     names : (str, str)
     quantity : str
@@ -48,7 +48,7 @@ class Effect:
     quantity: str
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         return (
             f"{self.name} of {self.quantity}, {self.names[0]} minus {self.names[1]}, "
             f"is {number(self.value, self.unit)} "

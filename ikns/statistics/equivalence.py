@@ -1,7 +1,8 @@
 """Equivalence within a margin that was declared before the data were seen.
 
 Two one-sided t-tests (Schuirmann 1987, J Pharmacokinet Biopharm 15:657), by
-statsmodels. That no difference was found shows no equivalence; this does, or does not.
+statsmodels. A difference that is not significant does not show equivalence; this test
+can.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ Verdict = Literal["equivalent", "equivalent though different", "different", "und
 
 @dataclass(frozen=True)
 class Equivalence:
-    """Two one-sided tests beside the test of a difference, over subject means.
+    """Two one-sided tests and the test of a difference, over subject means.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ class Equivalence:
     unit: str
 
     def sentence(self) -> str:
-        """Say it; undecided stays undecided."""
+        """Return the result as a sentence; undecided stays undecided."""
         a, b = self.names
         margin = number(self.margin, self.unit)
         what = {

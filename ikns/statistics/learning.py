@@ -42,13 +42,13 @@ class LearningCurve:
     model, subject : str
         The subject is ``all`` where gain and rate are shared.
     final : float
-        a, where learning leads, in the value's unit; mean over persons.
+        a, the asymptote, in the value's unit; mean over persons.
     gain : float
         b, above that at the first trial, in the value's unit; 0 for the constant.
     rate : float
         tau in trials, or the exponent c; NaN for the constant.
     deviation : float
-        Root mean square of what is left.
+        Root mean square of the residuals.
     aicc : float
     """
 
@@ -96,7 +96,7 @@ class LearningCurves:
     unit: str
 
     def sentence(self) -> str:
-        """Say it; models nearly as good are named."""
+        """Return the result as a sentence that names models nearly as good."""
         near = [
             m
             for m in MODELS
@@ -214,7 +214,7 @@ def _fit(
         left, parameters = float(rest @ rest), people + 1  # with the noise
         final = y
     else:
-        # From a gain that is over within a trial to one still going on at the end.
+        # From learning within one trial to learning that continues at the end.
         low, high = (
             (math.log(0.2), math.log(5 * k.max()))
             if model == "exponential"
@@ -232,7 +232,7 @@ def _fit(
         rate, parameters = math.exp(float(found.x)), people + 3
         final = y - gain * curve(float(found.x))
     n = len(y)
-    # A perfect fit has no noise to weigh it by: rounding stands in for it.
+    # A perfect fit has no noise: rounding replaces it.
     noise = max(left / n, (1e-12 * float(np.abs(y).max())) ** 2)
     aicc = n * math.log(noise) + 2 * parameters * n / (n - parameters - 1)
     return LearningCurve(

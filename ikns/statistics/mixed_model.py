@@ -1,11 +1,11 @@
-"""Linear mixed model: what the condition does, each person being different.
+"""Linear mixed model: the effect of the condition, with random subjects.
 
     value = mean + level + condition + condition x level (+ trial) + subject
             + subject x condition + noise
 
-Subjects differ in skill and in how the condition suits them: both are random. Without
+Subjects differ in skill and in the effect of the condition: both are random. Without
 the second, a mixed model counts every trial as independent evidence for a difference,
-the paper's mistake again. Fitted by statsmodels (REML); its normal quantiles are too
+like the paper. Fitted by statsmodels (REML); its normal quantiles are too
 narrow for ten persons, so tests of the condition use Student's t with subjects - 1
 degrees of freedom, exact in the balanced case, where the test of the condition is the
 paired t-test of subject means.
@@ -91,7 +91,7 @@ class MixedModel:
     level: str
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         if self.condition is None:
             return f"Mixed model of {self.quantity}: {self.message}."
         c = self.condition

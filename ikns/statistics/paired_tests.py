@@ -1,9 +1,9 @@
 """Paired tests: the paper's own, pooled as it pooled them, and over subject means.
 
-The paper takes a subject's three trajectories (or ten objects) for independent pairs.
-They are not: what a person is good at shows in all of them. :func:`pooled_t`,
-:func:`normality` and :func:`exact_sign` repeat it, and say so; :func:`subject_means_t`
-has one pair a person. Computed by scipy.
+The paper treats a subject's three trajectories (or ten objects) as independent pairs.
+They are not, as a person's skill affects all of them. :func:`pooled_t`,
+:func:`normality` and :func:`exact_sign` repeat this and state it;
+:func:`subject_means_t` has one pair per person. Computed by scipy.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class PairedT:
     basis: str
 
     def sentence(self) -> str:
-        """Say it; a difference that is not shown is not called none."""
+        """Return the result as a sentence; not significant is not called equal."""
         shown = "differs" if self.p < 0.05 else "is not shown to differ"
         return (
             f"Paired t-test {self.basis}: {self.quantity} {shown} between "
@@ -145,7 +145,7 @@ class Normality:
     basis: str
 
     def sentence(self) -> str:
-        """Say it; a normality that is not refuted is not called shown."""
+        """Return the result as a sentence; not rejected is not called normal."""
         verdict = (
             "the differences are not normally distributed"
             if self.p < 0.05
@@ -200,7 +200,7 @@ class SignTest:
     basis: str
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         n = self.positive + self.negative
         shown = "is shown" if self.p < 0.05 else "is not shown"
         return (
@@ -215,7 +215,7 @@ class SignTest:
 def exact_sign(pairs: Pairs) -> SignTest:
     """Exact sign test of the paired differences, as the paper did it for times.
 
-    All ties: nothing speaks for either, p = 1.
+    With ties only, p = 1.
     """
     d = pairs.differences
     up, down = int(np.sum(d > 0)), int(np.sum(d < 0))
@@ -245,7 +245,7 @@ class RankTest:
     basis: str
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         shown = "differs" if self.p < 0.05 else "is not shown to differ"
         return (
             f"Wilcoxon's signed-rank test {self.basis}: {self.quantity} {shown} "

@@ -1,4 +1,4 @@
-"""Two conditions side by side: what the paired tests take.
+"""Paired values of two conditions, the input of the paired tests.
 
 Every difference in this package is the first condition minus the second.
 """
@@ -37,7 +37,7 @@ class Pairs:
     quantity, unit : str
         What the values are.
     dropped : int
-        Pairs left out for want of a partner.
+        Pairs left out because one value is missing.
     """
 
     first: Array

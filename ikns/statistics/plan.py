@@ -18,7 +18,7 @@ _STEPS = [k * 10**power for power in range(7) for k in (1, 2, 5)]
 
 @dataclass(frozen=True)
 class SamplingPlan:
-    """How many participants reach what.
+    """Power by number of participants.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class SamplingPlan:
         By number of participants.
     size : SampleSize
     declared : Power or None
-        With the participants that the study has.
+        With the participants of the study.
     """
 
     curve: tuple[Power, ...]
@@ -54,7 +54,7 @@ def plan_participants(
     ----------
     spread : Spread
     participants : int, optional
-        That the study has.
+        Of the study.
     levels, repeats, difference, margin, alpha, target, most, simulations, seed
         As in :func:`ikns.statistics.sample_size`; a number of participants
         has the same seed there and here.

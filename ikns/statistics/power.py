@@ -4,8 +4,8 @@ The difference of a trial of the first condition from one of the second is
 
     d = difference + subject + subject x level + trial of first - trial of second
 
-all normal and independent. Averaging trials and trajectories shrinks their parts of the
-noise, never the subjects': what more repeats cannot buy, only more people can.
+all normal and independent. Averaging over trials and trajectories reduces their parts
+of the noise, but not that of the subjects, which only more participants reduce.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class Power:
     seed: int
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         what = (
             f"equivalence within {number(self.margin)}"
             if self.margin is not None

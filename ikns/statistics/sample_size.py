@@ -36,7 +36,7 @@ class SampleSize:
     tried: tuple[Power, ...]
 
     def sentence(self) -> str:
-        """Say it, with what is uncertain about it."""
+        """Return the result as a sentence, with its uncertainty."""
         aim = (
             f"equivalence within {number(self.found.margin)}"
             if self.found.margin is not None

@@ -1,4 +1,4 @@
-"""Success of paired trials: exact McNemar, and what it takes for granted."""
+"""Success of paired trials: exact McNemar test, over pairs and over subjects."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class SuccessTest:
     succeeded : (int, int)
         Of ``pairs``, per condition.
     only_first, only_second : int
-        Pairs in which one condition alone succeeded; only these tell anything.
+        Pairs in which only one condition succeeded; only these are informative.
     p : float
         McNemar's, exact, two-sided; counts pairs as independent.
     p_subjects : float
-        Signs of the subjects' differences in success flipped in all ways: one vote a
-        person. 1 with no difference in any subject.
+        Sign-flip permutation test of the subjects' differences in success: one value
+        per person. 1 with no difference in any subject.
     low, high : float
         95 % interval of the share of one-sided pairs that the first won (Clopper and
         Pearson); 0 and 1 when there is none.
@@ -52,7 +52,7 @@ class SuccessTest:
     names: tuple[str, str]
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         shown = "differs" if self.p < 0.05 else "is not shown to differ"
         return (
             f"Success {shown}: {self.succeeded[0]} of {self.pairs} with "

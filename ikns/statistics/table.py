@@ -1,6 +1,7 @@
-"""Trials as a tidy table: one row a trial, one column a thing known about it.
+"""Trials as a tidy table: one row per trial, one column per variable.
 
-A table is a mapping from column names to sequences of one length. Checked once, here.
+A table is a mapping from column names to sequences of one length, which is checked
+here.
 """
 
 from __future__ import annotations

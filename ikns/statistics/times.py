@@ -1,9 +1,9 @@
-"""Times to success with a limit: failed trials stay in.
+"""Times to success with a limit, including failed trials.
 
 A trial that fails, by a drop or by time-out, is censored at the limit: the object was
-not placed within it, however early it fell. Censoring at the drop would say that it
-might have been placed a moment later. Leaving failures out, as the paper did, compares
-the trials that went well, and favors the condition that fails more.
+not placed within it, however early it fell. Censoring at the drop would imply that it
+might have been placed a moment later. Leaving failures out, as the paper did, favors
+the condition that fails more.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class TimeTest:
         Of the restricted times, one pair a person; None without spread.
     chi2, p : float
         Log-rank test stratified by pair (which of the two was done first), 1 degree;
-        counts pairs as independent. NaN and 1 when no pair tells.
+        counts pairs as independent. NaN and 1 when no pair is informative.
     p_exact : float
         The same question, binomial.
     first_sooner, second_sooner : int
@@ -47,7 +47,7 @@ class TimeTest:
     survivors : (float, float)
         Means of pairs that succeeded twice, as the paper took them, s; NaN with none.
     failed_pairs : int
-        What that leaves out.
+        Pairs that this leaves out.
     limit : float
         s.
     pairs, subjects : int
@@ -69,7 +69,7 @@ class TimeTest:
     names: tuple[str, str]
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         a, b = self.restricted_means
         parts = [
             f"Mean time to success within {number(self.limit, 's')}, failures counted "
@@ -110,7 +110,7 @@ def restricted_mean(times: np.ndarray, success: np.ndarray, limit: float) -> flo
     Parameters
     ----------
     times : (n,) array
-        Of success, or when watching ended, s.
+        Of success, or of censoring, s.
     success : (n,) bool array
     limit : float
         s.
@@ -174,7 +174,7 @@ def time_test(
         With ``subject``, ``condition``, the level, time in s and success; one trial per
         subject, condition and level. The time of a failed trial may be missing (NaN).
     limit : float
-        When a trial was ended, s.
+        Time limit of a trial, s.
     unequal : "refuse" or "keep"
         What to do about trials without a partner, as in :func:`pair_trials`.
 

@@ -1,8 +1,8 @@
 """Repeated-measures analysis of variance: condition, level, and both, by statsmodels.
 
-The balanced companion of the mixed model: each effect is tested against how much it
-varies from subject to subject, nothing has to converge, no trial may be missing. Its
-test of the condition is the paired t-test of subject means, squared.
+The alternative to the mixed model for balanced data: each effect is tested against its
+variation between subjects, without iteration, and no trial may be missing. Its test of
+the condition is the paired t-test of subject means, squared.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class VarianceTable:
     quantity: str
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return the result as a sentence."""
         parts = [
             f"{name} {'has' if p < 0.05 else 'is not shown to have'} an effect (F({k}, "
             f"{m}) = {number(F)}, {p_text(p)})"

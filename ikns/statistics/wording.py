@@ -1,4 +1,4 @@
-"""How numbers read in a sentence."""
+"""Numbers in sentences."""
 
 from __future__ import annotations
 

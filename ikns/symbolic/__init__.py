@@ -1,4 +1,4 @@
-"""A body's kinematics as CasADi expressions, and what optimizers find with them."""
+"""A body's kinematics as CasADi expressions, and optimizations with them."""
 
 from ikns.symbolic.control_range import ControlRange, available_control
 from ikns.symbolic.held_hand import HeldHand, available_range, longest_sweep

@@ -1,4 +1,4 @@
-"""The joints of a task and what they must keep, as expressions: hands, clearances."""
+"""The joints of a task and its constraints as expressions: hands, clearances."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Chain:
     pairs : tuple
         Capsules that must not overlap, each with where its link sits in the tree.
     alone : bool
-        Whether a posture is given by the task's joints alone.
+        Whether a posture consists of the task's joints only.
     """
 
     tree: Tree
@@ -68,7 +68,7 @@ class Chain:
     def whole(self, q: Array) -> Array:
         """Angles of the whole body (m,) from its own, its configuration, or a robot's.
 
-        A robot's joints that are off the way to its frame do not matter.
+        A robot's joints that do not move its frame are zero.
         """
         n = len(self.columns) if self.alone else self.n_angles
         if q.shape not in ((n,), (n + 7,)) or (self.alone and len(q) != n):
@@ -89,11 +89,11 @@ class Held:
     place : Function
         (x, angles) to the hands' positions (3, h) m and rotations (3, 3 h).
     off : Function
-        (x, angles, positions, rotations) to how far the hands are off, (k,) m and rad.
+        (x, angles, positions, rotations) to the hands' errors, (k,) m and rad.
     jacobian : Function
         (x, angles) to the hands' Jacobian, (k, n).
     clearance : Function
-        (x, angles) to the room between the capsules of each pair, m.
+        (x, angles) to the clearance between the capsules of each pair, m.
     names : tuple of str
         Of the pairs.
     """

@@ -1,4 +1,4 @@
-"""How far the control signal can go while the hand is held, whatever was explored."""
+"""Available range of the control signal while the hand is held."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ControlRange:
         Least and greatest c, not clipped: 0 and 1 where exactly the range that the map
         holds is available, below 0 and above 1 where there is more.
     now : float
-        c of the posture that was asked about.
+        c of the given posture.
     share : float
         The range in use over the available one.
     joints : AvailableRange

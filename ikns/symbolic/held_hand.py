@@ -1,4 +1,4 @@
-"""What an arm can still do while it holds its hand: sweeps, and the range of c.
+"""Self-motions of an arm that holds its hand: sweeps, and the range of c.
 
 Every posture x of a chain that keeps the hand where it is obeys
 
@@ -33,17 +33,17 @@ from ikns.symbolic.results import AvailableRange, Sweep
 __all__ = ["HeldHand", "available_range", "longest_sweep"]
 
 Array = NDArray[np.float64]
-#: A posture or postures, what binds, whether it is a solution, the optimizer's word.
+#: A posture or postures, active limits, whether it is a solution, optimizer status.
 Found = tuple[Array, tuple[str, ...], bool, str]
 
 #: Postures to search from, besides the given one, where much freedom is left.
 _STARTS = 5
-#: With less room than this a side of a sweep is its start alone, rad.
+#: With less room than this a side of a sweep is only its start, rad.
 _ROOM = 1e-4
 
 
 class HeldHand:
-    """The postures of a chain that hold a hand; built once, asked at many places.
+    """The postures of a chain that hold a hand; built once, solved at many places.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class HeldHand:
         q : (18,) or (25,) array
             Joint angles or configuration of a skeleton; (n,) of a robot.
         direction : (n,) array, optional
-            What rises from the first posture to the last; default: the joint that
+            Increases from the first posture to the last; default: the joint that
             moves most at the start.
 
         Raises
@@ -180,7 +180,7 @@ class HeldHand:
         postures, solved, status = self._sweeper.solve(guess, at.hold, ahead)
         if not solved:
             return guess, self._binding(walked.beyond, at), False, status
-        # Mostly the last one is stopped, but one before it may be.
+        # Usually the last one is at a limit, but an earlier one may be.
         stopped = [self._binding(x, at) for x in postures[:0:-1]]
         return postures, next(filter(None, stopped), ()), True, status
 

@@ -1,7 +1,7 @@
 """Forward kinematics and Jacobians as CasADi expressions, from the joint tree.
 
-The same joints as the compiled kernels follow (:mod:`ikns._kernels.body.tree`), so what
-an optimizer differentiates is the body that everything else moves.
+The joints are those of the compiled kernels (:mod:`ikns._kernels.body.tree`), so
+optimizers use the same body model as everything else.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ Pose = tuple[ca.SX, ca.SX]
 #: A frame fixed to a joint of a tree: joint, rotation (3, 3), translation (3,) m.
 End = tuple[int, Array, Array]
 
-#: A placement's entry this close to a whole number is one that rounding has blurred;
-#: made whole it drops out of the expressions.
+#: An entry of a placement this close to an integer is rounded to it, so that zeros and
+#: ones drop out of the expressions.
 _BLUR = 1e-15
 
 
@@ -54,7 +54,7 @@ def joint_frames(
     q : (nq,) expression
         Configuration; see :func:`root_at_origin`.
     growth : mapping, optional
-        Factor on what hangs on a joint, by the joint that carries it.
+        Size factor of what a joint carries, by joint.
     """
     frames: list[Pose] = []
     grown = {} if growth is None else growth
@@ -67,7 +67,7 @@ def joint_frames(
 
 
 def frame(above: Pose, rotation: Array, translation: Array | ca.SX) -> Pose:
-    """Pose of a frame that is placed on another."""
+    """Pose of a frame fixed to another."""
     R, p = above
     return R @ ca.SX(_whole(rotation)), p + R @ ca.SX(translation)
 
@@ -218,6 +218,6 @@ def _moved(placed: Pose, kind: int, q: ca.SX, at: int) -> Pose:
 
 
 def _whole(values: Array) -> Array:
-    """Values with those that are whole but for rounding made whole."""
+    """Values rounded where they are integers up to rounding errors."""
     near = np.round(values)
     return np.where(np.abs(values - near) <= _BLUR, near, values)

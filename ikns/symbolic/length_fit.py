@@ -1,18 +1,18 @@
 """Segment lengths from a static trial and many frames of the exploration together.
 
-A static trial says where markers are, and lengths follow as far as they were put on the
-right places. Frames in which joints turn say where the joints are, wherever the markers
-sit. Minimized, over log sizes s, marker offsets o and the posture of every frame, is
+Lengths from a static trial are as accurate as the placement of the markers. Frames in
+which joints turn determine the joint centers, wherever the markers are. The cost over
+log sizes s, marker offsets o and the posture of every frame is
 
     the cost of :func:`ikns.calibration.scaling.scale`          static trial, priors
     + sum over F frames and markers |p_m(q_k, s, o) - seen|^2 / marker_sd^2 * N / F
 
-Skin moves with the posture, so errors recur from frame to frame: N says how many frames
-with errors of their own the F are worth. The default of 1 takes them as one; with N = F
-skin that moves by 6 mm makes lengths worse than a static trial alone does.
+Skin moves with the posture, so errors are correlated between frames: N is the number of
+frames with independent errors that the F frames are worth. The default of 1 takes them
+as one; with N = F, skin motion of 6 mm makes lengths worse than a static trial alone.
 
-A length shows only as far as the joints at its ends turn; where they do not, an offset
-of all markers of the segment along it explains the same frames, and the answer stays
+A length is observable only as far as the joints at its ends turn; where they do not, an
+offset of all markers along the segment explains the same frames, and the result stays
 with the static trial and the prior.
 """
 
@@ -47,8 +47,8 @@ Array = NDArray[np.float64]
 
 #: Fewer frames than this are refused.
 MIN_FRAMES = 10
-#: How the spread of the markers is found: solve, measure, solve again, so many times
-#: at most, until it changes by less than this share.
+#: The spread of the markers is estimated from the solution and the fit repeated: at
+#: most so many times, until it changes by less than this share.
 _ROUNDS, _SETTLED = 3, 0.05
 #: No camera places a marker better than this, m.
 _LEAST_SD = 1e-4
@@ -56,7 +56,7 @@ _LEAST_SD = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class LengthFit:
-    """What the joint fit found, beside what the static trial alone gave.
+    """Result of the joint fit, with that of the static trial alone.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class LengthFit:
     solved : bool
         Whether the optimizer met its tolerance.
     status : str
-        In the optimizer's own words.
+        Status reported by the optimizer.
     iterations : int
         Of the last solution.
     """
@@ -110,16 +110,16 @@ def fit_lengths(
     generic, static, marker_set, min_duration
         As :func:`ikns.calibration.scaling.scale` takes them.
     recordings : sequence of Recording
-        The exploration. Taken are frames far apart in joint angles, among those that
-        show most markers.
+        The exploration, from which frames far apart in joint angles are chosen, among
+        those that show most markers.
     n_frames : int
-        How many frames in all, at least 10.
+        Number of frames in total, at least 10.
     independent_frames : float
-        How many frames with errors of their own all are worth; `n_frames` for markers
-        that do not move over the bone.
+        Number of frames with independent errors that they are worth; `n_frames` for
+        markers that do not move relative to the bone.
     marker_sd : float, optional
-        Error of a marker of weight 1 in a moving frame, m per axis. Default: as the fit
-        finds it.
+        Error of a marker of weight 1 in a moving frame, m per axis. Default: estimated
+        by the fit.
 
     Returns
     -------
@@ -158,12 +158,12 @@ def fit_lengths(
     scaled, before = scale(
         generic, static, marker_set=marker_set, min_duration=min_duration
     )
-    dressed, target, _ = static_posture(
+    reference, target, _ = static_posture(
         generic, static, marker_set=marker_set, min_duration=min_duration
     )
-    worn = dressed.marker_set
+    worn = reference.marker_set
     q, markers = _chosen(scaled, recordings, n_frames)
-    first = MarkerIK(dressed.with_markers(worn.all_tracked())).solve(target)
+    first = MarkerIK(reference.with_markers(worn.all_tracked())).solve(target)
     seen = np.asarray(np.isfinite(markers).all(axis=2))
     worth = min(independent_frames / len(q), 1.0)
     pulls = np.r_[1.0, np.full(len(q), worth)] / POSE_SD**2
@@ -176,11 +176,11 @@ def fit_lengths(
     every[:, tracked] = markers
     in_static = np.isfinite(target).all(axis=1) / MARKER_SD**2
 
-    sizes = np.log(list(_sizes(scaled, dressed).values()))
+    sizes = np.log(list(_sizes(scaled, reference).values()))
     offsets = np.zeros((len(worn.markers), 3))
-    nominal = dressed.resized(size_factors(sizes)).marker_positions
+    nominal = reference.resized(size_factors(sizes)).marker_positions
     offsets[tracked] = scaled.marker_positions - nominal[tracked]
-    program = LengthProgram(dressed, len(q) + 1)
+    program = LengthProgram(reference, len(q) + 1)
     sd = marker_sd or _spread(scaled, q, markers)
     q = np.vstack([first.q, q])
     for _ in range(_ROUNDS):
@@ -194,14 +194,14 @@ def fit_lengths(
         sizes, offsets, q = found.log_sizes, found.offsets, found.q
         if marker_sd is not None or not found.solved:
             break
-        # Unknown are 24 numbers a frame and what all frames share.
+        # Unknowns: 24 numbers per frame, and the shared ones.
         freedom = 3 * seen.sum() - 24 * len(seen) - 3 * len(tracked) - len(sizes)
         after = float(np.sqrt(np.sum(trust * found.squares[1:]) / max(freedom, 1)))
         after = max(after, _LEAST_SD)
         if abs(after - sd) < _SETTLED * sd:
             break
         sd = after
-    sized = dressed.resized(size_factors(sizes))
+    sized = reference.resized(size_factors(sizes))
     places = sized.marker_positions + offsets
     skeleton = sized.with_markers(worn.at(places).only(kept))
     return skeleton, _report(skeleton, worn, found, before, sd, len(trust))
@@ -259,7 +259,7 @@ def _chosen(
 
 
 def _far_apart(points: Array, n: int) -> NDArray[np.int64]:
-    """Rows each farthest from those before it, the one nearest the mean first."""
+    """Farthest-point sampling of rows, starting with the one nearest the mean."""
     at = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmin())]
     nearest = np.linalg.norm(points - points[at[0]], axis=1)
     while len(at) < min(n, len(points)):
@@ -278,6 +278,6 @@ def _spread(skeleton: Skeleton, q: Array, markers: Array) -> float:
     return max(float(np.sqrt(np.sum(squares[known]) / max(freedom, 1))), _LEAST_SD)
 
 
-def _sizes(skeleton: Skeleton, dressed: Skeleton) -> dict[str, float]:
-    sizes = relative_sizes(skeleton.urdf, dressed.urdf)
+def _sizes(skeleton: Skeleton, reference: Skeleton) -> dict[str, float]:
+    sizes = relative_sizes(skeleton.urdf, reference.urdf)
     return {name: sizes[name] for name in SEGMENTS}

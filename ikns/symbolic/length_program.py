@@ -1,8 +1,9 @@
-"""The least-squares problem of the length fit, for IPOPT, as sparse as it is.
+"""The sparse least-squares problem of the length fit, for IPOPT.
 
-Unknown are the postures x_k of all frames and, shared, the log sizes s and the marker
-offsets o. Only frame k holds x_k, so the Hessian is an arrow: a block a frame, and one
-border for what all share. It is put together from the exact blocks of one frame.
+The unknowns are the postures x_k of all frames and, shared, the log sizes s and the
+marker offsets o. Only frame k depends on x_k, so the Hessian is an arrowhead matrix:
+one block per frame, and a border for the shared unknowns. It is assembled from the
+exact blocks of one frame.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ _IPOPT: dict[str, Any] = {
 
 @dataclass(frozen=True, eq=False)
 class FrameData:
-    """What was seen, and where each posture starts.
+    """Seen markers, and the posture to start from in each frame.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ class FrameData:
     weights : (F, M) array
         Inverse variance per axis, 1/m^2.
     pulls : (F,) array
-        Inverse variance of the joint angles about zero, 1/rad^2: weak, it settles what
+        Inverse variance of the joint angles about zero, 1/rad^2: a weak prior for what
         no marker shows.
     """
 
@@ -73,7 +74,7 @@ class Solution:
         Squared distance of each marker from where it was seen, m^2.
     solved : bool
     status : str
-        In the optimizer's own words.
+        Status reported by the optimizer.
     iterations : int
     """
 
@@ -92,16 +93,16 @@ class LengthProgram:
 
     Parameters
     ----------
-    dressed : Skeleton
+    reference : Skeleton
         The generic body, markers at their nominal places.
     n_frames : int
         How many frames.
     """
 
-    def __init__(self, dressed: Skeleton, n_frames: int) -> None:
-        m, n = len(dressed.marker_set.markers), dressed.nv
+    def __init__(self, reference: Skeleton, n_frames: int) -> None:
+        m, n = len(reference.marker_set.markers), reference.nv
         self._n, self._m, self._frames = n, m, n_frames
-        held = dressed.columns(dressed.marker_set.held)
+        held = reference.columns(reference.marker_set.held)
         self._free = np.isin(np.arange(n), held, invert=True)
         x, start = ca.SX.sym("x", n), ca.SX.sym("start", 4)
         sizes, offsets = ca.SX.sym("s", len(SEGMENTS)), ca.SX.sym("o", m, 3)
@@ -109,7 +110,7 @@ class LengthProgram:
         pull = ca.SX.sym("pull")
         shared = ca.vertcat(sizes, ca.vec(offsets))
         q = ca.vertcat(x[:3], _turned(start, x[3:6]), x[6:])
-        squares = ca.sum2((sized_markers(dressed, q, sizes, offsets) - seen) ** 2)
+        squares = ca.sum2((sized_markers(reference, q, sizes, offsets) - seen) ** 2)
         cost = (ca.dot(weights, squares) + pull * ca.sumsqr(x[6:])) / 2
         inputs = [x, shared, start, seen, weights, pull]
         H = ca.hessian(cost, ca.vertcat(x, shared))[0]
@@ -129,7 +130,7 @@ class LengthProgram:
             ca.MX.sym("pull", 1, n_frames),
         ]
         spread = np.array(
-            [marker.placement_sd for marker in dressed.marker_set.markers]
+            [marker.placement_sd for marker in reference.marker_set.markers]
         )
         belief = np.zeros((shared.size1(), shared.size1()))
         k = len(SEGMENTS)
@@ -148,7 +149,7 @@ class LengthProgram:
         p = ca.vertcat(*(ca.vec(g) for g in given))
         whole = ca.blockcat([[blocks, border], [border.T, C + prior]])
         self._hessian = ca.Function("hessian", [z, p], [whole])
-        # The optimizer's own symbols: blocks are of these.
+        # The symbols that nlpsol expects for a Hessian.
         at, by, factor, none = (
             ca.MX.sym(name, size)
             for name, size in (("x", z.size1()), ("p", p.size1()), ("f", 1), ("g", 0))

@@ -1,7 +1,7 @@
 """Follow a self-motion step by step: along the null direction, then back to the hand.
 
-A walk gives the optimizer its first guess, and tells how far the curve goes before a
-limit or a volume stops it.
+A walk gives the optimizer its first guess, and finds where a limit or a volume ends the
+curve.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ Function = Callable[[Array], Array]
 STRIDE = 0.05
 #: No self-motion of an arm is longer than this, rad; a continuous joint's may be.
 _LONGEST = 30.0
-#: Hands are back where they were when off by less than this, m and rad.
+#: Tolerance of the hands' pose, m and rad.
 _TOLERANCE = 1e-10
-#: The next joint motion that moves the hand by so little of what the strongest does
-#: belongs to the null space too: there the curve branches.
+#: Where the smallest relevant singular value of the Jacobian is below this share of the
+#: largest, the null space has another dimension and the curve branches.
 _SINGULAR = 1e-4
 _MAX_STEPS = 20
 
@@ -38,8 +38,8 @@ class Walk:
     postures : (K, n) array
         From the start, rad.
     why : {"blocked", "closed", "singular", "long"}
-        What ended it: a limit or volume, the start reached again, a singular posture,
-        or its length.
+        What ended it: a limit or volume, a closed curve, a singular posture, or its
+        length.
     beyond : (n,) array, optional
         The first posture that a limit or volume forbids.
     """
@@ -77,7 +77,7 @@ def walk(
         Whether a posture keeps all limits and volumes apart.
     start : (n,) array
     ahead : (n,) array
-        Which of both ways to go.
+        Which of the two ways to go.
     """
     postures, x, length = [start], start, 0.0
     while length < _LONGEST:
@@ -88,7 +88,7 @@ def walk(
         null = rows[-1]
         ahead = null if null @ ahead > 0 else -null
         stride = STRIDE
-        # Where the curve bends sharply a shorter step finds back.
+        # Where the curve bends sharply a shorter step converges.
         while (after := come_back(off, jacobian, x + stride * ahead)) is None or (
             np.linalg.norm(after - x) > 1.5 * stride
         ):

@@ -1,4 +1,4 @@
-"""A posture that holds a hand: checked, with all that others must keep."""
+"""A checked start posture, and the constraints that it defines."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ __all__ = ["Start", "binding", "start_of"]
 
 Array = NDArray[np.float64]
 
-#: A limit or volume binds when this little of it is left, rad and m: a thousand times
-#: what the optimizer's tolerance leaves.
+#: A limit or volume is active when less than this is left, rad and m: a thousand times
+#: the optimizer's tolerance.
 BINDS = 1e-6
 #: A start may miss a limit or a volume by rounding, rad and m.
 _ROUNDING = 1e-9
@@ -24,7 +24,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A posture and what is fixed by it.
+    """A posture and the hand pose that it defines.
 
     Parameters
     ----------
@@ -51,13 +51,13 @@ class Start:
 
     @property
     def hold(self) -> Array:
-        """What the optimizers take as given: matrices column after column."""
+        """Parameters of the optimizers: matrices column by column."""
         matrices = (self.positions, self.rotations)
         return np.concatenate([self.angles, *(m.ravel(order="F") for m in matrices)])
 
 
 def start_of(chain: Chain, held: Held, q: ArrayLike) -> Start:
-    """Check a posture and write down what its hand holds.
+    """Check a posture and compute the hand pose to hold.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def start_of(chain: Chain, held: Held, q: ArrayLike) -> Start:
 
 
 def binding(chain: Chain, held: Held, x: Array, angles: Array) -> tuple[str, ...]:
-    """Name the limits and volumes that leave a posture x (n,) no room."""
+    """Name the limits and volumes that are active at a posture x (n,)."""
     limits = [
         f"{name} at its {end} limit"
         for end, room in (("lower", x - chain.lower), ("upper", chain.upper - x))

@@ -64,7 +64,7 @@ class Climber:
         self._solver = ca.nlpsol("climber", "ipopt", problem, IPOPT)
 
     def solve(self, guess: Array, hold: Array, Z: Array) -> tuple[Array, bool, str]:
-        """Return the posture (n,), whether it is a solution, IPOPT's word on it."""
+        """Return the posture (n,), whether it is a solution, and IPOPT's status."""
         result = self._solver(
             x0=guess,
             p=np.concatenate([hold, Z]),
@@ -116,7 +116,7 @@ class Sweeper:
         self._solver = ca.nlpsol("sweeper", "ipopt", problem, IPOPT)
 
     def solve(self, guess: Array, hold: Array, ahead: Array) -> tuple[Array, bool, str]:
-        """Return postures from the start (K + 1, n), whether solved, IPOPT's word.
+        """Return postures from the start (K + 1, n), whether solved, IPOPT's status.
 
         Parameters
         ----------

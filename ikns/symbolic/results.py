@@ -1,4 +1,4 @@
-"""What comes out of a held hand: a sweep, a range."""
+"""Results for a held hand: a sweep, a range."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Sweep:
         Whether the optimizer met its tolerance on either side. Where it did not, the
         side ends at the last posture of the walk, up to 0.05 rad short.
     status : (str, str)
-        In the optimizer's own words.
+        Status reported by the optimizer.
     """
 
     postures: Array
@@ -50,16 +50,16 @@ class AvailableRange:
     postures : (2, n) array
         Where they are, rad.
     stops : (tuple, tuple) of str
-        What binds there: joint limits, volumes that touch, or ``turns back`` where the
-        direction has its extreme between all limits.
+        What is active there: joint limits, volumes that touch, or ``turns back`` where
+        the direction has its extreme between all limits.
     solved : (bool, bool)
         Whether the optimizer met its tolerance.
     status : (str, str)
-        In the optimizer's own words.
+        Status reported by the optimizer.
     freedom : int
         Degrees of freedom left with the hand held. With one the range is that of the
-        curve through the start; with more the best of several starts, so it may be too
-        small, and nothing says that all of it can be reached without letting go.
+        curve through the start. With more it is the best of several starts: it may be
+        too small, and may not be connected while the hand is held.
     """
 
     lower: float

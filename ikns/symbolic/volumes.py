@@ -70,7 +70,7 @@ def capsules(urdf: str) -> list[Capsule]:
         own: list[Capsule] = []
         for shape in link.iter("collision"):
             own += _of_shape(link.get("name", ""), shape)
-        # A ball within a limb adds nothing.
+        # A sphere inside another shape is redundant.
         kept = [c for c in own if not any(_holds(o, c) for o in own if o is not c)]
         found += _numbered(kept)
     return found
@@ -165,7 +165,7 @@ def _of_shape(link: str, shape: ET.Element) -> Iterator[Capsule]:
 
 
 def _numbered(shapes: list[Capsule]) -> list[Capsule]:
-    """Shapes whose names tell them apart; the rods of one box share a name."""
+    """Shapes with unique names; the rods of one box share a name."""
     seen: dict[str, list[float]] = {}
     named = []
     for shape in shapes:
@@ -196,7 +196,7 @@ def _rods(size: Array) -> tuple[list[Array], float]:
 
 
 def _holds(outer: Capsule, inner: Capsule) -> bool:
-    """Whether a capsule holds a ball; for balls only."""
+    """Whether a capsule contains a sphere; false for other shapes."""
     if inner.start != inner.end:
         return False
     start, end, ball = map(np.array, (outer.start, outer.end, inner.start))

@@ -2,8 +2,8 @@
 
     c_k = sum_i w_i (Z_ik . q - m_ik) / sum_i w_i (M_ik - m_ik)
 
-with the natural-neighbor weights w of the place of the hand (of the midpoint of both,
-for a chain of two arms), the directions Z and ranges m to M of the points
+with the natural-neighbor weights w of the hand position (for two arms, the midpoint of
+both hands), the directions Z and ranges m to M of the points
 (T. Lisini Baldi et al., arXiv 2012.03600, section II).
 """
 
@@ -31,7 +31,7 @@ class ControlMap(NamedTuple):
     Parameters
     ----------
     points : (P, 3) array
-        m; where there are no natural neighbors the nearest of these has all the weight.
+        m; without natural neighbors the nearest of these has all the weight.
     numbers, indices : arrays
         A packed interpolator; `indices` is empty where there is none.
     directions : (P, d, n) array
@@ -42,13 +42,13 @@ class ControlMap(NamedTuple):
     hands : (1,) or (2,) integer array
         The chain's hands, of right and left.
     link : (M,) integer array
-        Link that a marker shows, or -1.
+        Link that a marker belongs to, or -1.
     need : (L,) integer array
-        Markers of a link that must be seen.
+        How many markers of a link must be seen.
     pair : (N, 2) integer array
-        Markers of the same link, two and two.
+        Pairs of markers of the same link.
     apart : (N,) array
-        How far apart they are on the link, m.
+        Their distance on the link, m.
     """
 
     points: Floats
@@ -82,7 +82,7 @@ def control_frame(
     place: Floats,
     c: Floats,
 ) -> tuple[float, float, float, int, bool, bool, int]:
-    """Solve a frame.
+    """Solve one frame.
 
     Parameters
     ----------
@@ -94,15 +94,15 @@ def control_frame(
     markers : (M, 3) array
         In the world, m; NaN where not seen.
     from_scratch : bool
-        Whether `q` is no place to start from.
+        Whether there is no pose to start from in `q`.
     q : (nq,) array
-        The pose before; overwritten by the solution.
+        The previous pose; overwritten by the solution.
     work, cavity_work, rotation (1, 2, 3, 3), weights (P,) : arrays
         Scratch.
     position : (1, 2, 3) array
         Right and left hand in the thorax frame, m, written.
     place : (3,) array
-        Where the task happens, written, m.
+        Position of the task, written, m.
     c : (d,) array
         The signals, written, not clipped; NaN while the chain is not in sight, and
         where the weights are NaN or the range is zero.
@@ -112,18 +112,18 @@ def control_frame(
     residual : float
         As from marker inverse kinematics.
     worst : float
-        Largest distance of a marker of the chain's links, m; NaN without any.
+        Largest residual of a marker on the chain's links, m; NaN without any.
     intermarker : float
-        Largest difference of a distance between two markers of a link from what it is
-        on that link, m; 0 where no two are seen.
+        Largest error of a distance between two markers of a link, m; 0 where no pair is
+        seen.
     iterations : int
     converged : bool
         As from marker inverse kinematics.
     known : bool
         Whether the chain is in sight.
     status : int
-        Where the hand is, as :func:`ikns._kernels.voronoi.query.natural_weights`
-        says it.
+        Of the hand position, from
+        :func:`ikns._kernels.voronoi.query.natural_weights`.
     """
     problem = unpack(whole, real)
     s = cut(problem, work)
@@ -167,7 +167,7 @@ def control_frame(
 def _worst_residual(
     problem: MarkerProblem, s: Scratch, link: Indices, q: Floats
 ) -> float:
-    """Compare the markers taken last with a pose, which they need not have led to."""
+    """Largest residual of the current markers at `q`, m."""
     errors_at(problem, s, q)
     largest = -1.0
     for m in range(len(link)):

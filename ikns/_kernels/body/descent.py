@@ -1,7 +1,7 @@
 """Levenberg-Marquardt descent of one frame of marker inverse kinematics.
 
 See :mod:`ikns._kernels.body.marker_ik` for the cost. The true Hessian is used where it
-is positive definite, else that of Gauss and Newton.
+is positive definite, else that of Gauss-Newton.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ikns._kernels.compiled import compiled
 
 __all__ = ["copy", "descend", "errors_at"]
 
-#: A step with the true Hessian is followed by one of about its square, times how fast
-#: the Hessian changes: up to 50 per radian where markers barely show a joint. A step of
-#: this times the root of the tolerance so leaves less than 5 % of the tolerance.
+#: The step after one with the true Hessian is about its square times the rate at which
+#: the Hessian changes, up to 50 per radian where markers barely determine a joint. So
+#: after a step of this times the root of the tolerance less than 5 % of it remain.
 _NEWTON = 0.03
 
 
@@ -124,7 +124,7 @@ def descend(
                 damping = max(10 * damping, 1e-6)
         largest = _largest(s.step)
         integrate(problem.tree, s.q, s.step, s.trial)
-        # A small step without the true Hessian says less, unless there is no other.
+        # Without the true Hessian a small step proves less, unless there is no other.
         converged = largest < (enough if true_hessian else tolerance)
         if definite and not true_hessian:
             converged = converged and damping > 1e-3
@@ -177,7 +177,7 @@ def _step(
 ) -> bool:
     """Write the damped step; False where its matrix is not positive definite.
 
-    `share` of the curvature counts: 1 for the true Hessian, 0 for Gauss and Newton's.
+    `share` of the curvature is used: 1 for the true Hessian, 0 for Gauss-Newton's.
     """
     for d in range(len(depth)):
         last = depth[d]
@@ -195,7 +195,7 @@ def _step(
 
 @compiled
 def _largest(step: Floats) -> float:
-    """Cut a step to one radian or meter: beyond, the quadratic model knows nothing."""
+    """Limit a step to one radian or meter, beyond which the model is not valid."""
     largest = 0.0
     for d in range(len(step)):
         largest = max(largest, abs(step[d]))

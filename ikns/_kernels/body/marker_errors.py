@@ -1,4 +1,4 @@
-"""The cost of marker inverse kinematics, term by term, and the slope of each."""
+"""The cost of marker inverse kinematics and its gradient, term by term."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["add_penalties", "marker_errors", "penalties", "take_markers"]
 def take_markers(
     given: Floats, seen: Floats, weight: Floats, target: Floats
 ) -> tuple[int, bool]:
-    """Take over the markers that are seen, which are finite.
+    """Copy the seen markers, which are those that are finite.
 
-    Returns how many, and whether one is infinite.
+    Returns how many there are, and whether a marker is infinite.
     """
     n_seen, infinite = 0, False
     for m in range(len(seen)):
@@ -47,9 +47,9 @@ def marker_errors(
     x: Floats,
     error: Floats,
 ) -> tuple[float, float]:
-    """Place joints and markers, seen from the first joint, and compare.
+    """Write joints and markers relative to the first joint, and the markers' errors.
 
-    Returns the sum of squared errors, weighted and not.
+    Returns the sum of squared errors, weighted and unweighted.
     """
     place_joints(tree, q, rotation, translation)
     for k in range(3):
@@ -88,7 +88,7 @@ def penalties(
     moved: Floats,
     beyond: Floats,
 ) -> float:
-    """Cost of being off the start and beyond limits; how far, both (n,)."""
+    """Write distances (n,) from the start and beyond the limits; return the cost."""
     displacement(tree, start, q, moved)
     cost = 0.0
     for i in range(len(moved)):
@@ -113,7 +113,7 @@ def add_penalties(
     hessian: Floats,
     curvature: Floats,
 ) -> None:
-    """Add the penalties' part to gradient and Hessian, and leave held joints out."""
+    """Add the penalties to gradient and Hessian, and remove held joints from both."""
     for d in range(len(depth)):
         last = depth[d]
         gradient[d] += pull**2 * moved[d] + limit**2 * beyond[d]

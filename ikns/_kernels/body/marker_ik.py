@@ -5,9 +5,9 @@ Minimizes over the configuration q
     sum_m weight_m |x_m(q) - seen_m|^2 + (pull |q - before|)^2 + (limit |beyond|)^2
 
 by Levenberg-Marquardt (More 1978) as :mod:`ikns.motion.marker_ik.reference` does, but
-with the true Hessian where that is positive definite: the curvature term costs next to
-nothing here (see :mod:`ikns._kernels.body.normal_equations`), and where markers
-disagree with the body by centimeters Gauss-Newton takes many times as many steps.
+with the true Hessian where that is positive definite: the curvature term is cheap here
+(see :mod:`ikns._kernels.body.normal_equations`), and where markers deviate from the
+body by centimeters Gauss-Newton needs many times as many steps.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ikns._kernels.compiled import compiled
 
 __all__ = ["INFINITE", "solve_frame", "solve_frames"]
 
-#: Stands for the iterations of a frame with an infinite marker: a fault, not a gap.
+#: Iterations of a frame with an infinite marker, which is a fault and not a gap.
 INFINITE = -1
 
 
@@ -54,16 +54,16 @@ def solve_frames(
         Markers in the world, m; NaN where not seen.
     first, last, way : int
     before : (nq,) array
-        The pose before the first frame; later frames start from the one before.
+        The pose before the first frame; later frames start from the previous one.
     from_scratch : bool
-        Whether there is none, so the first frame cannot start from `before`.
+        Whether there is no such pose.
     work : array
-        Memory of the size that the problem needs.
+        Scratch of :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
     q : (T, nq) array
-        The solutions; the pose before where no marker is seen.
+        The solutions; the previous pose where no marker is seen.
     residual : (T,) array
         Root mean square distance of the seen markers, m; NaN without any, infinite
-        where the pose before is not finite.
+        where the previous pose is not finite.
     iterations, converged : (T,) arrays
         Iterations are `INFINITE` where a marker is infinite, not seen and not NaN.
     """
@@ -95,8 +95,8 @@ def solve_frame(
 ) -> tuple[float, int, bool]:
     """Write the solution of one frame, (nq,); return residual, iterations, converged.
 
-    Round -1 descends from the pose before. Without it, or lost, rounds 0, 1, ... do
-    from several others, and the last goes on from what is best for each limb.
+    Round -1 descends from the previous pose. Without one, or where that fails, rounds
+    0, 1, ... descend from the starts, the last from the best result for each limb.
     """
     n_seen, infinite = take_markers(problem.marker_weight, seen, s.weight, s.target)
     copy(before, s.start)
@@ -115,7 +115,7 @@ def solve_frame(
         elif k == n_starts:
             _join_limbs(problem.q_branch, s.solved, s.residuals, s.start)
         if 0 <= k < n_starts and aligned:
-            # Starts have their root at the origin; lay them over the markers.
+            # Starts have their root at the origin; align them with the markers.
             errors_at(problem, s, s.start)
             rigid_pose(s.x, s.target, s.weight, s.N, s.V, s.start)
         copy(s.start, s.q)
@@ -138,7 +138,7 @@ def solve_frame(
 def _sum_by_limb(
     branch: Indices, weight: Floats, error: Floats, residuals: Floats
 ) -> None:
-    """Write each limb's squared errors behind the first entry."""
+    """Write each limb's squared errors after the first entry."""
     for b in range(1, len(residuals)):
         residuals[b] = 0.0
     for m in range(len(weight)):
@@ -151,7 +151,7 @@ def _sum_by_limb(
 def _join_limbs(
     branch: Indices, solved: Floats, residuals: Floats, start: Floats
 ) -> None:
-    """Write the best solution, each limb taken from where it is best."""
+    """Write the best solution, with each limb from the solution that fits it best."""
     best = 0
     for k in range(len(solved)):
         if residuals[k, 0] < residuals[best, 0]:

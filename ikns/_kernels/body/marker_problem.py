@@ -1,7 +1,7 @@
-"""What marker inverse kinematics needs to know, and the memory that it works in.
+"""The problem of marker inverse kinematics as arrays, and its scratch memory.
 
-Handing an array from Python to a kernel takes a quarter of a microsecond, so a problem
-travels as one array of integers and one of reals and is cut up inside.
+Passing an array from Python to a kernel takes a quarter of a microsecond, so a problem
+is packed into one array of integers and one of reals and unpacked inside.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ["MarkerProblem", "Scratch", "cut", "pack", "scratch_size", "unpack"]
 
 
 class MarkerProblem(NamedTuple):
-    """What stays the same from frame to frame: n rates, M markers, S starts.
+    """What does not change between frames: n rates, M markers, S starts.
 
     Parameters
     ----------
@@ -26,30 +26,30 @@ class MarkerProblem(NamedTuple):
     marker_joint : (M,) integer array
         Joint of the tree that carries the marker.
     marker_position : (M, 3) array
-        Place in that joint's frame, m.
+        Position in that joint's frame, m.
     marker_weight : (M,) array
-        Zero for markers that do not count.
+        Zero for markers that are not used.
     path : (n, D) integer array
     depth : (n,) integer array
-        What carries each degree of freedom, from the root to itself, and how many
-        there are; see :mod:`ikns._kernels.body.tree_cholesky`.
+        The degrees of freedom from the root to each one, and how many precede it; see
+        :mod:`ikns._kernels.body.tree_cholesky`.
     free : (n,) array
         1 for degrees of freedom to solve for, 0 for those that are held.
     angle : (n,) integer array
-        Where in q the angle is that `lower` and `upper` limit, or -1.
+        Entry of q that `lower` and `upper` limit, or -1.
     lower, upper : (n,) array
         Joint limits, rad or m.
     starts : (S, nq) array
-        Configurations to start from when nothing is known.
+        Configurations to start from without a previous pose.
     marker_branch, q_branch : (M,), (nq,) integer arrays
-        Limb that a marker is on and a number of q belongs to, from 0 to
-        ``n_branches - 1``, or -1; each limb's best start counts.
+        Limb of each marker and of each entry of q, from 0 to ``n_branches - 1``, or -1;
+        the best start is chosen by limb.
     n_branches : int
     max_iterations : int
     pull, pull_from_scratch, limit : float
         Weights of the terms of the cost, m/rad.
     tolerance : float
-        A frame has converged when the next step moves no joint more, rad and m.
+        A frame has converged when the next step moves every joint less, rad and m.
     lost : float
         Residual above which a frame is also tried from scratch, m.
     """
@@ -77,7 +77,7 @@ class MarkerProblem(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory to work in."""
+    """Scratch memory of a frame."""
 
     origin: Floats
     rotation: Floats
@@ -106,7 +106,7 @@ class Scratch(NamedTuple):
 
 
 def pack(problem: MarkerProblem) -> tuple[Indices, Floats]:
-    """Lay a problem out as integers and reals, in the order of `unpack`."""
+    """Pack a problem into integers and reals, in the order of `unpack`."""
     p, tree = problem, problem.tree
     J, n, M = len(tree.kind), len(p.free), len(p.marker_joint)
     S, nq = p.starts.shape
@@ -145,7 +145,7 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Floats]:
 
 @compiled
 def unpack(whole: Indices, real: Floats) -> MarkerProblem:
-    """Cut a packed problem up."""
+    """Unpack a problem."""
     J, n, M, S, nq, D = whole[0], whole[1], whole[2], whole[3], whole[4], whole[5]
     i = 8
     tree_at, i = i, i + 4 * J + n
@@ -195,7 +195,7 @@ def unpack(whole: Indices, real: Floats) -> MarkerProblem:
 
 
 def scratch_size(problem: MarkerProblem) -> int:
-    """Reals that a frame needs to work in, in the order of `cut`."""
+    """Return how many reals a frame's scratch memory has, in the order of `cut`."""
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
     S, nq = problem.starts.shape
     D = problem.path.shape[1]
@@ -211,7 +211,7 @@ def scratch_size(problem: MarkerProblem) -> int:
 
 @compiled
 def cut(problem: MarkerProblem, work: Floats) -> Scratch:
-    """Cut up memory of :func:`scratch_size` reals."""
+    """Divide memory of :func:`scratch_size` reals into arrays."""
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
     S, nq = problem.starts.shape
     D = problem.path.shape[1]

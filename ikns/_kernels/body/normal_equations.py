@@ -7,8 +7,8 @@ With r = x - seen, the error of a marker at x, and each degree of freedom a twis
     Gauss-Newton_ij = sum_m weight_m (v_i + w_i x x) . (v_j + w_j x x)
     curvature_ij    = sum_m weight_m (w_i x (v_j + w_j x x)) . r     where i carries j
 
-over the markers that j carries. All three follow from sums over these markers that
-joints hand down to what carries them (weights take the place of masses in the
+over the markers that j carries. All three follow from sums over these markers, which
+are accumulated from the leaves to the root (weights take the place of masses in the
 composite-rigid-body algorithm; Featherstone 2008, Rigid Body Dynamics Algorithms,
 chapter 6):
 
@@ -129,9 +129,9 @@ def _sum_moments(
 
 @compiled
 def _forces(moments: Floats, j: int, axes: Floats, forces: Floats, d: int) -> float:
-    """Gradient by the degree of freedom d of joint j; what its motion meets.
+    """Write the forces of degree of freedom d of joint j; return its gradient.
 
-    Writes sum weight u (3) and sum weight x x u (3) for the velocity u = v + w x x,
+    Forces are sum weight u (3) and sum weight x x u (3) for the velocity u = v + w x x,
     then sum weight u x r (3).
     """
     v0, v1, v2 = axes[d, 0], axes[d, 1], axes[d, 2]

@@ -1,4 +1,4 @@
-"""Poses and Jacobians of frames, from the joints on the way to each and no others.
+"""Poses and Jacobians of frames, from the joints between the base and each frame.
 
 Along a path the pose is a product of fixed placements and of turns about (or shifts
 along) each joint's z. A joint with axis z and origin p moves the frame at x by the
@@ -24,12 +24,12 @@ Indices = NDArray[np.int64]
 
 
 class Paths(NamedTuple):
-    """Paths from one base to E frames, laid end to end; K joints in all.
+    """Paths from one base to E frames, concatenated; K joints in total.
 
     Parameters
     ----------
     ends : (E,) integer array
-        How many joints precede the end of each path.
+        End of each path among the K joints.
     joint : (K, 3) integer array
         Kind (:data:`ikns._kernels.body.tree.REVOLUTE` or ``PRISMATIC``), column of the
         angles, column of the Jacobian (-1 for none).
@@ -130,7 +130,7 @@ def write_jacobians(paths: Paths, angles: Floats, rows: int, jacobian: Floats) -
 
 @compiled
 def _carry(paths: Paths, k: int, R: Floats, p: Floats) -> None:
-    """Go on by placement k."""
+    """Move the frame by placement k."""
     own, shift = paths.rotation[k], paths.translation[k]
     for a in range(3):
         x, y, z = R[a, 0], R[a, 1], R[a, 2]

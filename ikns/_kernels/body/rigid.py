@@ -80,7 +80,7 @@ def rigid_pose(
 
 @compiled
 def _diagonalize(A: Floats, V: Floats) -> None:
-    """Turn a symmetric A (k, k) diagonal; columns of V are its eigenvectors."""
+    """Diagonalize a symmetric A (k, k) in place; write its eigenvectors as columns."""
     k = len(A)
     for i in range(k):
         for j in range(k):

@@ -1,4 +1,4 @@
-"""Steps of a tree of joints, and how far apart two configurations are.
+"""Steps of a tree of joints, and the displacement between two configurations.
 
 A revolute or prismatic joint's step is added. A free flyer at the pose (R, p) moved by
 the twist (v, w) in its own frame goes to (R exp(w), p + R V(w) v), with t = |w|,
@@ -38,7 +38,7 @@ def integrate(tree: Tree, q: Floats, step: Floats, moved: Floats) -> None:
 
 @compiled
 def displacement(tree: Tree, q0: Floats, q: Floats, moved: Floats) -> None:
-    """Write how far `q` is from `q0`, (n,)."""
+    """Write the displacement from `q0` to `q`, (n,)."""
     for j in range(len(tree.kind)):
         at, first = tree.first_q[j], tree.first_v[j]
         if tree.kind[j] == FREE_FLYER:
@@ -103,7 +103,7 @@ def _pose_displacement(q0: Floats, q: Floats, at: int, moved: Floats, i: int) ->
 def _turned(
     x: float, y: float, z: float, w: float, a: float, b: float, c: float
 ) -> tuple[float, float, float]:
-    """Turn the vector (a, b, c) by a unit quaternion."""
+    """Rotate the vector (a, b, c) by a unit quaternion."""
     tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     return (
         a + w * tx + y * tz - z * ty,

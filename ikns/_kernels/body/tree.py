@@ -1,4 +1,4 @@
-"""A tree of joints as arrays, and where its joints are.
+"""A tree of joints as arrays, and the poses of its joints.
 
 Every joint's frame is turned so that its axis is z. The pose of joint i in the world is
 that of its parent, times its fixed placement there, times its own motion: a turn about
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 REVOLUTE, PRISMATIC, FREE_FLYER = 0, 1, 2
-#: Not a plain 2, for which numba would compile what takes it once more.
+#: Not a plain 2, for which numba would compile another version of its callees.
 _Z = np.int64(2)
 
 
@@ -43,12 +43,12 @@ class Tree(NamedTuple):
     parent : (J,) integer array
         Joint that carries this one; -1 is the world.
     first_q, first_v : (J,) integer arrays
-        Where the joint's numbers begin in q and in v.
+        First entry of the joint in q and in v.
     rotation : (J, 3, 3) array
     translation : (J, 3) array
         The joint's placement in its parent's frame, m.
     dof_parent : (n,) integer array
-        The degree of freedom before this one on the way to the root, or -1.
+        The next degree of freedom towards the root, or -1.
     """
 
     kind: Indices
@@ -71,14 +71,14 @@ def place_joints(tree: Tree, q: Floats, rotation: Floats, translation: Floats) -
 def place_joint(
     tree: Tree, j: int, q: Floats, rotation: Floats, translation: Floats
 ) -> None:
-    """Write the pose of joint `j`, that of its parent being known."""
+    """Write the pose of joint `j` from that of its parent."""
     parent, at, kind = tree.parent[j], tree.first_q[j], tree.kind[j]
     c, s, shift = 1.0, 0.0, 0.0
     if kind == REVOLUTE:
         c, s = np.cos(q[at]), np.sin(q[at])
     elif kind == PRISMATIC:
         shift = q[at]
-    # Entries and not slices: a slice counts references, which takes longer than this.
+    # Entries and not slices: counting references to a slice takes longer than this.
     for a in range(3):
         if parent < 0:
             r0, r1 = tree.rotation[j, a, 0], tree.rotation[j, a, 1]

@@ -1,14 +1,13 @@
-"""Cholesky factors that keep the zeros of a branched tree.
+"""Sparse Cholesky factorization for a branched tree of joints.
 
-In the normal equations of a tree of joints two degrees of freedom meet only where one
-carries the other. Factored as H = L' L from the leaves to the root, no other entry
-fills in (Featherstone 2005, Efficient Factorization of the Joint-Space Inertia Matrix
+In the normal equations of a tree of joints two degrees of freedom are coupled only
+where one carries the other. Factored as H = L' L from the leaves to the root, there is
+no fill-in (Featherstone 2005, Efficient Factorization of the Joint-Space Inertia Matrix
 for Branched Kinematic Trees, Int. J. Robotics Research 24: 487).
 
-A row holds what carries its degree of freedom in the order from the root: entry a of
-row k stands for column ``path[k, a]``, and ``path[k, depth[k]]`` is k itself. What
-carries ``path[k, a]`` is then the first part of the same row, so rows are added up
-entry by entry.
+A row holds the degrees of freedom from the root to its own: entry a of row k is column
+``path[k, a]``, and ``path[k, depth[k]]`` is k itself. The path to ``path[k, a]`` is the
+first part of the same row, so rows are added entry by entry.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What subspaces that know nothing would show: the level to compare a finding with."""
+"""Chance level: what random subspaces would show."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def chance_angles(
         )
     wanted = np.asarray(shares, dtype=np.float64)
     if d + null_dim > n:
-        # They share a line at least; the largest angle is the same as between what is
-        # orthogonal to both.
+        # They share at least a line; the largest angle equals that between their
+        # orthogonal complements.
         d, null_dim = n - null_dim, n - d
         if d == 0 or null_dim == 0:
             return np.zeros(wanted.shape)
@@ -84,8 +84,8 @@ def chance_inside(
 ) -> Array:
     """Quantiles of the variance share inside a subspace drawn at random.
 
-    Its mean is ``null_dim / n`` whatever the covariance; how far it strays depends on
-    how few directions hold the variance.
+    Its mean is ``null_dim / n`` for any covariance; its spread is larger the fewer
+    directions hold the variance.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a comparison accepts, checked once."""
+"""Checks of the samples of a comparison."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def checked_samples(
     lower: ArrayLike,
     upper: ArrayLike,
 ) -> CheckedSamples:
-    """Return the samples in full shape, or say what is wrong with them."""
+    """Return the samples in full shape, or raise what is wrong with them."""
     t, angles, J, x, R = (
         np.asarray(given, dtype=np.float64)
         for given in (time, q, jacobians, position, rotation)

@@ -1,6 +1,6 @@
-"""Other coordinates of the shoulder: the same movement, straighter or more bent.
+"""Other coordinates of the shoulder, in which the same movement is more or less curved.
 
-Principal components see a self-motion only as far as it is straight in the joint
+Principal components describe a self-motion only as far as it is straight in the joint
 coordinates. The shoulder's rotation R, of the upper arm in the girdle, is written as
 
 - ``internal``: the skeleton's own angles, ``R = Rx(-a) Rz(f) Ry(r)``;
@@ -8,7 +8,7 @@ coordinates. The shoulder's rotation R, of the upper arm in the girdle, is writt
   al. 2005; there in the thorax, here in the girdle, which differs by the clavicle);
 - ``rotation_vector``: ``R = R0 exp(y)`` about a reference posture R0.
 
-All three see the same angular velocity ``w = E(angles) rates``, with the rotation axes
+All three have the same angular velocity ``w = E(angles) rates``, with the rotation axes
 as the columns of E. So rates convert with ``B = E_internal^-1 E_other``, and a Jacobian
 J of internal angles becomes ``J B``. The left side is mirrored, as its joints are.
 """
@@ -41,7 +41,7 @@ class Coordinates:
     from_internal : callable
         From internal angles (..., 3), rad, to these coordinates.
     to_internal : callable
-        The way back.
+        The inverse.
     rates : callable
         From internal angles (..., 3) to B (..., 3, 3): internal rates are B times the
         rates of these coordinates.

@@ -13,7 +13,7 @@ __all__ = ["null_turn", "straight_departure"]
 
 Array = NDArray[np.float64]
 
-#: Share of the samples that stands for one end of the range.
+#: Share of the samples that represents one end of the range.
 _END = 0.05
 
 
@@ -32,8 +32,8 @@ def null_turn(c: Array, jacobians: Array, null_dim: int) -> float:
     Returns
     -------
     float
-        Largest principal angle between the null spaces averaged over the twentieth of
-        the samples with the least c and over that with the most.
+        Largest principal angle between the null spaces averaged over the 5 % of the
+        samples with the smallest c and over the 5 % with the largest.
     """
     if not np.ptp(c) > 0:
         return float("nan")
@@ -48,7 +48,7 @@ def null_turn(c: Array, jacobians: Array, null_dim: int) -> float:
 def straight_departure(
     kinematics: Kinematics | None, mean: Array, Z: Array, lower: Array, upper: Array
 ) -> tuple[float, float]:
-    """How far the hand strays when the joints go straight along Z to its ends.
+    """Deviation of the hand when the joints move straight along Z to its ends.
 
     Parameters
     ----------

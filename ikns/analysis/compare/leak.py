@@ -1,4 +1,4 @@
-"""Leak: how the hand moves with the control signal, which should leave it alone."""
+"""Leak: hand motion with the control signal, which should not move the hand."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def slopes(c: Array, hand: Array, counts: Array | None = None) -> Array:
     Returns
     -------
     (d, m) or (B, d, m) array
-        Of each signal while the others stay; NaN where they do not vary by themselves.
+        Of each signal with the others constant; NaN where signals are collinear.
     """
     once = counts is None
     weight = np.ones((1, len(c))) if counts is None else counts
@@ -95,13 +95,13 @@ def slopes(c: Array, hand: Array, counts: Array | None = None) -> Array:
 
 
 def slope_scores(c: Array, hand: Array) -> Array:
-    """How much each sample moves the slopes: c times the residual, (N, d m)."""
+    """Influence of each sample on the slopes: c times the residual, (N, d m)."""
     deviation = c - c.mean(axis=0)
     residual = hand - hand.mean(axis=0) - deviation @ slopes(c, hand)
     return (deviation[:, :, None] * residual[:, None, :]).reshape(len(c), -1)
 
 
 def hand_turns(rotation: Array) -> Array:
-    """Turn of each orientation (N, 3, 3) from their mean, (N, 3) rad."""
+    """Rotation vectors from the mean of the orientations (N, 3, 3), (N, 3) rad."""
     turned = Rotation.from_matrix(rotation)
     return np.asarray((turned * turned.mean().inv()).as_rotvec())

@@ -76,7 +76,7 @@ def visited_points(
             f"expected {2 * n} still samples or more near a PCA point, found "
             f"{counts.max()}."
         )
-    number = np.full(len(counts) + 1, -1)  # the last stands for none
+    number = np.full(len(counts) + 1, -1)  # the last is for samples without a point
     number[points] = np.arange(len(points))
     return number[near], points
 

@@ -1,4 +1,4 @@
-"""A learned map against an analytic one: how alike, and what the difference costs."""
+"""A learned map compared with an analytic one."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _LEAST = 10
 
 @dataclass(frozen=True, eq=False)
 class MapComparison:
-    """What :func:`compare` found, one entry a PCA point.
+    """Result of :func:`compare`, one entry per PCA point.
 
     Parameters
     ----------
@@ -40,14 +40,13 @@ class MapComparison:
     inside : (P,) array
         Share of the samples' joint variance that lies along the analytic directions.
     learned_leak, analytic_leak : (P,) array
-        How far the hand goes while c goes from 0 to 1 there, m: the slope of hand
-        position on c over the samples. It should be zero.
+        Hand displacement while c goes from 0 to 1 there, m: the slope of hand position
+        on c over the samples. It should be zero.
     learned_turn, analytic_turn : (P,) array
-        How far the hand turns meanwhile, rad: likewise.
+        Hand rotation meanwhile, rad: likewise.
     learned_leak_interval : (P, 2) array
-        Between these the learned leak lies in 95 of 100 such recordings (block
-        bootstrap over time, see :mod:`ikns.numerics.bootstrap`); NaN with fewer than
-        ten samples.
+        95 % confidence interval of the learned leak (block bootstrap over time, see
+        :mod:`ikns.numerics.bootstrap`); NaN with fewer than ten samples.
     agreement : (P,) array
         Correlation of the two control signals over the samples (first degree of
         freedom); NaN with fewer than three samples or no motion.
@@ -77,9 +76,8 @@ def compare(
 ) -> MapComparison:
     """Compare two maps with the same PCA points on a motion.
 
-    :func:`ikns.analysis.compare.compare_motion` goes on where this ends: with a
-    skeleton it also knows null spaces at any posture, their curvature, and what chance
-    would give.
+    :func:`ikns.analysis.compare.compare_motion` does more: with a skeleton it also
+    compares null spaces at the mean posture, their curvature, and the chance level.
 
     Parameters
     ----------
@@ -140,7 +138,7 @@ def compare(
     leaks, turns = np.full((2, n), np.nan), np.full((2, n), np.nan)
     for i in range(n):
         own = labels == i
-        # The points' own directions: what is asked is how good each is where it holds.
+        # The points' own directions, not interpolated: each is judged at its point.
         signals = [_local_signal(m, i, q[own]) for m in (learned, analytic)]
         if own.sum() > 2:
             turn = hand_turns(rotation[own])

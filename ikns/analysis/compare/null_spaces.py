@@ -77,7 +77,7 @@ def point_null_spaces(
 ) -> NullSpaces:
     """Null spaces of samples (N, n) with Jacobians (N, k, n) and bases (N, r, n).
 
-    Without kinematics the posture nearest to the mean stands for it.
+    Without kinematics the posture nearest to the mean replaces it.
     """
     (N, n), r = q.shape, bases.shape[1]
     projectors = np.einsum("tri,trj->tij", bases, bases).reshape(N, -1)

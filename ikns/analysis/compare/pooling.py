@@ -1,4 +1,4 @@
-"""All points together."""
+"""Values pooled over all points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Crosstalk: how the control signal changes when the hand is carried elsewhere."""
+"""Crosstalk: changes of the control signal during reaches."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 #: Neighboring reaches share the rest between them, so their changes are correlated, by
 #: 0.22 for normally distributed c at unrelated rests. Then G / g(0) of
 #: :func:`ikns.numerics.bootstrap.block_length` is 0.3 and its rule asks for three
-#: reaches; a dozen reaches are too few for it to see that by itself.
+#: reaches; a dozen reaches are too few to estimate that.
 _LEAST_BLOCK = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Crosstalk:
-    """What :func:`crosstalk` found; one entry a reach.
+    """Result of :func:`crosstalk`; one entry per reach.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Crosstalk:
     distance : (R,) array
         From rest to rest, m.
     excursion : (R,) array
-        Farthest that c goes from where it was before, meanwhile.
+        Largest deviation of c from its value before the reach.
     mean_change, per_meter, largest : float
         Mean of ``abs(change)``; its sum over the sum of distances, 1/m; the largest
         excursion.
@@ -71,7 +71,7 @@ def find_reaches(
     max_hand_speed : float
         Slower is a rest, m/s.
     min_distance : float
-        Rests that are nearer to each other do not count as a reach, m.
+        Rests closer than this have no reach between them, m.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """The whole comparison on plain arrays: from samples with a still hand to one table.
 
-Everything is conditional on the directions and ranges given, as if they were on disk:
-what is asked is how good this map is. The one exception are the angles: there the
-directions are learned again from every resample, and how much they turn counts.
+Everything is conditional on the given directions and ranges, as the question is how
+good this map is. Only the intervals of angles include the uncertainty of learning: the
+directions are learned again from every resample.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class NullSpaceComparison:
-    """What :func:`compare_samples` found: one entry a PCA point, NaN where unknown.
+    """Result of :func:`compare_samples`: one entry per PCA point, NaN where unknown.
 
     Intervals are (low, high) in the last axis. They allow for what noise adds to the
     length of a vector, so those of angles, leaks and turns may end below their value.
@@ -38,7 +38,7 @@ class NullSpaceComparison:
     Parameters
     ----------
     points : (P,) integer array
-        Which points of the map, from 0.
+        Numbers of the points in the map, from 0.
     counts : (P,) integer array
         Samples.
     null_dim : int
@@ -48,33 +48,32 @@ class NullSpaceComparison:
     null_directions : (P, null_dim, n) array
         Null space averaged over the visited postures.
     concentration : (P,) array
-        How much of the null spaces their average holds in its weakest direction, 0 to
-        1: the eigenvalue that belongs to it.
+        Eigenvalue of the averaged null space's weakest direction, 0 to 1; 1 where the
+        null spaces of all samples contain it.
     angles, mean_posture_angles : (P, k) array
         Principal angles to the averaged null space, and to the one at the mean posture,
         rad, increasing.
     angle_interval, mean_posture_interval : (P, 2) array
         Of the largest.
     chance_angles : (2,) array
-        Largest angle of random directions, rad: the twentieth that is smallest, and
-        the median.
+        Largest angle of random directions, rad: 5th percentile and median.
     inside, inside_mean_posture : (P,) array
         Share of the joint variance inside the averaged null space, and inside that at
         the mean posture.
     inside_interval : (P, 2) array
         Of the first.
     inside_chance : (P, 2) array
-        Share inside a random subspace: median, and what one in twenty exceeds.
+        Share inside a random subspace: median and 95th percentile.
     leak, turn : (P, d) array
         Hand displacement, m, and turn, rad, per unit of c: lengths of the slopes of a
         regression over the samples, on all d signals at once.
     leak_interval, turn_interval : (P, d, 2) array
     kinematic_leak, kinematic_turn : (P, d) array
-        What the Jacobian at the mean posture makes of Z, per unit of c, m and rad.
+        Motion along Z by the Jacobian at the mean posture, per unit of c, m and rad.
     curvature : (P,) array
         Angle between the null spaces at both ends of the range of c, rad.
     straight_leak, straight_turn : (P,) array
-        How far the hand is off where straight Z ends, m and rad.
+        Deviation of the hand at the ends of straight Z, m and rad.
     agreement : (P,) array
         Correlation of c along Z with that along Z's projection on the averaged null
         space.
@@ -138,8 +137,8 @@ def compare_samples(
     Intervals come from a circular block bootstrap over time within each point's
     samples (:mod:`ikns.numerics.bootstrap`); those of angles, leaks and turns from
     :func:`ikns.numerics.bootstrap.length_interval`, as all are lengths of vectors that
-    noise makes longer. The leak's interval tells how little a few seconds say about it;
-    it knows nothing of errors of the body model that `q` and `jacobians` share.
+    noise makes longer. The leak's interval reflects the short recording, not errors of
+    the body model that `q` and `jacobians` share.
 
     Parameters
     ----------
@@ -160,9 +159,9 @@ def compare_samples(
     lower, upper : (P,) or (P, d) array
         m and M, rad.
     kinematics : Kinematics or sequence of P Kinematics, optional
-        For what is said about the mean posture and about straight lines. Without, the
-        visited posture nearest to the mean stands for it, and nothing is said about
-        straight lines.
+        For values at the mean posture and along straight lines. Without it the visited
+        posture nearest to the mean replaces it, and values along straight lines are
+        NaN.
     resamples : int
         Of the bootstrap; 0 for no intervals.
     level : float
@@ -187,7 +186,7 @@ def compare_samples(
 
     Examples
     --------
-    Two joints, and a hand that sees only the first:
+    Two joints, of which only the first moves the hand:
 
     >>> t = np.linspace(0, 5, 200)
     >>> q = np.stack([0.01 * np.sin(9 * t), np.sin(t)], axis=1)

@@ -1,4 +1,4 @@
-"""The learned directions against the null space, point by point."""
+"""Learned directions compared with a null space, with bootstrap intervals."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Subspaces(NamedTuple):
     angles : (k,) array
         Principal angles, rad, increasing.
     residual : (n,) array
-        What of the direction farthest away is outside the null space; its length is
-        the sine of the largest angle.
+        Part of the farthest direction outside the null space; its length is the sine
+        of the largest angle.
     replicates : (B, n) array
         The same from resamples.
     """
@@ -135,7 +135,7 @@ def angle_interval(
 def share_interval(
     share: float, replicates: Array, blocks: float, *, level: float
 ) -> tuple[float, float]:
-    """Interval of a share, by its log odds."""
+    """Confidence interval of a share, from its log odds."""
     if not 0 < share < 1:
         return np.nan, np.nan
     odds = np.log(replicates / (1 - replicates))

@@ -1,4 +1,4 @@
-"""Uncontrolled manifold: joint variance where a task sees it, and where it does not.
+"""Uncontrolled manifold: joint variance that does or does not affect a task.
 
 The joint variance over repetitions is split along the null space of the task's Jacobian
 (V_UCM) and across it (V_ORT), each per degree of freedom (Scholz and Schoner 1999, Exp

@@ -1,4 +1,4 @@
-"""What goes into a split, checked once: trials, joints, and the task's Jacobian."""
+"""Checks of a split's input: trials, joints, and the task's Jacobian."""
 
 from __future__ import annotations
 

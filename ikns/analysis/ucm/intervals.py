@@ -1,4 +1,4 @@
-"""How sure: intervals of dVz over the trials of one person, and over people."""
+"""Confidence intervals of dVz over the trials of one person, and over people."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def confidence_interval(
 
     ``"jackknife"`` is for trials: it leaves out one at a time and takes Student's t
     with one degree of freedom less than trials (Tukey 1958). ``"bootstrap"`` is for
-    samples of one trial, which resemble their neighbors: blocks of them are drawn, and
-    their spread used with Student's t (:mod:`ikns.numerics.bootstrap`). The null space
-    is held where it is in both.
+    correlated samples of one trial: blocks of them are drawn, and their spread is used
+    with Student's t (:mod:`ikns.numerics.bootstrap`). The null space is constant in
+    both.
 
     On normal and on heavy-tailed trials of 3 and 7 joints, 8 to 40 of them, 95 %
     intervals of the jackknife held the truth in 91 to 96 % of cases; percentiles of
@@ -119,7 +119,7 @@ def confidence_interval(
 
 
 def _influence(split: VarianceSplit) -> Array:
-    """How much each sample moves dVz where there is one, (N, times)."""
+    """Influence of each sample on dVz where it is finite, (N, times)."""
     n = len(split.deviations)
     along, rest = (
         np.sum(part.reshape(n, -1, part.shape[-1]) ** 2, axis=2)

@@ -1,4 +1,4 @@
-"""The split itself: joint variance along the task's null space, and across it.
+"""The variance split: joint variance along the task's null space, and across it.
 
 With n joints, k task variables and d = n - k, over N trials with deviations ``e`` from
 the mean posture and P the projector on the null space of the Jacobian there::

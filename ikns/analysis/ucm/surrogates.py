@@ -1,4 +1,4 @@
-"""Surrogates: the same joints, each as variable as before, but no longer together."""
+"""Surrogates: data with the variance of each joint, but without covariation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class SurrogateTest:
-    """dVz beside what it would be if the joints did not vary together.
+    """dVz compared with its values if the joints did not covary.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Trials of different length made comparable: cut to the movement, time normalized."""
+"""Alignment of trials: cut to the movement, time normalized."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""How long, how heavy and how varied people are: published tables and what follows.
+"""Anthropometry: lengths, masses and their variation, from published tables.
 
-The tables are data (``*.toml`` beside this file). Every row names its landmarks, its
-source and how sure we are of it, because one word, such as "upper arm", names lengths
-that differ by 18 %: acromion to radiale on the skin, or shoulder to elbow joint center.
-All results are SI; the segments run from joint center to joint center.
+The tables are data (``*.toml`` in this folder). Every row states its landmarks, source
+and reliability, because one name, such as "upper arm", is used for lengths that differ
+by 18 %: acromion to radiale on the skin, or shoulder to elbow joint center. All results
+are SI; segments run from joint center to joint center.
 """
 
 from ikns.body.anthropometry.lengths import (

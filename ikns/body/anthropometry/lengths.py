@@ -1,4 +1,4 @@
-"""Distances between joint centers, given stature only, and how far people differ."""
+"""Distances between joint centers given stature, and their spread among people."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["LIMB_SEGMENTS", "expected_lengths", "length_uncertainty"]
 #: Segments of each side, from the sternum to the hand.
 LIMB_SEGMENTS = ("clavicle", "upper_arm", "forearm", "hand")
 
-#: Surface measure that tells, among people of one stature, whose segment is longer.
+#: Surface measure that predicts a segment's length among people of one stature.
 SURFACE_MEASURES = {
     "clavicle": "biacromial_breadth",
     "upper_arm": "acromion_radiale",
@@ -67,9 +67,9 @@ def length_uncertainty(sex: str) -> dict[str, float]:
     """Spread of the limb segments among people of one (average) stature.
 
     The standard error of estimate of the surface measure in ANSUR II, scaled to the
-    segment; for the clavicle together with what we do not know about the offset from
-    acromion to joint center. How well a surface measure stands for a distance of
-    joint centers is not included: no table tells, so take these as lower bounds.
+    segment; for the clavicle together with the uncertainty of the offset from acromion
+    to joint center. How well a surface measure represents a distance of joint centers
+    is not included, as no table states it, so these are lower bounds.
 
     Parameters
     ----------
@@ -111,9 +111,9 @@ def person_length(
 ) -> NDArray[np.float64]:
     """Length of a segment of a person whose surface measure is known, meters.
 
-    ``expected length(stature) * surface / expected surface(stature)``: longer between
-    the joint centers by the share by which the surface measure exceeds that of other
-    people of the same stature. The clavicle takes its breadth directly.
+    ``expected length(stature) * surface / expected surface(stature)``: the ratio to the
+    mean of people of the same stature is that of the surface measure. The clavicle
+    follows from the biacromial breadth directly.
 
     Parameters
     ----------

@@ -17,24 +17,24 @@ __all__ = [
     "expected_measure",
 ]
 
-#: Statures that are taken for an adult's, meters: wide enough for people of short or
-#: tall stature, narrow enough to notice centimeters and feet.
+#: Plausible statures of adults, meters: wide enough for short and tall people, narrow
+#: enough to detect centimeters and feet.
 STATURE_LIMITS = (1.2, 2.3)
 
-#: Masses that are taken for an adult's, kilograms.
+#: Plausible masses of adults, kilograms.
 MASS_LIMITS = (25.0, 250.0)
 
-#: Breadths between the acromia that are taken for an adult's, meters.
+#: Plausible biacromial breadths of adults, meters.
 BIACROMIAL_LIMITS = (0.2, 0.6)
 
 
 def check_stature(stature: ArrayLike) -> NDArray[np.float64]:
-    """Return stature as an array, meters, or say what is wrong with it.
+    """Return stature as an array, meters, or refuse it.
 
     Raises
     ------
     InvalidInput
-        When it is no number or outside :data:`STATURE_LIMITS`.
+        When it is not a number or outside :data:`STATURE_LIMITS`.
     """
     return _within(
         stature, STATURE_LIMITS, "stature", "m", "did you give centimeters or feet?"
@@ -42,23 +42,23 @@ def check_stature(stature: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_mass(mass: ArrayLike) -> NDArray[np.float64]:
-    """Return mass as an array, kilograms, or say what is wrong with it.
+    """Return mass as an array, kilograms, or refuse it.
 
     Raises
     ------
     InvalidInput
-        When it is no number or outside :data:`MASS_LIMITS`.
+        When it is not a number or outside :data:`MASS_LIMITS`.
     """
     return _within(mass, MASS_LIMITS, "mass", "kg", "did you give grams or pounds?")
 
 
 def check_biacromial(breadth: ArrayLike) -> NDArray[np.float64]:
-    """Return biacromial breadth as an array, meters, or say what is wrong with it.
+    """Return biacromial breadth as an array, meters, or refuse it.
 
     Raises
     ------
     InvalidInput
-        When it is no number or outside :data:`BIACROMIAL_LIMITS`.
+        When it is not a number or outside :data:`BIACROMIAL_LIMITS`.
     """
     return _within(
         breadth,

@@ -53,11 +53,11 @@ def sample_adults(
 
     Stature is normal; each surface measure is its regression on stature plus a normal
     residual with the standard error of estimate. Residuals are independent, as their
-    correlations are not published, except those of forearm and hand (``ansur2.toml``
-    says how that one was found). The logarithm of mass is normal and correlates with
-    stature so that mass itself has the table's mean, deviation and correlation.
-    Stature and residuals are redrawn beyond three standard deviations, which takes
-    1.3 % off the deviations. Distances of joint centers: see ``person_length``.
+    correlations are not published, except those of forearm and hand (see
+    ``ansur2.toml``). The logarithm of mass is normal and correlated with stature such
+    that mass itself has the table's mean, deviation and correlation. Stature and
+    residuals beyond three standard deviations are drawn again, which reduces the
+    deviations by 1.3 %. Distances of joint centers: see ``person_length``.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _adults(deviates: NDArray[np.float64], sex: str) -> list[Adult]:
 def _mass(
     stature_deviate: NDArray[np.float64], residual: NDArray[np.float64], sex: str
 ) -> NDArray[np.float64]:
-    """Log-normal mass, kg: mass is skewed and a normal one could be starved."""
+    """Log-normal mass, kg: mass is skewed, and a normal one could be too low."""
     body = row("ansur2", "body_mass", sex=sex)
     variation = (body["sd_kg"] / body["mean_kg"]) ** 2
     sigma = np.sqrt(np.log1p(variation))

@@ -28,7 +28,7 @@ class Segment:
     Parameters
     ----------
     name : str
-        Name of the segment; limbs stand for either side.
+        Name of the segment; limbs are the same on either side.
     length_m : float
         Distance between the two landmarks along the long axis, meters.
     mass_kg : float
@@ -69,9 +69,9 @@ def segments(
     side-to-side axis (largest for the head, which is deeper than wide).
 
     `trunk_head` is his trunk and head as one body, without the two shoulder girdles:
-    these move with the clavicles and get a small mass of their own, so that the whole,
-    at rest, keeps de Leva's mass, center of mass and inertia. The girdle's front-back
-    place and the tilt of its long axis are neglected in that.
+    these move with the clavicles and have a small mass, so that at rest the total has
+    de Leva's mass, center of mass and inertia. The girdle's front-back position and the
+    tilt of its long axis are neglected.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def segments(
         "female" or "male".
     lengths : mapping of str to float, optional
         Known lengths in meters, of any of `clavicle`, `upper_arm`, `forearm`, `hand`;
-        centers of mass and radii of gyration follow them, masses do not.
+        centers of mass and radii of gyration scale with them, masses do not.
 
     Returns
     -------
@@ -96,8 +96,8 @@ def segments(
     ------
     InvalidInput
         When stature or mass is not an adult's in meters and kilograms, the sex is
-        unknown, or a given length is for no such segment or not half to twice what is
-        expected.
+        unknown, or a given length is of an unknown segment or not half to twice the
+        expected one.
 
     Examples
     --------
@@ -175,7 +175,7 @@ def _trunk_head(stature: float, mass: float, sex: str, girdle: Segment) -> Segme
     front_back, long, vertical = girdle.inertia_kg_m2
     one_girdle = np.array([front_back, vertical, long])
     one_girdle += girdle.mass_kg * np.array([girdle_side**2, girdle_side**2, 0.0])
-    total, up, inertia = _lump(
+    total, up, inertia = _combine(
         [
             (trunk.mass_kg, -trunk.com_m, np.array(trunk.inertia_kg_m2)),
             (
@@ -198,10 +198,10 @@ def _trunk_head(stature: float, mass: float, sex: str, girdle: Segment) -> Segme
     )
 
 
-def _lump(
+def _combine(
     parts: list[tuple[float, float, NDArray[np.float64]]],
 ) -> tuple[float, float, NDArray[np.float64]]:
-    """Join bodies whose centers lie on one vertical; a negative mass takes away."""
+    """Combine bodies with centers on one vertical; a negative mass is subtracted."""
     total = sum(mass for mass, _, _ in parts)
     up = sum(mass * height for mass, height, _ in parts) / total
     inertia = np.zeros(3)

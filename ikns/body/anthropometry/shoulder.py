@@ -1,4 +1,4 @@
-"""Where the joints of the shoulder girdle lie in the thorax."""
+"""Joint positions of the shoulder girdle in the thorax."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def shoulder_joints(
     No table gives the glenohumeral center's distance from the midline, so it is half
     the biacromial breadth minus an offset between two published shoulder models; the
     heights come from de Leva's trunk, the rest from a published model of a man
-    (``shoulder.toml`` names each source and how sure we are). Offsets grow with
-    stature. The acromion is put straight above the joint, which no source states.
+    (``shoulder.toml`` states each source and its reliability). Offsets scale with
+    stature. The acromion is assumed to be straight above the joint.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The published tables, and clear words when one asks for what is not there."""
+"""The published tables, with clear errors for unknown rows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ikns.errors import InvalidInput
 
 __all__ = ["SEXES", "TABLES", "normalize_sex", "row", "subjects", "table"]
 
-#: The sexes that the tables know.
+#: The sexes in the tables.
 SEXES = ("female", "male")
 
 #: The tables that :func:`table` reads.
@@ -26,7 +26,7 @@ def normalize_sex(sex: str) -> str:
     Raises
     ------
     InvalidInput
-        When the tables hold no such sex.
+        When the tables have no such sex.
 
     Examples
     --------
@@ -53,8 +53,8 @@ def table(name: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        The TOML file as it is: ``source``, ``mark`` and the rows under ``row``. Units
-        stand in the keys (``_mm``, ``_kg``; the rest are fractions). A fresh copy.
+        The TOML file: ``source``, ``mark`` and the rows under ``row``. Units are in the
+        keys (``_mm``, ``_kg``; the rest are fractions). A new copy.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def row(table_name: str, row_name: str, *, sex: str) -> dict[str, Any]:
     -------
     dict
         The numbers of that sex (or of both, where the source does not distinguish)
-        beside ``proximal``, ``distal``, ``source`` and ``mark``.
+        with ``proximal``, ``distal``, ``source`` and ``mark``.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def row(table_name: str, row_name: str, *, sex: str) -> dict[str, Any]:
 
 
 def subjects(table_name: str, *, sex: str) -> dict[str, Any]:
-    """Who was measured: ``n`` and, where the source tells, mean stature and mass.
+    """Subjects of a table: ``n`` and, where stated, mean stature and mass.
 
     Parameters and errors as in :func:`row`.
 

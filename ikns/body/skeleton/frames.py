@@ -36,8 +36,8 @@ class LinkFrames:
         self._cache: dict[tuple[tuple[str, ...], tuple[str, ...]], Paths] = {}
 
     def index(self, link: str) -> int:
-        """Return the number of a link's frame in the model."""
-        # Pinocchio answers an unknown name with the number of frames.
+        """Return the index of a link's frame in the model."""
+        # Pinocchio returns the number of frames for an unknown name.
         index = self._model.getFrameId(link, pin.FrameType.BODY)
         if index >= self._model.nframes:
             raise FileError(f"the URDF has no link '{link}'.")

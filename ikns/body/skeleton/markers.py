@@ -1,4 +1,4 @@
-"""Markers on the joints of Pinocchio's model: where they are, and their derivatives."""
+"""Markers on the joints of Pinocchio's model: their positions and derivatives."""
 
 from __future__ import annotations
 
@@ -83,10 +83,10 @@ class Markers:
         return positions, jacobian
 
     def by_size(self, q: Array, along: Array) -> tuple[Array, Array]:
-        """Differentiate by the sizes' logarithms, (M, 3, S), and the places, (M, 3, 3).
+        """Differentiate by the log sizes, (M, 3, S), and the marker places, (M, 3, 3).
 
-        `along` (M, 3) is the part of each marker's place that grows with its segment,
-        in the joint's frame, m.
+        `along` (M, 3) is the part of each marker's position that scales with its
+        segment, in the joint's frame, m.
         """
         model, data = self._model, self._data
         pin.forwardKinematics(model, data, q)
@@ -126,7 +126,7 @@ def grown_positions(
 
 
 def part_along(urdf: str, marker_set: MarkerSet, positions: Array) -> Array:
-    """Part of the markers' places (M, 3) that grows with their segment.
+    """Part of the markers' positions (M, 3) that scales with their segment.
 
     Along a limb only, as girth does not follow length; on the thorax, all of it.
     """

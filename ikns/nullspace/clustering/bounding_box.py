@@ -1,4 +1,4 @@
-"""The smallest box around points, oriented as they lie, and places on its surface."""
+"""The minimum oriented bounding box of points, and points on its surface."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ikns.errors import InvalidInput
 
 __all__ = ["BoundingBox", "box_surface_points", "minimum_bounding_box"]
 
-# Thinner than this times the longest side counts as flat: far above rounding (1e-16)
-# and below the 0.1 mm that any camera resolves in a workspace of a meter.
+# A side shorter than this times the longest is flat: far above rounding (1e-16) and
+# below the 0.1 mm that cameras resolve in a workspace of a meter.
 _FLAT = 1e-9
 _ROUNDING = 1e-12  # of the coordinates, when points are compared
-# Search for the smallest box: largest faces of the hull and other frames to start from,
-# how many go on after a first round of turns, and the gain in volume that ends it.
+# Search for the smallest box: numbers of hull faces and of other frames to start from,
+# of candidates after the first round, and the relative gain in volume that ends it.
 _FACES, _FRAMES, _FINALISTS, _GAIN = 12, 6, 10, 1e-6
 
 
@@ -44,17 +44,19 @@ class BoundingBox(NamedTuple):
 def minimum_bounding_box(points: ArrayLike) -> BoundingBox:
     """Oriented box of minimum volume around points.
 
-    The exact minimum (O'Rourke 1985) costs the cube of the hull's size. Here a box is
-    turned about one of its axes to the smallest rectangle seen along that axis (exact,
-    one side lies on the outline: Freeman and Shapira 1975), then about the next, until
-    a round of turns gains less than a millionth (30 rounds at most). This starts from
-    the principal axes, from the largest faces of the convex hull and from frames all
-    around; the best after one round go on, and the smallest result counts.
+    The exact minimum (O'Rourke 1985) takes time cubic in the hull's size. Here a box is
+    rotated about one of its axes to the smallest rectangle in the projection along that
+    axis (exact, as one side lies on the hull: Freeman and Shapira 1975), then about the
+    next, until a round of rotations gains less than a millionth (30 rounds at most).
+    This starts from the principal axes, from the largest faces of the convex hull and
+    from random frames; the best after one round are continued, and the smallest result
+    is returned.
 
     Guaranteed: it holds all points and is never larger than the principal-axes box or
     the coordinate-axes box. Not guaranteed: the global minimum.
-    (Against descents from 240 frames it was 0.4 % larger on average and 3 % at worst on
-    4 random points; less on more points; 0.001 % on lumps at the corners of a box.)
+    (Compared with descents from 240 frames it was 0.4 % larger on average and 3 % at
+    worst on 4 random points; less on more points; 0.001 % on clusters at the corners of
+    a box.)
 
     Flat points get the smallest rectangle, exactly. Points that fill more than three
     dimensions get the box along their principal axes.
@@ -103,14 +105,14 @@ def minimum_bounding_box(points: ArrayLike) -> BoundingBox:
 def box_surface_points(
     box: BoundingBox, n: int, *, up: ArrayLike | None = None
 ) -> NDArray[np.float64]:
-    """Places on the surface of a box where `n` centroids start.
+    """Points on the surface of a box where `n` centroids start.
 
     In this order: vertices; centers of the upper and the lower face; centers of the
-    other faces; middles of the edges (26 in all for a box with three sides); then
-    whatever place on the surface is farthest from those before, on a regular grid.
-    Fewer than all vertices: two opposite ones, or first those no two of which share an
-    edge. A flat box is a rectangle, a segment or a point and gives the places that it
-    has; of a box with more than three sides only the three longest vary.
+    other faces; midpoints of the edges (26 in total for a box with three sides); then
+    repeatedly the point of a regular grid on the surface that is farthest from those
+    before. With fewer than all vertices: two opposite ones, or first those without a
+    common edge. A flat box is a rectangle, a segment or a point; of a box with more
+    than three sides only the three longest vary.
 
     Parameters
     ----------
@@ -162,7 +164,7 @@ def _spread(
     if n <= len(places):
         return places
     r = len(half)
-    # At least four candidates for each place; a segment offers its whole length.
+    # At least four candidates for each point; on a segment, all along it.
     steps = 2 ** int(np.ceil(np.log2(4 * n) / max(r - 1, 1)))
     line = np.linspace(-1.0, 1.0, steps + 1)
     grid = np.array(list(itertools.product(line, repeat=r)))
@@ -209,7 +211,7 @@ def _smallest_axes(
 def _shrunk(
     x: NDArray[np.float64], axes: NDArray[np.float64], *, rounds: int = 30
 ) -> NDArray[np.float64]:
-    """Turn about one axis after the other until no turn makes the box smaller."""
+    """Rotate about one axis after the other until no rotation shrinks the box."""
     volume = _volume(x, axes)
     for _ in range(rounds):
         before = volume
@@ -229,7 +231,7 @@ def _volume(x: NDArray[np.float64], axes: NDArray[np.float64]) -> float:
 def _turned(
     x: NDArray[np.float64], axes: NDArray[np.float64], i: int, j: int
 ) -> NDArray[np.float64]:
-    """Axes with `i` and `j` turned to the smallest rectangle around what they see."""
+    """Axes with `i` and `j` rotated to the smallest rectangle around the points."""
     seen = x @ axes[[i, j]].T
     outline = seen[ConvexHull(seen).vertices]
     edges = np.roll(outline, -1, axis=0) - outline

@@ -18,14 +18,15 @@ from ikns.nullspace.clustering.bounding_box import (
 
 __all__ = ["BoundingBoxKMeans", "nearest_center"]
 
-# A sample is a straggler when it lies this many robust standard deviations farther
-# from its centroid than the median sample. The distances of an isotropic normal cloud
-# of standard deviation s have median 1.54 s and robust deviation 0.68 s, so the radius
-# is 4.9 s. Hands are held less still at some points than at others: on 12 simulated
-# recordings 3 lost up to 44 % of a point, 5 at most 4 %, with a radius of 14 to 19 mm.
-_STRAGGLER = 5.0
+# An outlier is this many robust standard deviations farther from its centroid than the
+# median sample. The distances of an isotropic normal distribution of
+# standard deviation s have median 1.54 s and robust deviation 0.68 s, so the radius is
+# 4.9 s. Hands are held less still at some points than at others: on 12 simulated
+# recordings a limit of 3 lost up to 44 % of a point, 5 at most 4 %, with a radius of 14
+# to 19 mm.
+_OUTLIER = 5.0
 _MAD_TO_DEVIATION = 1.4826  # of a normal distribution, 1 / (quantile at 3/4)
-# At ten points half a meter apart 1 % is 5 mm, less than any hand holds still.
+# For ten points half a meter apart 1 % is 5 mm, less than any held hand moves.
 _LEAST = 0.01
 _ROUNDING = 1e-12  # of the coordinates, when distances are compared
 
@@ -40,16 +41,16 @@ def nearest_center(
     points : (N, d) array
         Positions, m.
     centers : (P, d) array
-        Centers, m; of two equally near the first counts.
+        Centers, m; of two equally near ones the first is chosen.
     radius : float, optional
         Points farther than this from their center belong to none. The default is taken
         from the data: the median distance plus 5 robust standard deviations (1.4826
         times the median absolute deviation) of all distances. While the user holds the
         hand at a point the distances are a few millimeters to centimeters; samples from
-        the reaches between points are the stragglers that this cuts off, as long as
-        they are fewer than half of the samples. At least a hundredth of the distance
-        across the centers, because stragglers shift the center of a perfectly still
-        hand by more than the hand moves.
+        the reaches between points are the outliers that this removes, as long as they
+        are fewer than half of the samples. At least a hundredth of the distance across
+        the centers, because outliers shift the center of a perfectly still hand by more
+        than the hand moves.
 
     Returns
     -------
@@ -64,10 +65,10 @@ def nearest_center(
     if radius is None:
         median = np.median(nearest)
         deviation = _MAD_TO_DEVIATION * np.median(np.abs(nearest - median))
-        # Rounding must not throw out points that all have the same distance.
+        # Rounding must not remove points that all have the same distance.
         rounding = _ROUNDING * np.abs(points).max()
         across = float(np.linalg.norm(np.ptp(centers, axis=0)))
-        spread = median + _STRAGGLER * deviation + rounding
+        spread = median + _OUTLIER * deviation + rounding
         radius = max(float(spread), _LEAST * across)
     labels[nearest > radius] = -1
     return labels, radius
@@ -78,8 +79,8 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
 
     Centroids start at :func:`box_surface_points`; each sample goes to the nearest; each
     centroid moves to the mean of its samples; this repeats until no assignment changes.
-    Then samples farther than `radius` from their centroid are let go. A centroid that
-    loses all samples stays where it is and counts none.
+    Then samples farther than `radius` from their centroid are removed. A centroid
+    without samples stays where it is.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The null-space map: learned from still samples or computed from the Jacobian.
 
-The method is in `estimator`, read top to bottom; the signs that it needs in
-`alignment`, the gate in `samples`, the map without learning in `analytic`.
+The method is in `estimator`; the signs of directions are in `alignment`, the selection
+of still samples in `samples`, and the map without learning in `analytic`.
 """
 
 from ikns.nullspace.map.analytic import analytic_map

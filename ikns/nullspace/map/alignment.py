@@ -1,4 +1,4 @@
-"""Agreeing signs: principal components have none of their own, a robot needs one."""
+"""Consistent signs of directions, which principal components do not have."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def spanning_tree(
     Parameters
     ----------
     strength : (E,) array
-        How strongly each edge ties its ends.
+        Weight of each edge.
     edges : (E, 2) integer array
         Pairs of nodes.
     root : int
@@ -30,7 +30,8 @@ def spanning_tree(
     Returns
     -------
     list of (parent, child)
-        In the order of growth, so each parent is the root or an earlier child.
+        In the order in which they are added; a parent is the root or an earlier
+        child.
     """
     tree: list[tuple[int, int]] = []
     reached = np.zeros(edges.max(initial=root) + 1, dtype=bool)
@@ -54,21 +55,21 @@ def align(
     root: int,
     reference: Floats | None = None,
 ) -> tuple[Floats, list[tuple[int, int]]]:
-    """Directions of all points with agreeing signs.
+    """Directions of all points with consistent signs.
 
     For one degree of freedom a direction is the normalized sum of the point's
-    components, each times its weight and the sign that agrees with the point before it
-    in the tree; for d degrees of freedom it is the point's d components, turned within
-    their span to agree best with the point before (orthogonal Procrustes, Schoenemann
-    1966). The tree grows from `root`, which follows the reference, along the edges
-    whose ends agree best: by the smallest cosine between the spans of their `n_dof`
-    leading components.
+    components, each times its weight and the sign that agrees with the point's parent
+    in the tree; for d degrees of freedom it is the point's d components, rotated within
+    their span to agree best with the parent (orthogonal Procrustes, Schoenemann 1966).
+    The tree grows from `root`, which follows the reference, along the edges with the
+    best agreement: the smallest cosine between the spans of the `n_dof` leading
+    components at both ends.
 
     Parameters
     ----------
     components : sequence of P (k_i, n) arrays
-        Orthonormal rows, leading one first; at least `n_dof`, or none where nothing is
-        known.
+        Orthonormal rows, leading one first; at least `n_dof`, or none where no joint
+        moves.
     weights : sequence of P (k_i,) arrays
         Used for one degree of freedom.
     n_dof : int
@@ -76,10 +77,10 @@ def align(
     edges : (E, 2) integer array
         Neighbors, as a connected graph.
     root : int
-        Where to begin.
+        Root of the tree.
     reference : (d, n) array, optional
-        The sum of all directions has a positive product with it, row by row. Without
-        it the entry of largest magnitude of that sum is positive.
+        The sum of all directions has a positive dot product with it, row by row.
+        Without it the entry of largest magnitude of that sum is positive.
 
     Returns
     -------
@@ -98,7 +99,7 @@ def align(
 
     def toward(k: int, target: Floats) -> Floats:
         if not known[k]:
-            return target  # hand on the sign to those behind
+            return target  # pass the sign on to the children
         if n_dof > 1:
             return _procrustes(leading[k], target)
         sign = np.where(components[k] @ target[0] < 0, -1.0, 1.0)
@@ -120,7 +121,7 @@ def align(
 
 
 def _turn(rows: Floats, target: Floats) -> Floats:
-    """Orthogonal (d, d) matrix that turns rows (d, n) to agree best with the target."""
+    """Orthogonal (d, d) matrix that rotates rows (d, n) to best match the target."""
     u, _, vt = np.linalg.svd(target @ rows.T)
     return u @ vt
 

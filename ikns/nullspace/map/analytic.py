@@ -1,4 +1,4 @@
-"""The map without learning: the null space of the Jacobian where the arm has been."""
+"""The analytic map: null spaces of the Jacobian at the visited postures."""
 
 from __future__ import annotations
 
@@ -35,23 +35,23 @@ def analytic_map(
     radius: float | None = None,
     **parameters: Any,
 ) -> NullSpaceMap:
-    """Map of the null spaces that the Jacobian has where the arm has been.
+    """Map of the null spaces of the Jacobian at visited postures.
 
-    At each center Z is the null space of the chain's Jacobian averaged over the visited
-    postures (:func:`ikns.numerics.subspace.mean_null_direction`): those of the still
-    samples that are nearest to this center. m and M are the ends of ``Z @ q`` over the
-    same samples, and signs agree as in a learned map.
+    At each center Z is the null space of the chain's Jacobian averaged
+    (:func:`ikns.numerics.subspace.mean_null_direction`) over the still samples that are
+    nearest to this center. m and M are the ends of ``Z @ q`` over the same samples, and
+    signs agree as in a learned map.
 
     Where the null space has more dimensions than `n_dof` (seven joints that hold the
     position alone have four), Z is what varies least between postures, whether or not
-    the arm moved that way; a :class:`MapWarning` then tells of neighbors that disagree.
+    the arm moved that way; a :class:`MapWarning` then names neighbors that disagree.
 
     Parameters
     ----------
     skeleton : Skeleton
         Owner of the Jacobian.
     motion : Motion
-        What the arm did.
+        Motion of the arm.
     centers : (P, 3) array
         PCA points, m; those of a learned map to compare with it.
     chain : str

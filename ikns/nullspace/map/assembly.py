@@ -1,4 +1,4 @@
-"""From each point's components to directions with agreeing signs and their ranges."""
+"""From each point's components to directions with consistent signs and ranges."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 # Directions more than 60 degrees apart say little about each other's sign.
 _WEAK = 0.5
-# A reference within 6 degrees of orthogonal would turn its verdict with a little noise.
+# The sign of a reference within 6 degrees of orthogonal changes with a little noise.
 _INDIFFERENT = 0.1
 
 
@@ -50,7 +50,7 @@ def assemble(
     -------
     directions : (P, d, n) array
     lower, upper : (P, d) arrays
-        Quantiles of the projections of the samples, which are not centered, rad.
+        Quantiles of the projections of the uncentered samples, rad.
 
     Warns
     -----
@@ -103,7 +103,7 @@ def _warn_of_disagreement(
 
 
 def _warn_of_indifference(directions: Floats, reference: Floats) -> None:
-    """Say so when the reference is almost orthogonal to all that it should sign."""
+    """Warn when the reference is almost orthogonal to the sum of the directions."""
     total = directions.sum(axis=0)
     size = np.linalg.norm(total, axis=1) * np.linalg.norm(reference, axis=1)
     cosine = float(((total * reference).sum(axis=1) / np.maximum(size, 1e-300)).min())

@@ -1,4 +1,4 @@
-"""What a map accepts, checked once, and what a person should look at."""
+"""Checks of a map's input, and warnings about its samples."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ Floats = NDArray[np.float64]
 
 DOMAINS = ("position", "velocity")
 OUTSIDES = ("nearest", "project", "nan")
-# Thinner than this part of the width is a sheet: 2 cm of 40 cm, which is how far a hand
-# drifts that is held still.
-_SHEET = 0.05
-# A point with less than this part of an equal share of the samples is left out.
+# Points thinner than this share of their width are flat: 2 cm of 40 cm, about the drift
+# of a held hand.
+_FLAT = 0.05
+# A point with less than this share of an equal part of the samples is left out.
 _SHARE = 0.1
 
 
 class MapWarning(UserWarning):
-    """The map was made, but a person should look at what the sentence says."""
+    """The map was made, but the message needs a look."""
 
 
 class MapSettings(NamedTuple):
@@ -58,7 +58,7 @@ class MapSettings(NamedTuple):
 
 
 def checked_settings(parameters: Any, shape: tuple[int, int]) -> MapSettings:
-    """Return what a map's parameters mean for samples (N, n), or say what is wrong."""
+    """Return a map's parameters for samples (N, n), or raise what is wrong."""
     p = parameters
     if len(p.quantiles) != 2 or p.n_points < 1:
         raise InvalidInput(
@@ -112,7 +112,7 @@ def checked_rows(rows: ArrayLike, width: int, what: str) -> Floats:
 def checked_map(
     centers: ArrayLike, directions: ArrayLike, lower: ArrayLike, upper: ArrayLike
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return a map's arrays in full shape, or say what is wrong with them."""
+    """Return a map's arrays in full shape, or raise what is wrong with them."""
     places, z = np.array(centers, dtype=float), np.array(directions, dtype=float)
     m, M = np.array(lower, dtype=float), np.array(upper, dtype=float)
     if z.ndim == 2:
@@ -140,7 +140,7 @@ def checked_map(
 
 
 def checked_velocities(velocity: ArrayLike | None, q: Floats) -> Floats:
-    """Return joint velocities that go with joint vectors (N, n)."""
+    """Return joint velocities that match joint vectors (N, n)."""
     if velocity is None:
         raise InvalidInput(
             'domain="velocity" needs joint velocities, pass them to fit as velocity.'
@@ -171,8 +171,8 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
     Raises
     ------
     NotEnoughData
-        When no point is left; and of 4 points and more in space when fewer than 4 are
-        left or all samples or points lie at one place, on one line or in one plane.
+        When no point is left; and for 4 or more points in space when fewer than 4 are
+        left, or all samples or points lie at one place, on one line or in one plane.
     """
     centers, counts = found.cluster_centers_, found.counts_
     natural = centers.shape[1] == 3 and len(centers) >= 4
@@ -208,8 +208,8 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
 
 
 def _check_volume(width: Floats, what: str) -> None:
-    """Refuse what is a sheet, a line or a dot; `width` (3,) m, the longest first."""
-    full = np.count_nonzero(width > _SHEET * width[0])
+    """Refuse points in a plane, on a line or at a place; `width` (3,) m, decreasing."""
+    full = np.count_nonzero(width > _FLAT * width[0])
     if full < 3:
         where = ("at one place", "on one line", "in one plane")[full]
         raise NotEnoughData(
@@ -225,7 +225,7 @@ def _by(width: Floats) -> str:
 def warn_of_components(
     centers: Floats, n_components: NDArray[np.int64], n_dof: int
 ) -> None:
-    """Name the points where no joint moves, and those where too much does."""
+    """Warn of points where no joint moves, and of those with too many components."""
     none = [
         format_point(centers, k) for k in np.flatnonzero(n_components == 0).tolist()
     ]
@@ -249,5 +249,5 @@ def warn_of_components(
 
 
 def format_point(centers: Floats, k: int) -> str:
-    """Name a point by its place, for messages: numbers change when points drop out."""
+    """Name a point by its position, as numbers change when points are left out."""
     return f"({', '.join(f'{x:.3f}' for x in centers[k])})"

@@ -1,7 +1,7 @@
 """The method: from samples with a still hand to the control signal.
 
-Around each PCA point (where the user held the hand and moved the arm) joint vectors q
-vary along a direction Z, between m and M. Between the points Z, m and M are weighted
+At each PCA point (where the user held the hand and moved the arm) joint vectors q vary
+along a direction Z, between m and M. Between the points Z, m and M are interpolated
 with the natural-neighbor weights w of the hand position, so that
 
     c = (Z^ q - m^) / (M^ - m^) = sum_i w_i (Z_i q - m_i) / sum_i w_i (M_i - m_i)
@@ -43,17 +43,17 @@ class NullSpaceMap(BaseEstimator):
 
     Fitting: hand positions are clustered
     (:class:`ikns.nullspace.clustering.BoundingBoxKMeans`); in each cluster the
-    principal components of the joint vectors that explain at least `variance` are added
-    up, each times its explained-variance ratio and a sign, and the sum is normalized to
-    Z; m and M are the ends of ``Z @ q``.
+    principal components of the joint vectors that explain at least `variance` are
+    summed, each times its explained-variance ratio and a sign, and the sum is
+    normalized to Z; m and M are the ends of ``Z @ q``.
 
-    A component has no sign of its own, and a direction and its opposite drive a robot
-    opposite ways. So signs are made to agree between neighboring points, strongest
-    agreement first (:func:`ikns.nullspace.map.alignment.align`), and one sign for all
-    comes from `reference`. For ``n_dof = d > 1`` the directions are the d leading
-    components of each point, turned within their span to agree with its neighbors', and
-    all together to agree best with the reference. Where natural neighbors mean nothing
-    (fewer than 4 points asked for, `X` not in space) the nearest point's values hold.
+    The sign of a component is arbitrary, but opposite directions move a robot in
+    opposite ways. So signs are made consistent between neighboring points, strongest
+    agreement first (:func:`ikns.nullspace.map.alignment.align`), and the overall sign
+    follows from `reference`. For ``n_dof = d > 1`` the directions are the d leading
+    components of each point, rotated within their span to agree with its neighbors',
+    and together to agree best with the reference. Where natural neighbors are undefined
+    (fewer than 4 points, or `X` not in space) the nearest point's values are used.
 
     Parameters
     ----------
@@ -62,23 +62,24 @@ class NullSpaceMap(BaseEstimator):
     n_dof : int
         Degrees of freedom d to control.
     variance : float
-        Part of the variance, in (0, 1], that the components summed to Z explain.
+        Share of the variance, in (0, 1], that the components summed to Z explain.
     radius : float, optional
-        Samples farther from their centroid are left out, m; see
+        Samples farther from their centroid are ignored, m; see
         :func:`ikns.nullspace.clustering.nearest_center` for the default.
     domain : {"position", "velocity"}
         Components of joint vectors about their mean, or of joint velocities about zero
         (not their mean: a null space contains zero, and slow drift within it counts).
     outside : {"nearest", "project", "nan"}
         Outside the points' hull: the nearest point's values (the paper's rule; c jumps
-        there), those at the nearest place of the hull (continuous), or NaN.
+        there), those at the nearest position of the hull (continuous), or NaN.
     quantiles : (float, float)
-        What counts as the ends m and M; (0, 1) are minimum and maximum.
+        Quantiles that define m and M; (0, 1) are minimum and maximum.
     max_iter : int
         Most iterations of the clustering.
     reference : (n,) or (d, n) array, optional
-        What rises with c, as a gradient over the joints: its product with the sum of
-        all Z is made positive, row by row. Default: that sum's largest entry is.
+        Gradient over the joints of a quantity that increases with c: its dot product
+        with the sum of all Z is made positive, row by row. Default: that sum's largest
+        entry is.
     interpolation : {"natural", "laplace", "nearest"}
         Weights between the points: natural neighbors by volume (the paper's), natural
         neighbors by area (Laplace), or all the weight to the nearest point. Signs
@@ -102,13 +103,13 @@ class NullSpaceMap(BaseEstimator):
     cluster_means_ : (P, n) array
         Mean joint vectors, rad.
     n_components_ : (P,) integer array
-        Components that explain `variance`. More than `n_dof`, which warns: there is
-        freedom besides that wanted. Zero where no joint moves: Z, m, M are zero too,
-        and the point has no say in c.
+        Components that explain `variance`. More than `n_dof` mean further degrees of
+        freedom, with a warning. Zero where no joint moves: Z, m, M are zero too, and
+        the point has no influence on c.
     explained_variance_ratio_ : (P, n) array
         Of all components, decreasing.
     all_centers_, all_counts_ : (n_points, 3), (n_points,) array
-        Every PCA point asked for, also those left out.
+        All PCA points, including those left out.
     radius_ : float
         Radius used, m.
     interpolator_ : object
@@ -197,7 +198,7 @@ class NullSpaceMap(BaseEstimator):
 
         parts = [principal_components(moves[r], centered=centered) for r in rows]
         ratios = np.array([ratio for _, ratio in parts])
-        # Enough but for rounding: the last sum is 1, and `variance` may be 1 too.
+        # With a margin for rounding: the last sum is 1, and `variance` may be 1 too.
         short = np.cumsum(ratios, axis=1)[:, :-1] < self.variance - 1e-12
         moving = np.any(ratios, axis=1)
         n_components = np.where(moving, 1 + short.sum(axis=1), 0)
@@ -232,7 +233,7 @@ class NullSpaceMap(BaseEstimator):
         counts: ArrayLike = 0,
         **parameters: Any,
     ) -> Self:
-        """Make a map from what it consists of: one from a file, or an analytic one.
+        """Make a map from its arrays: one from a file, or an analytic one.
 
         Parameters
         ----------

@@ -31,7 +31,7 @@ def make_interpolator(
     outside: Literal["nearest", "project", "nan"],
     interpolation: Interpolation = "natural",
 ) -> NaturalNeighborInterpolator | NearestPoint:
-    """Interpolator between points (P, d): natural neighbors from 4 points in space on.
+    """Interpolator between points (P, d): natural neighbors for 4 or more in space.
 
     Parameters
     ----------
@@ -65,7 +65,8 @@ def _in_space(points: NDArray[np.float64]) -> bool:
 class NearestPoint:
     """Weights of 1 for the nearest point, in any dimension.
 
-    Stands in for :class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`.
+    Same methods as
+    :class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`.
 
     Parameters
     ----------
@@ -102,5 +103,5 @@ class NearestPoint:
         return weights.reshape(*queries.shape[:-1], -1)
 
     def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Nowhere: these points enclose no volume; (...) for queries (..., d)."""
+        """Return false for queries (..., d), (...): the points enclose no volume."""
         return np.zeros(np.shape(x)[:-1], dtype=bool)

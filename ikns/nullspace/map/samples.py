@@ -1,4 +1,4 @@
-"""The gate: which samples of a motion show the null space."""
+"""Selection of the samples of a motion that show the null space."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def still_mask(
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """Which samples have the chain's hands at rest while everything is known.
+    """Which samples have the chain's hands at rest and all joints known.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ def still_mask(
     chain : str
         See :data:`ikns.body.chains.CHAINS`.
     max_hand_speed : float
-        Hands slower than this, seen from the thorax, count as still, m/s. The default
-        is that of Lisini Baldi et al. (arXiv 2012.03600), who let the task decide.
+        Hands slower than this in the thorax frame count as still, m/s. Lisini Baldi et
+        al. (arXiv 2012.03600) choose it by task; the default is theirs.
     min_duration : float
-        Shorter rests are left out, s. Hands that roam are slow wherever they turn back,
-        for some 0.2 s, which shows no null space; 0.5 removes these and keeps every
-        hand that is held. The default of 0 keeps all, as the paper does.
+        Shorter rests are left out, s. A moving hand is slow for about 0.2 s wherever it
+        reverses, which shows no null space; 0.5 removes these rests and keeps those of
+        a held hand. The default of 0 keeps all, as in the paper.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def null_space_samples(
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Hand positions and joint vectors of the samples whose hands are still.
+    """Hand positions and joint vectors of the samples with still hands.
 
     The matching velocities, for ``NullSpaceMap(domain="velocity")``, are
     ``motion.chain_velocities(chain)[still_mask(motion, chain)]``.

@@ -1,7 +1,7 @@
 """Marker files: C3D, TRC and Vicon CSV in, C3D out.
 
-Inside there are meters, seconds and NaN; millimeters, frame numbers and empty cells
-exist only in here.
+Millimeters, frame numbers and empty cells exist only here; everywhere else there are
+meters, seconds and NaN.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def read(path: str | Path) -> Recording:
     Returns
     -------
     Recording
-        Times in seconds, frame 1 of a trial at 0 s unless the file states times of its
-        own; positions in meters, NaN where a marker was not seen.
+        Times in seconds, frame 1 of a trial at 0 s unless the file states its own
+        times; positions in meters, NaN where a marker was not seen.
 
     Raises
     ------

@@ -1,13 +1,13 @@
-"""C3D, the binary file of most camera systems: markers out of its points.
+"""Reader of C3D, the binary file of most camera systems.
 
-A C3D point is not always a marker. Modelled angles, forces, moments and powers are
-stored as points too, named in parameter lists of their own; they are dropped, and so
-are trajectories without a name. Virtual points that *are* positions (joint centers,
-the center of mass) stay: whoever needs certain markers picks them by label.
+A C3D point is not always a marker. Model outputs (angles, forces, moments, powers) are
+stored as points too and named in separate parameter lists; they are dropped, and so are
+trajectories without a name. Virtual points that *are* positions (joint centers, the
+center of mass) are kept; callers select markers by label.
 
-The bytes are read here rather than by ezc3d, which writes our files and checks this
-reader in its tests: version 1.7.2 ends the whole process on some damaged parameters,
-refuses parameter descriptions over 127 bytes, and drops all frames after 65535.
+ezc3d writes our files and checks this reader in its tests but does not read them:
+version 1.7.2 ends the whole process on some damaged parameters, refuses parameter
+descriptions over 127 bytes, and drops all frames after 65535.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import FileError
-from ikns.recording.files.border import (
+from ikns.recording.files.c3d_layout import C3dLayout, floats, read_layout
+from ikns.recording.files.conversion import (
     checked_rate,
     is_unlabeled,
     meters_per,
     to_recording,
 )
-from ikns.recording.files.c3d_layout import C3dLayout, floats, read_layout
 from ikns.recording.recording import Recording
 
 __all__ = ["read_c3d"]
@@ -33,16 +33,16 @@ __all__ = ["read_c3d"]
 #: Parameter lists of the POINT group whose members are not positions.
 _NOT_POSITIONS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 
-#: Largest count a 16-bit word can hold; longer recordings say so elsewhere.
+#: Largest count that a 16-bit word holds; longer recordings use other parameters.
 _WORD = 0xFFFF
 
 
 def read_c3d(path: Path) -> Recording:
     """Read the markers of a C3D file.
 
-    Frame 1 is at 0 s; a recording that was cut out of a longer one keeps the times it
-    had there. Positions without a unit are taken as mm, the unit C3D files are usually
-    in, and refused when that cannot be. Analog channels are ignored.
+    Frame 1 is at 0 s; a part of a longer recording keeps its times. Positions without a
+    unit are taken as mm, the usual unit of C3D files, and refused when that is not
+    plausible. Analog channels are ignored.
 
     Raises
     ------
@@ -128,7 +128,8 @@ def _frame_count(layout: C3dLayout, fitting: int) -> int:
     """Return the number of frames, also where it does not fit into 16 bits.
 
     Then Vicon writes first and last frame as pairs of words, others write a
-    floating-point count, and some nothing but the largest word: all that follows.
+    floating-point count, and some only the largest word: then all frames to the end of
+    the file count.
     """
     *_, first, last = layout.header
     count = layout.number("POINT:FRAMES", last - first + 1)

@@ -1,10 +1,10 @@
-"""Where things are in a C3D file: header and parameters, every offset checked.
+"""Header and parameters of a C3D file, with every offset checked.
 
 A C3D file is made of blocks of 512 bytes: a header, a section of named parameters in
 groups, and frames of points and analog samples, in one of three machines' number
-formats (https://www.c3d.org, user guide). Nothing here trusts a count or an offset
-before the bytes it speaks of are known to be there, so a damaged file ends in a
-sentence. Compiled readers were seen to end in a segmentation fault instead.
+formats (https://www.c3d.org, user guide). Every count and offset is checked against the
+size of the file before it is used, so a damaged file gives an error message where
+compiled readers ended in a segmentation fault.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import FileError
-from ikns.recording.files.border import existing_file, shown
+from ikns.recording.files.conversion import existing_file, shown
 
 __all__ = ["C3dLayout", "floats", "read_layout"]
 
@@ -32,7 +32,7 @@ Value = list[str] | NDArray[np.float64]
 
 @dataclass(frozen=True)
 class C3dLayout:
-    """What a C3D file says about itself.
+    """Header and parameters of a C3D file.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Writing a recording as C3D, whole or not at all."""
+"""Writer of C3D files; a file is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def write_c3d(path: str | Path, recording: Recording, *, force: bool = False) ->
 
     Positions are stored in single precision. Times become frame numbers, frame 1 at
     0 s. A marker that was not seen is stored as a point with negative residual; so is
-    one at exactly (0, 0, 0), which C3D cannot tell from it.
+    one at exactly (0, 0, 0), which C3D cannot distinguish from it.
 
     Parameters
     ----------
@@ -71,8 +71,8 @@ def write_c3d(path: str | Path, recording: Recording, *, force: bool = False) ->
     _check_labels(recording)
     first, rate = _first_frame_and_rate(recording)
     try:
-        # A folder of its own beside the target: same disk, so the move is one step,
-        # and whatever happens it is swept up.
+        # A temporary folder next to the target is on the same disk, so the move is
+        # atomic, and it is removed in any case.
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".ikns-") as folder:
             draft = Path(folder) / "draft.c3d"
             _write(draft, recording, first, rate)
@@ -105,7 +105,7 @@ def _first_frame_and_rate(recording: Recording) -> tuple[int, float]:
             f"that a C3D file states, found {len(time)}."
         )
     counted = (time - time[0]) * rate
-    # A lost frame shows as a long step, a drifting clock as a growing difference.
+    # A lost frame is a long step, a drifting clock a growing difference.
     lost = np.abs(np.diff(counted) - 1).max()
     drift = np.abs(counted - np.arange(len(time))).max()
     if max(lost, drift) >= 0.5:
@@ -146,7 +146,7 @@ def _write(path: Path, recording: Recording, first: int, rate: float) -> None:
 
 
 def _check_complete(path: Path, recording: Recording) -> None:
-    """Refuse what a full disk left over: the library that writes does not say."""
+    """Refuse a truncated file: the library does not report a full disk."""
     layout = read_layout(path)
     n_frames, n_markers, _ = recording.markers.shape
     if layout.size < layout.data_start + 16 * n_frames * n_markers:

@@ -1,4 +1,4 @@
-"""Numbers out of a text file: lines in, an array out, gaps as NaN."""
+"""Tables of numbers in text files; gaps become NaN."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import FileError
-from ikns.recording.files.border import existing_file, shown
+from ikns.recording.files.conversion import existing_file, shown
 
 __all__ = ["number_table", "text_lines"]
 
@@ -38,7 +38,7 @@ def number_table(
     n_columns : int
         Columns that the file's header promises.
     delimiter : str
-        What stands between two cells.
+        Separator of cells.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def number_table(
     """
     if not rows:
         return np.empty((0, n_columns))
-    # A damaged header must not ask for more memory than the lines can fill.
+    # A damaged header must not allocate more memory than the lines can fill.
     if len(rows) * n_columns > 4 * sum(len(line) for _, line in rows) + 10_000:
         raise FileError(
             f"{path}: expected {n_columns} columns as in its header, but its "

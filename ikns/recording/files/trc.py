@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import FileError
-from ikns.recording.files.border import (
+from ikns.recording.files.conversion import (
     checked_rate,
     is_unlabeled,
     meters_per,
@@ -31,8 +31,8 @@ _HEADER = 5
 def read_trc(path: Path) -> Recording:
     """Read a TRC file.
 
-    Times are the file's own, freed from the rounding of the few digits they are printed
-    with: where they agree with frame number and rate to half a frame, those are used.
+    Times are computed from frame number and rate where these agree with the printed
+    times to half a frame, as printed times are rounded; else the printed ones are used.
 
     Raises
     ------

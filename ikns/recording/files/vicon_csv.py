@@ -1,4 +1,4 @@
-"""Vicon Nexus' ASCII export: sections under each other, each with its own rate.
+"""Vicon Nexus' ASCII export: consecutive sections, each with its own rate.
 
 Only the section named Trajectories holds markers: a line with its rate, a line of
 labels (each above its X), one of component names, one of units, then one per frame.
@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 
 from ikns.errors import FileError
-from ikns.recording.files.border import (
+from ikns.recording.files.conversion import (
     checked_rate,
     is_unlabeled,
     meters_per,
@@ -91,7 +91,7 @@ def _trajectories(path: Path) -> tuple[list[str], list[tuple[int, str]]]:
 
 
 def _is_title(line: str) -> bool:
-    """Tell whether a line names the next section: words in the first cell, no more."""
+    """Whether a line names the next section: words in the first cell only."""
     first, _, rest = line.partition(",")
     return not rest.strip(" ,\t") and math.isnan(_number(first))
 

@@ -1,8 +1,7 @@
-"""What every marker file must pass before it becomes a recording.
+"""Checks and conversions that all readers of marker files share.
 
-Files speak in millimeters, empty cells and zeros; inside there are meters and NaN. The
-readers share the translation and its refusals here, so a user meets the same sentence
-whatever the format.
+Millimeters become meters; empty cells and zeros become NaN. The error messages are the
+same for every format.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ __all__ = [
     "to_recording",
 ]
 
-#: Meters in one unit, by the spellings that cameras' software writes.
+#: Meters in one unit, by the spellings that camera software writes.
 _METERS = {
     **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre"), 1e-3),
     **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetre"), 1e-2),
@@ -40,13 +39,13 @@ _UNLABELED = re.compile(r"(?:.*:)?(?:uname)?\*\d+", re.IGNORECASE)
 #: Frames per second that a marker system can have.
 _RATES = (0.1, 1e5)
 
-#: Meters. Cameras that see a person fill 2 cm (one hand) to 100 m (a hall). Data in
-#: meters labeled as mm span at most 2 cm of this range up to a volume of 20 m, and data
-#: in mm labeled as meters exceed it from an extent of 10 cm on.
+#: Plausible extent of the markers, m: from one hand (2 cm) to a hall (100 m). Data in
+#: meters labeled as mm are below this range up to a volume of 20 m, and data in mm
+#: labeled as meters exceed it from an extent of 10 cm on.
 _EXTENT = (0.02, 100.0)
 
-#: The extent needs no more frames than these, evenly spaced over the recording.
-_GLANCES = 500
+#: Most frames, evenly spaced over the recording, from which the extent is computed.
+_EXTENT_FRAMES = 500
 
 
 def existing_file(path: Path) -> int:
@@ -96,7 +95,7 @@ def meters_per(path: Path, unit: str) -> float:
 
 
 def checked_rate(path: Path, rate: float) -> float:
-    """Return the frame rate in Hz, or refuse what no camera has."""
+    """Return the frame rate in Hz, or refuse one that no camera has."""
     if not _RATES[0] <= rate <= _RATES[1]:
         raise FileError(
             f"{path}: expected a frame rate between {_RATES[0]:g} and {_RATES[1]:g} "
@@ -106,7 +105,7 @@ def checked_rate(path: Path, rate: float) -> float:
 
 
 def is_unlabeled(label: str) -> bool:
-    """Tell whether the software gave this trajectory a number instead of a name.
+    """Whether the software gave this trajectory a number instead of a name.
 
     Examples
     --------
@@ -134,11 +133,11 @@ def to_recording(
         Seconds.
     markers : (T, M, 3) array
         Meters, changed in place. A point with a missing coordinate becomes NaN, and so
-        does one at exactly zero: that is how many systems write "not seen".
+        does one at exactly zero, as many systems write "not seen".
     labels : sequence of M str
         Names as the file has them.
     unit : str
-        What the file called its unit, for the message when the size is not credible.
+        Unit stated by the file, for the message when the extent is not plausible.
 
     Raises
     ------
@@ -172,12 +171,12 @@ def to_recording(
 
 
 def _check_extent(path: Path, recording: Recording, unit: str) -> None:
-    step = -(-len(recording.time) // _GLANCES)
+    step = -(-len(recording.time) // _EXTENT_FRAMES)
     points = recording.markers[::step].reshape(-1, 3)
     points = points[~np.isnan(points[:, 0])]
     if not len(points):
         return
-    # The central nine tenths: one reflection on a window is not a wrong unit.
+    # The central nine tenths: a single ghost marker does not mean a wrong unit.
     low, high = np.percentile(points, [5, 95], axis=0)
     extent = float((high - low).max())
     # Fewer than three markers say nothing about the size of a body.
