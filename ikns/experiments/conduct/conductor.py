@@ -241,11 +241,12 @@ class Conductor:
 
     def _snapshot(self, now: float) -> dict[str, Any]:
         visit, trial = self._visit, self.experiment.view(now)
+        state, condition = visit.name, visit.condition
         shown = {
             "experiment": self.experiment.name,
-            "state": visit.name,
-            "prompt": prompt(self.experiment, visit.name),
-            "condition": visit.condition,
+            "state": state,
+            "prompt": prompt(self.experiment, state),
+            "condition": condition,
             "message": visit.message,
             "fault": self.log.fault or visit.signal.fault,
             "attempts": self.results[-_LISTED:],
@@ -254,8 +255,8 @@ class Conductor:
             "trial": trial,
         }
         shown |= progress_facts(self.experiment, visit.remaining)
-        shown |= visit.signal.snapshot(visit.condition)
-        if visit.name == "rest":
+        shown |= visit.signal.snapshot(condition)
+        if state == "rest":
             shown["countdown"] = visit.rest_left(now)
         elif trial:
             shown["countdown"] = trial.get("countdown", 0.0)
