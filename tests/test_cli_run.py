@@ -175,7 +175,9 @@ def test_a_source_without_the_labels_is_refused(files, data, tmp_path, capfd):
     assert "expected markers" in check_refused(argv, tmp_path, capfd)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT]
+)
 def test_a_signal_ends_a_run_in_order(files, tmp_path, number):
     session = tmp_path / "session"
     argv = run_argv(files, "--session", str(session), "--json")
@@ -195,7 +197,8 @@ def test_a_signal_ends_a_run_in_order(files, tmp_path, number):
             time.sleep(0.05)
         process.send_signal(number)
         out, err = process.communicate(timeout=60)
-    assert process.returncode == 0, err
+    assert process.returncode == 128 + number, err
+    assert "Traceback" not in err
     result = json.loads(out)
     assert result["transitions"][-1]["reason"] == "asked to stop"
     assert main(["replay", str(session)]) == 0

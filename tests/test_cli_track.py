@@ -109,7 +109,8 @@ def test_the_arm_drives_the_pointer_and_the_finger(
     argv = ["track", str(folder), "--conditions", "ikns", *SHORT, "--align", "0.5"]
     argv += ["--subject", str(files / "person"), "--finger", "sim:"]
     argv += ["--source", f"replay:{files / 'free.c3d'}?loop=yes", "--json"]
-    run(argv, conduct, monkeypatch)
+    code = 128 + signal.SIGINT if how == "signal" else 0
+    run(argv, conduct, monkeypatch, code)
     result = json.loads(capfd.readouterr().out)
     assert result["stopped"] == (how == "emergency")
     visit = read_visit(folder)

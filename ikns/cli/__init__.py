@@ -1,5 +1,44 @@
 """The command line: a thin shell over the package's public names."""
 
-from ikns.cli.app import main
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ikns.endings import (
+    BROKEN_PIPE,
+    flush_output,
+    handle_endings,
+    open_standard_streams,
+    signal_exit_code,
+)
 
 __all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Everything else is imported once signals are handled, so that even Ctrl-C during the
+    imports is an end in order.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments after the program's name; those of the process by default.
+
+    Returns
+    -------
+    int
+        0 on success, 2 on bad input, 128 + the number of the signal that ended the
+        command, 141 when no one reads its output any more; `ikns run` adds 3.
+    """
+    open_standard_streams()
+    with handle_endings(last=argv is None):
+        try:
+            from ikns.cli.app import run_command
+
+            code = run_command(argv)
+        except (KeyboardInterrupt, SystemExit):
+            if not (code := signal_exit_code()):
+                raise
+        return code if flush_output() else code or BROKEN_PIPE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -26,8 +28,9 @@ from ikns.cli.study_report import report
 from ikns.cli.track import track
 from ikns.cli.ucm import ucm
 from ikns.cli.view import view
+from ikns.endings import BROKEN_PIPE, signal_exit_code
 
-__all__ = ["app", "main"]
+__all__ = ["app", "run_command"]
 
 app = typer.Typer(
     name="ikns",
@@ -71,8 +74,8 @@ def _options(
 ) -> None: ...
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command.
+def run_command(argv: Sequence[str] | None = None) -> int:
+    """Run one command; :func:`ikns.cli.main` handles the signals around it.
 
     Parameters
     ----------
@@ -82,7 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 on success, 2 on bad input, 130 when interrupted.
+        Exit code.
     """
     try:
         # Not standalone: typer then raises errors instead of printing several lines.
@@ -98,14 +101,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         message = f"{message.rstrip('.')}; see ikns --help."
     except ikns.IknsError as error:
         message = str(error)
+    except BrokenPipeError:
+        return BROKEN_PIPE
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename}: "
         message = f"{where}{(error.strerror or str(error)).lower()}."
     except typer.Abort:
-        return 130
+        return signal_exit_code() or 128 + signal.SIGINT
     else:
         return code or 0
-    sys.stderr.write(f"ikns: {' '.join(message.split())}\n")
+    # The terminal may be gone.
+    with contextlib.suppress(OSError):
+        sys.stderr.write(f"ikns: {' '.join(message.split())}\n")
     return 2
 
 

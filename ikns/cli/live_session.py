@@ -1,12 +1,10 @@
-"""Session and signals of the commands that drive a finger."""
+"""Session of the commands that drive a finger."""
 
 from __future__ import annotations
 
-import signal
 import sys
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +14,7 @@ import ikns
 if TYPE_CHECKING:
     from ikns.live.session import RunWriter
 
-__all__ = ["live_session", "say", "software", "stopped_by_signals"]
+__all__ = ["live_session", "say", "software"]
 
 
 def software() -> dict[str, str]:
@@ -66,24 +64,7 @@ def live_session(
         yield writer
 
 
-@contextmanager
-def stopped_by_signals() -> Iterator[threading.Event]:
-    """Make Ctrl-C and SIGTERM set an event; a second Ctrl-C interrupts."""
-    stop = threading.Event()
-
-    def ask(number: int, _: object) -> None:
-        if stop.is_set() and number == signal.SIGINT:
-            raise KeyboardInterrupt
-        stop.set()
-
-    before = {n: signal.signal(n, ask) for n in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def say(sentence: str) -> None:
-    """Print a sentence on a new line of stderr."""
-    sys.stderr.write(f"\nikns: {sentence}\n")
+    """Print a sentence on a new line of stderr, if it is still there."""
+    with suppress(OSError):
+        sys.stderr.write(f"\nikns: {sentence}\n")

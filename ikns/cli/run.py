@@ -6,6 +6,7 @@ import dataclasses
 import math
 import shutil
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -14,9 +15,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 import ikns
-from ikns.cli.live_session import live_session, software, stopped_by_signals
+from ikns.cli.live_session import live_session, say, software
 from ikns.cli.options import AsJson, SubjectFolder
 from ikns.cli.output import show, table
+from ikns.cli.stop_notice import STOPPED, stop_line, watch_stops
+from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -98,6 +101,7 @@ def run(
             open_source(source, needs=calibrated.skeleton.marker_set)
         )
         ikns.warm_up()
+        stop = stack.enter_context(stop_on_signals())
         writer = None
         if session is not None:
             configuration = {
@@ -119,8 +123,8 @@ def run(
                     resume=resume,
                 )
             )
-        stop = stack.enter_context(stopped_by_signals())
-        shown = stack.enter_context(_status_line())
+        arm = threading.Event()
+        shown = [stack.enter_context(_status_line(arm))]
         if view:
             from ikns.view.scene import body_view
 
@@ -138,7 +142,8 @@ def run(
             session=writer,
             duration=math.inf if duration is None else duration,
             stop=stop,
-            on_status=_each(shown) if shown else None,
+            arm=arm,
+            on_status=_each(shown),
             status_every=1 / 30 if view else _LINE_EVERY,
             realtime=realtime,
         )
@@ -157,27 +162,40 @@ def run(
         *([f"Wrote {session}"] if session else []),
         as_json=as_json,
     )
+    code = signal_exit_code()
+    if report.stopped and not dry_run:
+        say(stop_line(report.stopped))
+        code = STOPPED
+    if code:
+        raise typer.Exit(code)
 
 
 @contextmanager
-def _status_line() -> Iterator[list[Callable[[LoopStatus], None]]]:
-    """Rewrite one line on stderr if it is a terminal."""
-    if not sys.stderr.isatty():
-        yield []
-        return
-    last = -math.inf
+def _status_line(arm: threading.Event) -> Iterator[Callable[[LoopStatus], None]]:
+    """Rewrite one line on stderr if it is a terminal; say there when it is stopped."""
+    with watch_stops(arm.set) as watch:
+        if not sys.stderr.isatty():
+            yield watch
+            return
+        last = -math.inf
 
-    def write(status: LoopStatus) -> None:
-        nonlocal last
-        if status.time - last >= _LINE_EVERY:
-            last = status.time
-            # A wrapped line could not be rewritten.
-            room = shutil.get_terminal_size().columns - 1
-            sys.stderr.write(f"\r\x1b[K{_line(status)[:room]}")
-            sys.stderr.flush()
+        def write(status: LoopStatus) -> None:
+            nonlocal last
+            watch(status)
+            if status.time - last >= _LINE_EVERY:
+                last = status.time
+                # A wrapped line could not be rewritten.
+                room = shutil.get_terminal_size().columns - 1
+                line = (
+                    stop_line(status.stopped, width=room)
+                    if status.stopped
+                    else _line(status)
+                )
+                sys.stderr.write(f"\r\x1b[K{line[:room]}")
+                sys.stderr.flush()
 
-    yield [write]
-    sys.stderr.write("\n")
+        yield write
+        sys.stderr.write("\n")
 
 
 def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], None]:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ikns.cli.keyboard import keyboard, pressed_keys
 from ikns.cli.options import AsJson
 from ikns.cli.output import json_text
 from ikns.errors import InvalidInput
@@ -32,6 +31,8 @@ _KEYS = {
 }
 #: A port unplugged by key is back after this long, s.
 _UNPLUGGED = 3.0
+#: Wait for a key, and interval of looking for events, s.
+_WAIT = 0.05
 
 
 def servo(
@@ -47,6 +48,13 @@ def servo(
         list[str] | None,
         typer.Option(help="KIND[=VALUE]@START[+DURATION], s; may be repeated."),
     ] = None,
+    answer_delay: Annotated[
+        float,
+        typer.Option(
+            help="Seconds between an instruction and its answer, beyond the time that "
+            "their bytes take on the line."
+        ),
+    ] = 0.0,
     obstacle: Annotated[
         float | None, typer.Option(help="Position that it cannot pass, ticks.")
     ] = None,
@@ -75,8 +83,8 @@ def servo(
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
     with (
         contextlib.suppress(KeyboardInterrupt),  # the usual way to stop it
-        Wire(made, link=link, faults=faults) as wire,
-        _keys() as key,
+        Wire(made, link=link, faults=faults, answer_delay=answer_delay) as wire,
+        pressed_keys() as keys,
     ):
         about = {"port": wire.port, "model": model, "id": id, "baud": baud}
         if as_json:
@@ -86,13 +94,13 @@ def servo(
                 f"{wire.port}: simulated {model}, id {id}, {baud} baud; try "
                 f"--finger 'dynamixel:{wire.port}?id={id}&baud={baud}&model={model}'\n"
             )
-            if sys.stdin.isatty():
+            if keyboard():
                 letters = ", ".join(f"{k} {v}" for k, v in _KEYS.items())
                 sys.stdout.write(f"Keys: {letters}, r repair, q quit\n")
         sys.stdout.flush()
         seen = 0
         while duration is None or wire.elapsed < duration:
-            pressed = key()
+            pressed = keys(_WAIT)[:1]
             if pressed == "q":
                 break
             if pressed == "r":
@@ -106,31 +114,3 @@ def servo(
                 sys.stderr.write(f"{at - (time.monotonic() - wire.elapsed):8.2f} s  ")
                 sys.stderr.write(f"{text} at {made.motor.position:.0f}\n")
             seen = len(events)
-
-
-@contextlib.contextmanager
-def _keys() -> Iterator[Callable[[], str]]:
-    """Yield a function that waits 0.05 s for a key; without a keyboard none comes."""
-    if not sys.stdin.isatty():
-
-        def no_key() -> str:
-            time.sleep(0.05)
-            return ""
-
-        yield no_key
-        return
-    import termios
-    import tty
-
-    number = sys.stdin.fileno()
-    before = termios.tcgetattr(number)
-
-    def key() -> str:
-        ready = select.select([number], [], [], 0.05)[0]
-        return sys.stdin.read(1) if ready else ""
-
-    try:
-        tty.setcbreak(number)
-        yield key
-    finally:
-        termios.tcsetattr(number, termios.TCSADRAIN, before)

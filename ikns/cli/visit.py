@@ -11,9 +11,12 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 import ikns
-from ikns.cli.live_session import software, stopped_by_signals
+from ikns.cli.live_session import software
 from ikns.cli.output import show, table
+from ikns.cli.stop_notice import watch_stops
 from ikns.cli.visit_drivers import (
     PAGE,
     ArmOptions,
@@ -26,6 +29,7 @@ from ikns.cli.visit_drivers import (
     open_arm_source,
 )
 from ikns.cli.visit_identity import VisitIdentity
+from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -71,12 +75,18 @@ def conduct(
     as_json : bool
     """
     from ikns.experiments.cockpit import Cockpit
-    from ikns.experiments.conduct import Conductor, HeldInput, VisitLog, run_visit
+    from ikns.experiments.conduct import (
+        Command,
+        Conductor,
+        HeldInput,
+        VisitLog,
+        run_visit,
+    )
 
     subject, simulated = _checked(identity, arm, pages, conditions)
     session = arm.session or identity.folder / "session"
     with ExitStack() as stack:
-        stop = stack.enter_context(stopped_by_signals())
+        stop = stack.enter_context(stop_on_signals())
         if subject is not None:
             # A source that does not answer is reported before anything is written.
             with open_arm_source(arm, subject):
@@ -114,7 +124,14 @@ def conduct(
             )
         address = ""
         if subject is not None:
-            shown: list[Callable[[LoopStatus], None]] = []
+            shown = [
+                stack.enter_context(
+                    watch_stops(
+                        lambda: conductor.submit(Command("arm")),
+                        how="; the panel can arm it again",
+                    )
+                )
+            ]
             if arm.view:
                 address = _open_view(stack, subject, shown, simulated=simulated)
             drivers["ikns"] = lambda: arm_driver(
@@ -143,6 +160,8 @@ def conduct(
         _announce(cockpit.url, cockpit.panel_url, browser=pages.browser)
         run_visit(conductor, drivers, stop=stop, rate=pages.rate)
     _show_attempts(identity, conductor, as_json=as_json)
+    if code := signal_exit_code():
+        raise typer.Exit(code)
 
 
 def _checked(

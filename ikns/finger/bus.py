@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import termios
 import time
 from typing import Any
 
@@ -53,6 +54,7 @@ class Bus:
         self.tries = 1
         self._bits = 0
         self._port: Any = None
+        self._settings: list[Any] = []
 
     def open(self) -> None:
         """Open the port for this program alone.
@@ -71,13 +73,31 @@ class Bus:
         port.baudrate = self.baud
         try:
             port.openPort()
-            port.ser.write_timeout = 0.1
-            port.ser.exclusive = True
+            self._settings = termios.tcgetattr(port.ser.fileno())
         except port_errors() as error:
             if port.is_open:
                 port.closePort()
-            raise FingerError(f"{self.port}: {port_error_text(error)}.") from None
+            raise FingerError(self._lost(error)) from None
         self._port = port
+
+    def restore_settings(self) -> bool:
+        """Undo what another program changed of rate and format; return whether it had.
+
+        Raises
+        ------
+        PortLost
+        """
+        if self._port is None:
+            raise PortLost(f"{self.port}: the port is closed.")
+        serial = self._port.ser
+        try:
+            if termios.tcgetattr(serial.fileno()) == self._settings:
+                return False
+            serial.baudrate = self.baud  # sets everything else as well
+            self._settings = termios.tcgetattr(serial.fileno())
+        except port_errors() as error:
+            raise PortLost(self._lost(error)) from None
+        return True
 
     def close(self) -> None:
         """Close the port; harmless when repeated."""
@@ -165,11 +185,14 @@ class Bus:
             bits = self._bits
         return alert_text(bits, self.model.protocol) if bits else ""
 
+    def _lost(self, error: Exception) -> str:
+        return f"{self.port}: {port_error_text(error, self.port)}."
+
     def _responds(self, number: int) -> bool:
         try:
             _, result, _ = self._packets.ping(self._port, number)
         except port_errors() as error:
-            raise PortLost(f"{self.port}: {port_error_text(error)}.") from None
+            raise PortLost(self._lost(error)) from None
         except IndexError:  # raised by the SDK when a response is too short
             self._port.is_using = False
             return False
@@ -227,7 +250,7 @@ class Bus:
             self._port.is_using = False
             if "timeout" in type(lost).__name__.lower():  # of pyserial, for a write
                 raise no_response from None
-            raise PortLost(f"{self.port}: {port_error_text(lost)}.") from None
+            raise PortLost(self._lost(lost)) from None
         except IndexError:  # raised by the SDK when a response is too short
             self._port.is_using = False
             raise no_response from None

@@ -12,14 +12,15 @@ from ikns.finger.configuration import RESPOND_TO_ALL, ServoConfiguration
 from ikns.finger.errors import FingerError, NoResponse, PortLost, Rejected
 from ikns.finger.guard import Guard
 from ikns.finger.state import FingerState
+from ikns.finger.torque import LOST, Torque
 
 __all__ = ["Drive"]
 
-#: Unit of the bus watchdog's register, s.
-_WATCHDOG_UNIT = 0.02
-#: Seconds between checks that torque is still on, and between attempts to reopen the
+#: Seconds between readings of torque and settings, and between attempts to reopen the
 #: port.
 _CHECK_INTERVAL, _REOPEN_INTERVAL = 0.1, 0.2
+#: Torque that should be off and was not read to be off for so long is reported, s.
+_CONFIRM_TIMEOUT = 1.0
 #: Where a read of the state starts, by protocol; see `Drive._measure`.
 _FIRST_REGISTERS = {
     2: ("moving", "realtime_tick", "goal_position", "profile_velocity"),
@@ -45,6 +46,9 @@ class Drive:
         Latest measurement.
     alert : str
         Hardware alert of the servo; the guard's reason takes precedence.
+    unconfirmed : str
+        What to do about torque that should be off and was not read to be off in time;
+        empty otherwise.
     """
 
     def __init__(
@@ -56,12 +60,13 @@ class Drive:
     ) -> None:
         self._bus, self._configuration = bus, configuration
         self._guard, self._lock = guard, lock
+        self._torque = Torque(bus, configuration)
         self.known = FingerState()
-        self.alert = ""
-        self._torque = False  # as far as known
+        self.alert = self.unconfirmed = ""
         self._sent: int | None = None
         self._first_register = 0
-        self._responded = self._checked = self._reopened = -math.inf
+        self._responded = self._reopened = -math.inf
+        self._unwanted_since = math.inf
 
     def set_up(self) -> None:
         """Write the limits, with torque off, and only where they differ."""
@@ -75,9 +80,7 @@ class Drive:
                 f"{bus.port}: servo {bus.id} reports {alert}; let it rest and "
                 "switch its power off and on."
             )
-        self._write_torque_off()
-        if "bus_watchdog" in model:
-            bus.write("bus_watchdog", 0)
+        self._torque.switch_off()
         for values in (
             configuration.eeprom_registers(model),
             configuration.ram_registers(model),
@@ -92,32 +95,40 @@ class Drive:
 
     def arm(self) -> None:
         """Switch torque on, with the present position as the goal."""
-        bus = self._bus
         values = self._measure()
         with self._lock:
             self._guard.start(time.monotonic(), values.flexion)
             self.alert = ""
-        self._torque_on()
-        bus.read("torque_enable")
+        self._switch_on()
+        if not self._torque.ready:
+            raise FingerError(
+                f"{self._bus.port}: servo {self._bus.id} does not switch its torque on."
+            )
 
     def cycle(self) -> None:
         """Write the goal and read the state once; the guard handles any failure."""
-        now = time.monotonic()
         with self._lock:
-            self._guard.tick(now)
-            torque, goal = self._guard.torque, self._guard.goal
+            self._guard.tick(time.monotonic())
         try:
-            self._write_goal(torque, goal)
+            if self._bus.restore_settings():
+                self._fail("another program changed the settings of the port")
+            with self._lock:
+                torque, goal = self._guard.torque, self._guard.goal
+            if torque:
+                self._follow(goal)
+            else:
+                self._keep_off()
             self._read_state()
         except PortLost as error:
             self._fail(str(error))
             self._reopen()
         except NoResponse:
-            if time.monotonic() - self._responded > self._guard.safety.silence_timeout:
-                timeout = self._guard.safety.silence_timeout
+            timeout = self._guard.safety.silence_timeout
+            if time.monotonic() - self._responded > timeout:
                 self._fail(f"no answer from the servo for {timeout:g} s")
         except FingerError as error:
             self._fail(str(error))
+        self._report_torque()
 
     def release(self, timeout: float) -> bool:
         """Switch torque off; return whether the servo confirmed it within `timeout`."""
@@ -126,7 +137,7 @@ class Drive:
         give_up = time.monotonic() + timeout
         while True:
             try:
-                self._torque_off()
+                self._torque.switch_off()
             except PortLost:
                 self._reopen()
                 time.sleep(0.01)
@@ -135,81 +146,70 @@ class Drive:
             else:
                 return True
             if time.monotonic() > give_up:
-                return False
+                return self._torque.on is False
 
-    def _write_goal(self, torque: bool, goal: float) -> None:
-        if not torque:
-            if self._torque:
-                self._torque_off()
-            return
-        if not self._torque:  # it was unreachable, or its watchdog stopped it
+    def _follow(self, goal: float) -> None:
+        """Send a goal, to a servo that is as it was set."""
+        torque = self._torque
+        if not torque.ready:  # it was unreachable, or its watchdog stopped it
             values = self._measure()
             with self._lock:
                 self._guard.hold_at(time.monotonic(), values.flexion)
-            self._torque_on()
+            self._switch_on()
             return
+        if time.monotonic() - torque.checked > _CHECK_INTERVAL:
+            self._check()
         ticks = self._configuration.ticks(goal)
-        if ticks != self._sent:
-            self._send_goal(ticks)
-
-    def _send_goal(self, ticks: int) -> None:
+        if not torque.ready or ticks == self._sent:
+            return
         try:
             self._bus.write("goal_position", ticks)
         except Rejected:
-            if not self._watchdog_tripped():
+            self._check()
+            if torque.ready:
                 raise
-            self._torque = False  # it stands still; the next cycle restarts it there
-            self._fail(
-                f"the servo received nothing for {self._configuration.watchdog:g} s"
-            )
-            return
-        self._sent = ticks
+        else:
+            self._sent = ticks
 
-    def _watchdog_tripped(self) -> bool:
-        return (
-            "bus_watchdog" in self._bus.model and self._bus.read("bus_watchdog") == -1
-        )
+    def _keep_off(self) -> None:
+        """Switch torque off until that is confirmed, and whenever it is on again."""
+        torque = self._torque
+        if torque.on is False:
+            if time.monotonic() - torque.checked <= _CHECK_INTERVAL:
+                return
+            torque.read()
+        if torque.on is not False:
+            torque.switch_off()
 
-    def _torque_on(self) -> None:
-        """Switch torque on, only with a fresh goal and the watchdog's error cleared."""
-        bus = self._bus
+    def _switch_on(self) -> None:
         with self._lock:
             goal = self._guard.goal
         if math.isnan(goal):
             return
-        watchdog = "bus_watchdog" in bus.model
-        self._torque_off()
-        for name, value in self._configuration.ram_registers(bus.model).items():
-            bus.write(name, value)
-        # A goal alone switches the torque of an AX-12 on, so it comes last but one.
-        self._torque = True
         self._sent = self._configuration.ticks(goal)
-        bus.write("goal_position", self._sent)
-        bus.write("torque_enable", 1)
-        if watchdog:
-            steps = math.ceil(self._configuration.watchdog / _WATCHDOG_UNIT)
-            bus.write("bus_watchdog", steps)
+        self._fail_check(self._torque.switch_on(self._sent))
 
-    def _torque_off(self) -> None:
-        """Switch torque off and clear the watchdog's error."""
-        bus = self._bus
-        self._write_torque_off()
-        self._torque, self._sent = False, None
-        if "bus_watchdog" in bus.model:
-            bus.write("bus_watchdog", 0)
+    def _check(self) -> None:
+        self._fail_check(self._torque.check())
 
-    def _write_torque_off(self) -> None:
-        """Switch torque off and read back that it is off.
+    def _fail_check(self, wrong: str) -> None:
+        if wrong:
+            with self._lock:
+                self._guard.fail(wrong, limp=wrong == LOST)
 
-        Responses carry no number, so a late one may be taken for the next. The LED is
-        read too only to give this response a length that no other response has.
-        """
-        bus = self._bus
-        bus.write("torque_enable", 0)
-        if bus.read_many("torque_enable", "led")["torque_enable"]:
-            raise FingerError(
-                f"{bus.port}: servo {bus.id} does not switch its torque off."
-            )
+    def _report_torque(self) -> None:
+        """Say so when torque that should be off is not confirmed to be off in time."""
+        now = time.monotonic()
+        with self._lock:
+            if self._guard.torque or self._torque.on is False:
+                self._unwanted_since, self.unconfirmed = math.inf, ""
+                return
+            self._unwanted_since = min(self._unwanted_since, now)
+            if now - self._unwanted_since > _CONFIRM_TIMEOUT:
+                self.unconfirmed = (
+                    f"servo {self._bus.id} has not confirmed that its torque is off, "
+                    "cut its power"
+                )
 
     def _read_state(self) -> None:
         values = self._measure()
@@ -221,20 +221,6 @@ class Drive:
             with self._lock:
                 self.alert = alert
                 self._guard.fail(f"the servo reports {alert}", limp=True)
-        if self._torque and now - self._checked > _CHECK_INTERVAL:
-            self._checked = now
-            # An AX-12 that rebooted switches torque on with the next goal, but has lost
-            # its speed limit.
-            name = "profile_velocity"
-            speed = self._configuration.ram_registers(self._bus.model)[name]
-            if not self._bus.read("torque_enable") or self._bus.read(name) != speed:
-                with self._lock:
-                    self._guard.fail("the servo has lost its torque", limp=True)
-            elif self._watchdog_tripped():
-                self._torque = False
-                self._fail(
-                    f"the servo received nothing for {self._configuration.watchdog:g} s"
-                )
 
     def _measure(self) -> FingerState:
         """Read all measurements in one instruction.
@@ -274,7 +260,7 @@ class Drive:
             self._guard.fail(reason.rstrip("."))
 
     def _reopen(self) -> None:
-        """Reopen the port once it is back; torque is then switched on again."""
+        """Reopen the port once it is back; the next cycle goes on from there."""
         now = time.monotonic()
         if now - self._reopened < _REOPEN_INTERVAL:
             return

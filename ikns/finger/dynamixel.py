@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 from typing import Self
 
+from ikns.endings import ending_requested
 from ikns.errors import InvalidInput
 from ikns.finger.bus import Bus
 from ikns.finger.configuration import ServoConfiguration
@@ -114,9 +115,12 @@ class DynamixelFinger:
         self._lock = threading.RLock()
         self._guard = Guard(self.safety)
         self._drive = Drive(self._bus, self._configuration, self._guard, self._lock)
+        self._access = threading.Lock()  # held while connecting or relaxing
         self._thread: threading.Thread | None = None
-        self._connected = False
+        self._attempt: _Attempt | None = None
         self._stop = threading.Event()
+        self._torque_owed = False  # torque may be on since an earlier connection
+        self._confirmed = True
 
     def connect(self) -> None:
         """Connect and follow commands from the present position; leave the safe state.
@@ -128,33 +132,20 @@ class DynamixelFinger:
         ------
         FingerError
             When the port is missing or busy, or the servo does not respond, is another
-            model, or reports an alert.
+            model, or reports an alert. If it was connected before, it goes on switching
+            the torque off until :meth:`relax`.
         """
-        self._stop_thread()
-        with self._lock:
-            self._guard.relax()
-        self._bus.close()
-        self._bus.open()
-        self._bus.tries = _TRIES  # nothing is time-critical yet
-        checked = False
-        try:
-            self._bus.check()  # another servo stays untouched
-            checked = self._connected = True
+        with self._access:
+            attempt = _Attempt()
             relax_at_exit(self)
-            self._drive.set_up()
-            self._drive.arm()
-        except BaseException:
-            if checked:
-                self._release()
-            self._bus.close()
-            raise
-        finally:
-            self._bus.tries = 1
-        self._stop.clear()
-        self._thread = threading.Thread(
-            target=self._run, daemon=True, name=f"finger on {self._bus.port}"
-        )
-        self._thread.start()
+            try:
+                self._begin(attempt)
+                attempt.done.wait()
+            except BaseException:  # such as Ctrl-C: the thread relaxes and ends
+                self._stop.set()
+                raise
+            if attempt.error is not None:
+                raise attempt.error
 
     def command(self, flexion: float) -> float:
         """Request a flexion; return the one sent, NaN if none is."""
@@ -167,13 +158,14 @@ class DynamixelFinger:
         """Return the latest known state."""
         with self._lock:
             known, guard = self._drive.known, self._guard
+            alert = guard.reason or self._drive.alert
             return replace(
                 known,
                 age=time.monotonic() - known.time,
                 mode=guard.mode,
                 sent=self._configuration.sent(guard.goal),
                 stalled=guard.stalled,
-                alert=guard.reason or self._drive.alert,
+                alert="; ".join(filter(None, (alert, self._drive.unconfirmed))),
             )
 
     def make_safe(self, reason: str) -> None:
@@ -184,16 +176,24 @@ class DynamixelFinger:
     def relax(self) -> None:
         """Switch the torque off, read back that it is off, and close the port.
 
+        The finger's own thread does so, whatever interrupts this call.
+
         Raises
         ------
         FingerError
             When the servo does not confirm that its torque is off; the port is closed
             even then.
         """
-        if not self._connected:
-            return
-        self._stop_thread()
-        if not self._release():
+        self._stop.set()
+        with self._access:
+            thread = self._thread
+            if thread is None:
+                return
+            self._stop.set()
+            thread.join()
+            self._thread = None
+            confirmed, self._confirmed = self._confirmed, True
+        if not confirmed:
             watchdog = "bus_watchdog" in self._model
             raise FingerError(
                 f"{self._bus.port}: servo {self._bus.id} did not confirm that its "
@@ -215,29 +215,81 @@ class DynamixelFinger:
                 raise
             exception[1].add_note(str(error))
 
-    def _release(self) -> bool:
-        """Switch torque off and close the port; repeated at exit if interrupted."""
-        confirmed = self._drive.release(_RELAX_TIMEOUT)
-        self._bus.close()
-        self._connected = False
-        forget(self)
-        return confirmed
-
-    def _stop_thread(self) -> None:
-        """Stop the thread, so that the caller may use the bus."""
+    def _begin(self, attempt: _Attempt) -> None:
+        """Hand an attempt to connect to the thread that owns the bus."""
         thread = self._thread
-        if thread is not None:
-            self._stop.set()
+        if thread is not None and self._stop.is_set():  # an interrupted relaxing
             thread.join()
-            self._thread = None
+            thread = None
+        self._stop.clear()
+        self._attempt = attempt
+        if thread is None or not thread.is_alive():
+            self._thread = threading.Thread(
+                target=self._run, daemon=True, name=f"finger on {self._bus.port}"
+            )
+            self._thread.start()
 
     def _run(self) -> None:
+        """Own the bus from connecting until the torque is off, whatever happens."""
         due = time.monotonic()
-        try:
-            while not self._stop.is_set():
+        while not self._stop.is_set():
+            attempt, self._attempt = self._attempt, None
+            if ending_requested():
+                with self._lock:
+                    self._guard.relax()
+            if attempt is not None and not self._open(attempt):
+                break
+            try:
                 self._drive.cycle()
-                due = max(due + self._period, time.monotonic())
-                self._stop.wait(max(due - time.monotonic(), 0.0))
-        except BaseException as error:  # the servo's watchdog then stops the motor
-            self.make_safe(f"talking to the servo ended with {error!r}")
-            raise
+            except Exception as error:  # whatever it is, the safe state needs this
+                self.make_safe(f"talking to the servo failed with {error!r}")
+            due = max(due + self._period, time.monotonic())
+            self._stop.wait(max(due - time.monotonic(), 0.0))
+        else:
+            self._close()
+        if (late := self._attempt) is not None:  # it was to relax before it connected
+            late.error = FingerError(f"{self._bus.port}: connecting was given up.")
+            late.done.set()
+
+    def _open(self, attempt: _Attempt) -> bool:
+        """Connect, on the thread; return whether the bus is still needed."""
+        connected_before = self._torque_owed
+        with self._lock:
+            self._guard.relax()
+        self._bus.close()
+        try:
+            self._bus.open()
+            self._bus.tries = _TRIES  # nothing is time-critical yet
+            self._bus.check()  # another servo stays untouched
+            self._torque_owed = True
+            self._drive.set_up()
+            if self._stop.is_set() or ending_requested():
+                raise FingerError(f"{self._bus.port}: connecting was given up.")
+            self._drive.arm()
+        except BaseException as error:  # the caller's
+            with self._lock:
+                self._guard.relax()
+            attempt.error = error
+        finally:
+            self._bus.tries = 1
+        needed = connected_before or attempt.error is None
+        if not needed:
+            self._close()
+        attempt.done.set()
+        return needed
+
+    def _close(self) -> None:
+        """Switch torque off, where it was ever on, and close the port."""
+        if self._torque_owed:
+            self._confirmed = self._drive.release(_RELAX_TIMEOUT)
+        self._torque_owed = False
+        self._bus.close()
+        forget(self)
+
+
+class _Attempt:
+    """An attempt to connect, made by the finger's thread for a caller that waits."""
+
+    def __init__(self) -> None:
+        self.done = threading.Event()
+        self.error: BaseException | None = None

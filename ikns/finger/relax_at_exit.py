@@ -1,65 +1,84 @@
-"""Switch the torque of every finger off when the program ends, however it ends.
+"""Keep track of the connected fingers, so that no end of a program forgets one.
 
-An exception and Ctrl-C leave through ``with`` or ``atexit``. SIGTERM and SIGHUP (the
-terminal was closed) would end Python at once, so they become an ordinary exit, unless
-the program handles them itself. Nothing runs after SIGKILL or a power cut: then only
-the servo's own watchdog stops it.
+An exception and Ctrl-C leave through ``with`` or ``atexit``, and so do the signals that
+:func:`ikns.endings.exit_on_signals` turns into an exit. An exception that ends a thread
+makes every finger safe, as that thread may be the one that commanded it.
+
+Python allows signal handlers in the main thread only. A program that connects a finger
+in another one has to call :func:`ikns.endings.exit_on_signals` in its main thread
+before; the command line handles signals from its first line on.
 """
 
 from __future__ import annotations
 
 import atexit
+import contextlib
+import os
 import signal
 import sys
 import threading
-from types import FrameType
+from collections.abc import Callable
 from typing import Protocol
+
+from ikns.endings import exit_on_signals
 
 __all__ = ["forget", "relax_at_exit"]
 
 
-class _Relaxes(Protocol):
+class _Connected(Protocol):
+    def make_safe(self, reason: str) -> None: ...
+
     def relax(self) -> None: ...
 
 
-_connected: list[_Relaxes] = []
+_connected: list[_Connected] = []
 _lock = threading.Lock()
+_hook_before: Callable[[threading.ExceptHookArgs], object] = threading.excepthook
 
 
-def relax_at_exit(finger: _Relaxes) -> None:
+def relax_at_exit(finger: _Connected) -> None:
     """Relax a finger when the program ends, however it ends."""
+    global _hook_before
     with _lock:
         if not any(other is finger for other in _connected):
             _connected.append(finger)
+        if threading.excepthook is not _make_all_safe:
+            _hook_before = threading.excepthook
+            threading.excepthook = _make_all_safe
     atexit.unregister(_relax_all)  # registered last, it runs first
     atexit.register(_relax_all)
-    if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) is signal.SIG_DFL:
-                signal.signal(number, _exit)
+    exit_on_signals()
 
 
-def forget(finger: _Relaxes) -> None:
+def forget(finger: _Connected) -> None:
     """Undo :func:`relax_at_exit`, for a finger that is relaxed already."""
     with _lock:
         _connected[:] = [other for other in _connected if other is not finger]
+        if not _connected and threading.excepthook is _make_all_safe:
+            threading.excepthook = _hook_before
 
 
-def _exit(number: int, frame: FrameType | None) -> None:
-    # Relax during the exit, not here: the signal may have come while a lock was held
-    # that relaxing needs.
-    sys.exit(128 + number)
+def _make_all_safe(about: threading.ExceptHookArgs) -> None:
+    """Make every finger safe after an exception has ended a thread."""
+    name = "a thread" if about.thread is None else f"the thread '{about.thread.name}'"
+    for finger in tuple(_connected):
+        finger.make_safe(f"an exception ended {name}")
+    _hook_before(about)
 
 
 def _relax_all() -> None:
     if threading.current_thread() is threading.main_thread():
-        signal.signal(
-            signal.SIGINT, signal.SIG_IGN
-        )  # a second Ctrl-C must not stop this
+        # What ends the program must not stop this too; each finger has its deadline.
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+            signal.signal(number, signal.SIG_IGN)
     for finger in tuple(_connected):
         try:
             finger.relax()
-        except (
-            Exception
-        ) as error:  # a failure must not leave other fingers under torque
-            sys.stderr.write(f"ikns: {error}\n")
+        # A failure must not leave other fingers under torque.
+        except Exception as error:
+            with contextlib.suppress(OSError):  # the terminal may be gone
+                sys.stderr.write(f"ikns: {error}\n")
+
+
+# A forked child must not write to the port of its parent.
+os.register_at_fork(after_in_child=_connected.clear)

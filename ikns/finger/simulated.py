@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Callable
 from typing import Self
@@ -84,6 +85,7 @@ class SimulatedFinger:
         self._flexion, self._velocity, self._effort = flexion, 0.0, 0.0
         self._now = clock()
         self._connected = False
+        self._lock = threading.Lock()
 
     @property
     def object_width(self) -> float | None:
@@ -157,20 +159,21 @@ class SimulatedFinger:
 
     def _advance(self) -> None:
         """Advance to the clock's time, in steps of a millisecond."""
-        now = self._clock()
-        if now < self._now:
-            raise FingerError("the clock of a simulated finger went backwards.")
-        while (left := now - self._now) > 0:
-            if self._at_rest() and left > _STEP:
-                # Nothing moves before the guard's next timeout.
-                step = min(left, 0.01)
-                self._now = now if left <= step else self._now + step
-            else:
-                step = min(left, _STEP)
-                self._now = now if left <= step else self._now + step
-                self._move(step)
-            self._guard.tick(self._now)
-            self._guard.measured(self._now, self._flexion)
+        with self._lock:  # any thread may make it safe
+            now = self._clock()
+            if now < self._now:
+                raise FingerError("the clock of a simulated finger went backwards.")
+            while (left := now - self._now) > 0:
+                if self._at_rest() and left > _STEP:
+                    # Nothing moves before the guard's next timeout.
+                    step = min(left, 0.01)
+                    self._now = now if left <= step else self._now + step
+                else:
+                    step = min(left, _STEP)
+                    self._now = now if left <= step else self._now + step
+                    self._move(step)
+                self._guard.tick(self._now)
+                self._guard.measured(self._now, self._flexion)
 
     def _at_rest(self) -> bool:
         goal = self._guard.goal

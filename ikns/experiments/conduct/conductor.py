@@ -53,6 +53,8 @@ class Conductor:
         Set at once by an emergency stop, in any thread; it stays set.
     on_emergency : list of callable
         Called by an emergency stop, in the thread that submits it.
+    on_arm : list of callable
+        Called when the experimenter arms the finger again.
 
     Examples
     --------
@@ -85,6 +87,7 @@ class Conductor:
         self.experiment, self.log = experiment, log
         self.emergency = Event()
         self.on_emergency: list[Callable[[], None]] = []
+        self.on_arm: list[Callable[[], None]] = []
         self.plan: dict[str, Any] = {"version": 0}
         self.curve: dict[str, Any] = {"version": 0}
         self.shown: dict[str, Any] = {}
@@ -212,6 +215,9 @@ class Conductor:
             self._reconnect = True
         elif visit.stopped:
             raise InvalidInput("the run was stopped; end it and start it again.")
+        elif name == "arm":
+            for call in self.on_arm:
+                call()
         elif name in self.experiment.commands:
             self.experiment.execute(name, text, now)
         elif name == "begin":

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple, Protocol
 __all__ = ["COMMANDS", "Command", "Experiment"]
 
 #: Commands of every experiment. The server itself sends ``page_connected`` and
-#: ``page_disconnected``; ``connect`` opens the source of the signal again.
+#: ``page_disconnected``; ``connect`` opens the source of the signal again; ``arm`` lets
+#: a finger follow again that is in its safe state.
 COMMANDS = frozenset(
-    "begin abort skip repeat rest pause connect emergency end".split()
+    "begin abort skip repeat rest pause connect arm emergency end".split()
 ) | {"page_connected", "page_disconnected"}
 
 

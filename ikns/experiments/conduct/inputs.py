@@ -87,6 +87,9 @@ class Driver(Protocol):
     def halt(self) -> None:
         """Stop all motion at once; called from any thread."""
 
+    def arm(self) -> None:
+        """Let a finger that is in its safe state follow again; from any thread."""
+
     def log_event(self, name: str, text: str, now: float) -> None:
         """Record an event, if it keeps a recording of its own."""
 
@@ -156,6 +159,9 @@ class HeldInput:
     def halt(self) -> None:
         """Do nothing: nothing moves here."""
 
+    def arm(self) -> None:
+        """Do nothing: nothing moves here."""
+
     def log_event(self, name: str, text: str, now: float) -> None:
         """Start measuring round trips anew with each trial; record nothing."""
         if name == "trial begins":
@@ -212,6 +218,9 @@ class VirtualInput:
         return {"kind": "virtual"}
 
     def halt(self) -> None:
+        """Do nothing: nothing moves here."""
+
+    def arm(self) -> None:
         """Do nothing: nothing moves here."""
 
     def log_event(self, name: str, text: str, now: float) -> None:

@@ -67,7 +67,7 @@ class LiveDriver:
         self._start = math.nan
         self._events: list[tuple[str, str, float]] = []
         self._rate, self._counted_at, self._frames = math.nan, math.nan, 0
-        self._stop = threading.Event()
+        self._stop, self._arm = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
 
     def begin(
@@ -89,6 +89,7 @@ class LiveDriver:
                     settings=settings,
                     session=self._writer,
                     stop=self._stop,
+                    arm=self._arm,
                     on_status=self._take_status,
                     status_every=_STATUS_EVERY,
                     on_decision=self._take_decision,
@@ -117,6 +118,10 @@ class LiveDriver:
         """Stop the loop at its next cycle, within 20 ms."""
         self._stop.set()
 
+    def arm(self) -> None:
+        """Arm a finger again that is in its safe state."""
+        self._arm.set()
+
     def take(self, now: float) -> list[Sample]:
         """Return the samples since the last call, at the times of receipt."""
         return self._samples.take(now)
@@ -130,6 +135,7 @@ class LiveDriver:
             "kind": "ikns",
             "state": status.state,
             "finger": self._finger_state,
+            "stopped": status.stopped,
             "flexion": status.flexion,
             "measured": status.measured,
             "rate": self._rate,

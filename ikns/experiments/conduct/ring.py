@@ -53,6 +53,9 @@ class RingDriver:
         """Stop within one period."""
         self._stop.set()
 
+    def arm(self) -> None:
+        """Do nothing: once the finger is safe this has ended, and is connected anew."""
+
     def take(self, now: float) -> list[Sample]:
         """Return the commands to the finger since the last call."""
         return self._samples.take(now)

@@ -57,6 +57,7 @@ def run_visit(
             due = max(due + 1 / rate, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
     finally:
+        source.halt()  # nothing moves while files are written
         try:
             conductor.close(time.monotonic())
         finally:
@@ -94,10 +95,15 @@ class _CurrentSource:
         conductor.set_source_status(status, fault=self._fault)
         conductor.update(time.monotonic())
 
+    def halt(self) -> None:
+        """Stop all motion at once."""
+        if self._driver is not None:
+            self._driver.halt()
+
     def close(self) -> None:
         """Close the source."""
         context, self._context, self._driver = self._context, None, None
-        self._conductor.on_emergency = []
+        self._conductor.on_emergency = self._conductor.on_arm = []
         self._conductor.set_event_listener(None)
         if context is not None:
             context.__exit__(None, None, None)
@@ -111,6 +117,7 @@ class _CurrentSource:
             self._driver = context.__enter__()
             self._context = context
             self._conductor.on_emergency = [self._driver.halt]
+            self._conductor.on_arm = [self._driver.arm]
             self._conductor.set_event_listener(self._driver.log_event)
         except (IknsError, OSError) as error:
             self._fault = str(error)

@@ -43,6 +43,9 @@ class Wire:
         A symbolic link to the pseudo-terminal, for a name that does not change.
     faults : sequence of Fault
         Their start times count from now.
+    answer_delay : float
+        Between an instruction and its response, s, beyond the servo's own return delay
+        and the time of their bytes on the line.
 
     Attributes
     ----------
@@ -66,11 +69,17 @@ class Wire:
         *servos: Servo,
         link: str | Path | None = None,
         faults: tuple[Fault, ...] | list[Fault] = (),
+        answer_delay: float = 0.0,
     ) -> None:
+        if not 0 <= answer_delay < math.inf:
+            raise InvalidInput(
+                f"the answer delay must be a number of seconds, not {answer_delay:g}."
+            )
         self.servos = servos
         self._link = None if link is None else Path(link)
         if self._link is not None and self._link.exists():
             raise InvalidInput(f"{self._link}: exists already; choose another link.")
+        self._answer_delay = answer_delay
         self._start = time.monotonic()
         self._lock = threading.RLock()
         self._faults = list(faults)
@@ -209,7 +218,8 @@ class Wire:
             if abs(speed - servo.baud) > _BAUD_TOLERANCE * servo.baud:
                 continue  # framing errors: it receives nothing
             for reply in servo.receive(data):
-                late = 0.0 if delay is None else delay.value or 0.05
+                late = self._answer_delay
+                late += 0.0 if delay is None else delay.value or 0.05
                 self._due.append((reply.due + late, reply.data))
 
     def _send(self) -> None:

@@ -1,12 +1,12 @@
 """When the finger may move: a state machine that gives a reason for every transition.
 
-    disarmed -> armed -> active <-> holding -> safe -> disarmed
+    disarmed -> armed -> active <-> holding -> safe -> armed or disarmed
 
 The finger follows the signal only in ``active``. Without valid poses the machine goes
 from ``active`` to ``holding`` (the finger stays where it is) and then to ``safe`` (the
 chosen safe state: hold, open or limp); when poses return, it goes from ``holding`` back
-to ``active``. A stop leads to ``safe`` from any state but ``disarmed``. ``safe`` can
-only be left by disarming: someone has to check and arm again.
+to ``active``. A stop leads to ``safe`` from any state but ``disarmed``. ``safe`` is
+never left by itself: someone has to check, and arm again or disarm.
 """
 
 from __future__ import annotations
@@ -81,6 +81,10 @@ class SafetyMachine:
     def arm(self, now: float, reason: str = "asked to arm") -> Changes:
         """Allow the finger to become active."""
         return self._go(now, "armed", reason) if self.state == "disarmed" else ()
+
+    def arm_again(self, now: float, reason: str = "asked to arm again") -> Changes:
+        """Leave the safe state, because someone asked for it."""
+        return self._go(now, "armed", reason) if self.state == "safe" else ()
 
     def activate(self, now: float, reason: str = "asked to start") -> Changes:
         """Let the finger follow the signal, if armed and poses are coming."""

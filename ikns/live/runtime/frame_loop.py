@@ -9,6 +9,7 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.errors import IknsError
 from ikns.finger import Finger
 from ikns.live.control.controller import Controller, Decision
 from ikns.live.control.safety import Changes
@@ -66,12 +67,35 @@ class FrameLoop:
         self._first_device_time = math.nan
         self._last: Decision | None = None
         self._status_time, self._status_frames = 0.0, 0
+        self._armed_at = -math.inf
+        self._stopped = self._alert = self._refusal = ""
         self.report = Report()
 
     def arm(self) -> None:
         """Start the clock and arm the safety machine."""
         self._start = time.monotonic()
         self._apply(self._controller.machine.arm(0.0))
+
+    def arm_again(self) -> None:
+        """Leave the safe state on request, from the measured position and from rest.
+
+        Connects the finger again, which takes a few tens of packets; frames that come
+        meanwhile are not used.
+        """
+        if self._controller.machine.state != "safe":
+            return
+        if self._finger is not None:
+            try:
+                self._finger.connect()
+            except (IknsError, OSError) as error:
+                self._refusal = f"; arming again failed: {str(error).rstrip('.')}"
+                return
+        self._armed_at = time.monotonic()
+        self._apply(self._controller.machine.arm_again(self.elapsed()))
+
+    def is_current(self, frame: Frame) -> bool:
+        """Whether a frame came after the finger was armed."""
+        return frame.receive_time >= self._armed_at
 
     def elapsed(self) -> float:
         """Time since the start, s."""
@@ -138,6 +162,7 @@ class FrameLoop:
     def disarm(self, reason: str) -> None:
         """Disarm the safety machine and complete the report."""
         now = time.monotonic() - self._start
+        self.report.stopped = self._stop_reason()
         self._apply(self._controller.machine.disarm(now, reason))
         self.report.seconds = now
         self.report.source = asdict(self._source.continuity.counts)
@@ -169,7 +194,14 @@ class FrameLoop:
             measured=self._measured,
             state=self._controller.machine.state,
             q=self._unknown_q if last is None else last.solved.q,
+            stopped=self._stop_reason(),
         )
+
+    def _stop_reason(self) -> str:
+        """Return why the finger is stopped; what it says itself is more recent."""
+        if self._controller.machine.state != "safe":
+            return ""
+        return (self._alert or self._stopped) + self._refusal
 
     def _command(self) -> float:
         """Command the finger, which limits what it does; return what was sent."""
@@ -183,7 +215,7 @@ class FrameLoop:
         if self._finger is None:
             return
         state = self._finger.state()
-        self._measured = state.flexion
+        self._measured, self._alert = state.flexion, state.alert
         if state.mode == "safe" and self._controller.machine.state != "safe":
             if self._session:
                 write_stop(self._session, now, state.alert)
@@ -194,7 +226,9 @@ class FrameLoop:
         for change in changes:
             self.report.transitions.append(change)
             del self.report.transitions[:-1000]
-            if change.after == "safe" and self._finger is not None:
-                self._finger.make_safe(change.reason)
+            if change.after == "safe":
+                self._stopped, self._refusal = change.reason, ""
+                if self._finger is not None:
+                    self._finger.make_safe(change.reason)
             if self._session:
                 write_transition(self._session, change)

@@ -38,6 +38,7 @@ def run(
     session: RunWriter | None = None,
     duration: float = math.inf,
     stop: threading.Event | None = None,
+    arm: threading.Event | None = None,
     on_status: Callable[[LoopStatus], None] | None = None,
     status_every: float = 0.2,
     on_decision: Callable[[float, float, Decision], None] | None = None,
@@ -62,6 +63,9 @@ def run(
         Stop after this time, s.
     stop : threading.Event, optional
         Set it to stop and relax the finger.
+    arm : threading.Event, optional
+        Set it to arm a finger again that is in its safe state, from the measured
+        position and from rest; the loop clears it. It has no effect otherwise.
     on_status : callable, optional
         Called with a :class:`LoopStatus` from within the loop, so it must not wait.
     status_every : float
@@ -127,11 +131,14 @@ def run(
         loop.arm()
         try:
             while not (stopped.is_set() or source.ended or loop.elapsed() >= duration):
+                if arm is not None and arm.is_set():
+                    loop.arm_again()
+                    arm.clear()
                 frame = source.read(loop.read_timeout())
                 if frame is None:
                     if not loop.warm_caches():
                         loop.keep_alive()
-                else:
+                elif loop.is_current(frame):
                     decision = loop.process(frame)
                     if on_decision:
                         received = frame.receive_time

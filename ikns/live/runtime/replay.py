@@ -88,8 +88,13 @@ def replay_run(run: Run) -> Replayed:
     machine = controller.machine
     rows = len(run.frame)
     c, flexion, state = np.empty(rows), np.empty(rows), np.empty(rows, dtype=np.int64)
-    # The watchdog's transitions follow from the frames' times; recorded stops do not.
-    stops = [onset for onset, _, what, _ in run.events if what == "stop"]
+    # The watchdog's transitions follow from the frames' times; what else stopped the
+    # finger, and who armed it again, do not.
+    acts = [
+        (onset, what)
+        for onset, _, what, words in run.events
+        if what == "stop" or (what == "armed" and words.startswith("safe "))
+    ]
     machine.arm(0.0)
     for i in range(rows):
         made = controller.frame(
@@ -100,8 +105,11 @@ def replay_run(run: Run) -> Replayed:
         if made.valid and made.state == "armed":
             machine.activate(float(run.receive_time[i]))
         following = run.receive_time[i + 1] if i + 1 < rows else np.inf
-        while stops and stops[0] < following:
-            machine.stop(stops.pop(0), "recorded")
+        while acts and acts[0][0] < following:
+            onset, what = acts.pop(0)
+            machine.stop(onset, "recorded")  # its watchdog may have, without a frame
+            if what == "armed":
+                machine.arm_again(onset)
     first = "c" if "c" in run.model else "c1"
     recorded = {
         "c": (c, run.model[first]),

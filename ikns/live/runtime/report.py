@@ -40,6 +40,8 @@ class LoopStatus:
         Of the safety machine.
     q : (nq,) array
         Configuration of the last frame; NaN before the first.
+    stopped : str
+        Why the finger is in its safe state; empty unless it is.
     """
 
     time: float
@@ -56,6 +58,7 @@ class LoopStatus:
     measured: float
     state: str
     q: NDArray[np.float64]
+    stopped: str = ""
 
 
 @dataclass
@@ -80,6 +83,8 @@ class Report:
         Counts of frames that were dropped, late, repeated or out of order.
     lost_rows : int
         Rows of the session that could not be written.
+    stopped : str
+        Why the finger was in its safe state at the end; empty if it was not.
     """
 
     frames: int = 0
@@ -94,3 +99,4 @@ class Report:
     transitions: list[Transition] = field(default_factory=list)
     source: dict[str, Any] = field(default_factory=dict)
     lost_rows: int = 0
+    stopped: str = ""

@@ -1,0 +1,61 @@
+"""Say in large words that the finger is stopped, and let someone arm it again."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from ikns.cli.keyboard import keyboard, pressed_keys
+
+if TYPE_CHECKING:
+    from ikns.live.runtime import LoopStatus
+
+__all__ = ["STOPPED", "stop_line", "watch_stops"]
+
+#: Exit code of a run that ends while its finger is stopped.
+STOPPED = 3
+#: With Shift: not typed by accident. Keys that come before the stop do not count.
+_KEY = "R"
+_WORDS = "FINGER STOPPED: "
+
+
+def stop_line(reason: str, *, width: int = 10_000) -> str:
+    """Return what stands while the finger is stopped; a narrow line cuts the reason.
+
+    >>> stop_line("no command for 0.5 s", width=30)
+    'FINGER STOPPED: no command for'
+    """
+    how = ", press Shift+R to arm again" if keyboard() else ""
+    room = width - len(_WORDS) - len(how)
+    return (_WORDS + reason[: max(room, 0)] + how)[:width]
+
+
+@contextmanager
+def watch_stops(
+    arm: Callable[[], None], *, how: str = ""
+) -> Iterator[Callable[[LoopStatus], None]]:
+    """Yield a function that takes every status of a loop; it prints each stop once.
+
+    Parameters
+    ----------
+    arm : callable
+        Called when the key is pressed while the finger is stopped.
+    how : str
+        Where else the finger can be armed again, for the sentence.
+    """
+    said = ""
+    with pressed_keys() as keys:
+
+        def watch(status: LoopStatus) -> None:
+            nonlocal said
+            pressed = keys(0.0)
+            if status.stopped and not said:
+                sys.stderr.write(f"\nikns: {stop_line(status.stopped)}{how}.\n")
+                sys.stderr.flush()
+            elif status.stopped and _KEY in pressed:
+                arm()
+            said = status.stopped
+
+        yield watch
