@@ -19,7 +19,7 @@ channels file. Missing values are ``n/a``.
 from ikns.live.session.channels import Channel, marker_channels, micro, model_channels
 from ikns.live.session.check import check_session, mend_session
 from ikns.live.session.dataset import create_session, next_run, open_run
-from ikns.live.session.export import export_run
+from ikns.live.session.export import check_export, export_run
 from ikns.live.session.reader import Run, read_run, runs
 from ikns.live.session.writer import RunWriter
 
@@ -27,6 +27,7 @@ __all__ = [
     "Channel",
     "Run",
     "RunWriter",
+    "check_export",
     "check_session",
     "create_session",
     "export_run",
