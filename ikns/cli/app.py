@@ -26,6 +26,7 @@ from ikns.cli.study_report import report
 from ikns.cli.track import track
 from ikns.cli.ucm import ucm
 from ikns.cli.view import view
+from ikns.errors import DataLoss
 
 __all__ = ["app", "main"]
 
@@ -82,7 +83,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 on success, 2 on bad input, 130 when interrupted.
+        0 on success, 1 when something recorded is not on disk, 2 on bad input, 130
+        when interrupted.
     """
     try:
         # Not standalone: typer then raises errors instead of printing several lines.
@@ -96,6 +98,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not message:  # no arguments at all: the help was printed
             return 2
         message = f"{message.rstrip('.')}; see ikns --help."
+    except DataLoss as error:
+        sys.stderr.write(f"ikns: {' '.join(str(error).split())}\n")
+        return 1
     except ikns.IknsError as error:
         message = str(error)
     except OSError as error:

@@ -17,7 +17,7 @@ import ikns
 from ikns.cli.live_session import live_session, software, stopped_by_signals
 from ikns.cli.options import AsJson, SubjectFolder
 from ikns.cli.output import show, table
-from ikns.errors import InvalidInput
+from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
     from ikns.live.runtime import LoopStatus, Report
@@ -98,6 +98,7 @@ def run(
             open_source(source, needs=calibrated.skeleton.marker_set)
         )
         ikns.warm_up()
+        losses: list[str] = []
         writer = None
         if session is not None:
             configuration = {
@@ -117,6 +118,7 @@ def run(
                     rate=stream.rate,
                     participant=participant,
                     resume=resume,
+                    losses=losses,
                 )
             )
         stop = stack.enter_context(stopped_by_signals())
@@ -142,7 +144,12 @@ def run(
             status_every=1 / 30 if view else _LINE_EVERY,
             realtime=realtime,
         )
-    result = _result(report) | {"session": session}
+    if writer is not None:
+        report.lost_rows = writer.lost  # counted on disk once it is closed
+        if not report.frames:
+            session = None
+            sys.stderr.write("ikns: no frame came, so no session was kept.\n")
+    result = _result(report) | {"session": session, "losses": losses}
     show(
         result,
         table(
@@ -157,6 +164,8 @@ def run(
         *([f"Wrote {session}"] if session else []),
         as_json=as_json,
     )
+    if losses:
+        raise DataLoss("; ".join(losses))
 
 
 @contextmanager
@@ -239,5 +248,5 @@ def _rows(report: Report) -> list[list[str]]:
             " / ".join(f"{1e3 * total.percentile(p):.2f}" for p in (50, 99, 100)),
         ],
         ["frames that took longer than a frame", str(report.misses)],
-        ["rows that could not be written", str(report.lost_rows)],
+        ["rows that are missing on disk", str(report.lost_rows)],
     ]

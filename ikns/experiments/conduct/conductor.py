@@ -186,7 +186,7 @@ class Conductor:
 
         Raises
         ------
-        FileError
+        DataLoss
             When an attempt cannot be written.
         """
         self.update(now)

@@ -18,7 +18,13 @@ channels file. Missing values are ``n/a``.
 
 from ikns.live.session.channels import Channel, marker_channels, micro, model_channels
 from ikns.live.session.check import check_session, mend_session
-from ikns.live.session.dataset import create_session, next_run, open_run
+from ikns.live.session.dataset import (
+    create_session,
+    discard_run,
+    next_run,
+    open_run,
+    session_lock,
+)
 from ikns.live.session.export import check_export, export_run
 from ikns.live.session.reader import Run, read_run, runs
 from ikns.live.session.writer import RunWriter
@@ -30,6 +36,7 @@ __all__ = [
     "check_export",
     "check_session",
     "create_session",
+    "discard_run",
     "export_run",
     "marker_channels",
     "mend_session",
@@ -39,4 +46,5 @@ __all__ = [
     "open_run",
     "read_run",
     "runs",
+    "session_lock",
 ]
