@@ -22,6 +22,10 @@ class FileError(IknsError, ValueError):
     """A file is missing, empty, damaged, or not of the expected format."""
 
 
+class DataLoss(FileError):
+    """Something that was recorded is not on disk; a program ends with exit code 1."""
+
+
 class MarkerMismatch(IknsError, ValueError):
     """A recording and a marker set do not match."""
 

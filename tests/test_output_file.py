@@ -1,11 +1,16 @@
 """Output files: whole or not at all, and never over another unasked."""
 
+import errno
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from ikns.errors import InvalidInput
-from ikns.output.file import refuse_overwriting, write_bytes, write_csv
+from ikns.output import file as module
+from ikns.output.file import create_bytes, refuse_overwriting, write_bytes, write_csv
 
 
 def test_a_table_has_nine_digits_and_empty_cells(tmp_path: Path) -> None:
@@ -24,12 +29,107 @@ def test_a_write_that_fails_leaves_nothing(tmp_path: Path) -> None:
 def test_what_may_not_be_written_is_refused_with_its_reason(tmp_path: Path) -> None:
     old = tmp_path / "old.csv"
     old.write_text("kept")
-    refuse_overwriting(old, force=True)
-    refuse_overwriting(tmp_path / "new.csv", force=False)
+    refuse_overwriting(old, force=True, inputs=[])
+    refuse_overwriting(tmp_path / "new.csv", force=False, inputs=[])
     for path, reason in (
         (old, "use --force"),
         (tmp_path, "found a folder"),
         (tmp_path / "none" / "new.csv", "existing folder"),
+        (Path("/dev/null"), "found a device"),
     ):
         with pytest.raises(InvalidInput, match=reason):
-            refuse_overwriting(path, force=path != old)
+            refuse_overwriting(path, force=path != old, inputs=[])
+
+
+def test_a_link_to_nothing_is_not_replaced_unasked(tmp_path: Path) -> None:
+    link = tmp_path / "out.csv"
+    link.symlink_to(tmp_path / "elsewhere.csv")
+    with pytest.raises(InvalidInput, match="use --force"):
+        refuse_overwriting(link, force=False, inputs=[])
+    with pytest.raises(InvalidInput, match="another program wrote it"):
+        write_bytes(link, b"new", force=False)
+    assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
+
+
+def test_a_file_that_came_meanwhile_is_not_replaced_unasked(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    refuse_overwriting(path, force=False, inputs=[])
+    path.write_text("of another program")
+    with pytest.raises(InvalidInput, match="another program wrote it meanwhile"):
+        write_csv(path, ["a"], [[1.0]], force=False)
+    assert path.read_text() == "of another program"
+    write_csv(path, ["a"], [[1.0]], force=True)
+    assert path.read_text() == "a\n1\n"
+    assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EIO])
+@pytest.mark.parametrize("force", [True, False])
+def test_a_disk_that_refuses_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, force: bool
+) -> None:
+    path = tmp_path / "table.csv"
+    if force:
+        path.write_text("old")
+
+    def refuse(descriptor: int) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(module.os, "fsync", refuse)
+    with pytest.raises(OSError, match=os.strerror(code)):
+        write_bytes(path, b"new", force=force)
+    assert [each.read_text() for each in tmp_path.iterdir()] == ["old"] * force
+
+
+@pytest.mark.parametrize("linked", [True, False])
+def test_of_several_writers_one_succeeds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, linked: bool
+) -> None:
+    def no_links(source: Path, target: Path) -> None:
+        raise OSError(errno.EPERM, "no hard links on this file system")
+
+    if not linked:
+        monkeypatch.setattr(module.os, "link", no_links)
+    path = tmp_path / "attempt"
+    assert create_bytes(path, b"first")
+    assert not create_bytes(path, b"second")
+    assert [each.read_bytes() for each in tmp_path.iterdir()] == [b"first"]
+
+
+CREATES = """
+import sys
+from pathlib import Path
+from ikns.output.file import create_bytes
+sys.stdin.readline()  # all begin together
+who = sys.argv[1]
+for k in range(100):
+    if create_bytes(Path(f"{k}"), who.encode()):
+        print(k)
+"""
+
+
+def test_processes_never_share_a_file(tmp_path: Path) -> None:
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-c", CREATES, str(who)],
+            cwd=tmp_path,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for who in range(3)
+    ]
+    for process in running:
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+    told = {}
+    for who, process in enumerate(running):
+        out, _ = process.communicate(timeout=120)
+        assert process.returncode == 0
+        for number in out.split():
+            assert number not in told
+            told[number] = str(who)
+    # Each was told to one writer, and it is that writer's content that is there.
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == told
+    assert len(told) == 100

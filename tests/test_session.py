@@ -273,21 +273,24 @@ def test_a_deleted_folder_is_told_within_a_second(tmp_path):
             time.sleep(0.02)
         run.row("markers", [1, 0, 0, *[0.0] * 6])
     assert "it has been deleted" in told[0]
-    assert run.lost == 1
+    # Neither row is on disk, be it that the first was written before.
+    assert run.lost == 2
+    (sentence,) = [each for each in run.losses if "rows are missing" in each]
+    assert "2 of 2 rows are missing (cannot be written: it has been dele" in sentence
     assert not session.exists()
 
 
 def test_a_row_costs_no_wait(tmp_path, monkeypatch):
     # A disk that writes nothing until every row has been handed over.
-    import ikns.live.session.writer as writer
+    import ikns.live.session.row_file as row_file
 
-    real, disk, wrote = writer.os.write, threading.Event(), []
+    real, disk, wrote = row_file.os.write, threading.Event(), []
 
     def write(*args):
         wrote.append(disk.wait(5))
         return real(*args)
 
-    monkeypatch.setattr(writer.os, "write", write)
+    monkeypatch.setattr(row_file.os, "write", write)
     session = create_session(tmp_path / "s")
     disk.set()
     with begun(session) as run:

@@ -2,6 +2,7 @@
 
 import logging
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -119,6 +120,23 @@ def test_a_killed_run_continues_and_two_processes_make_the_bits_of_one(
     foreign.unlink()
     assert not any(Path(f"/proc/{worker}").exists() for worker in left_behind)
     assert contents(study) == contents(done)
+
+
+@pytest.mark.parametrize("lost", ["attempts.parquet", "visit.json"])
+def test_a_visit_that_lost_a_file_is_named(
+    done: Path, tmp_path: Path, lost: str
+) -> None:
+    study = tmp_path / "study"
+    shutil.copytree(done, study)
+    visit = list_visits(study)[1]
+    for path in visit.iterdir():
+        if path.name == lost or lost == "visit.json":
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    before = contents(study)
+    with pytest.raises(FileError, match=f"{visit.name}: expected a visit with") as told:
+        run_study(study, n_jobs=1)
+    assert "move the folder away" in str(told.value)
+    assert contents(study) == before
 
 
 def test_a_cohort_grows_without_doing_anything_twice(

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import pickle
+import shutil
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
@@ -295,6 +296,29 @@ def test_visits_that_cannot_be_used_are_left_out_with_their_reason(tmp_path):
     for name in ("sub-01_tracking", "sub-03_tracking", again.name):
         (tmp_path / "visits" / name / "visit.json").write_text("{}")
     with pytest.raises(FileError, match=r"expected a visit .*and 3 more"):
+        summarize(tmp_path)
+
+
+def test_a_visit_that_is_empty_or_lost_its_attempts_is_named(tmp_path):
+    for who in (1, 2, 3):
+        small.tracking(tmp_path, who, dict.fromkeys(BOTH, float(who)))
+    visits = tmp_path / "visits"
+    (visits / "sub-02_tracking" / "attempts.parquet").unlink()
+    (visits / "sub-04_tracking").mkdir()
+    (visits / "gate" / "sub-01_picking").mkdir(parents=True)
+    summary = summarize(tmp_path)
+    reasons = {each.folder: each.reason for each in summary.left_out}
+    assert set(reasons) == {
+        visits / "sub-02_tracking",
+        visits / "sub-04_tracking",
+        visits / "gate" / "sub-01_picking",
+    }
+    for folder, reason in reasons.items():
+        assert reason.startswith(f"{folder}: expected a visit with ")
+    assert summary.groups[0].tracking.participants == ["01", "03"]
+    for who in (1, 2, 3):
+        shutil.rmtree(visits / f"sub-{who:02d}_tracking")
+    with pytest.raises(FileError, match="sub-04_tracking: expected a visit with"):
         summarize(tmp_path)
 
 

@@ -1,6 +1,9 @@
 """Visits on disk: every bit comes back, and nothing is lost or overwritten."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +27,7 @@ from ikns.experiments.visits import (
     read_visit,
     tracking_record,
     tracking_row,
+    visit_lock,
     write_attempts,
 )
 from ikns.experiments.visits.parquet import read_rows, table_bytes
@@ -261,3 +265,97 @@ def test_the_last_final_attempt_at_each_step_counts() -> None:
     ]
     rows = [attempt_row(k, key, out) for k, (key, out) in enumerate(went, start=1)]
     assert [row["number"] for row in counted_attempts(rows)] == [3, 5, 7]
+
+
+# --- several programs at once ---------------------------------------------------------
+
+WRITES = """
+import json, sys
+from ikns.errors import InvalidInput
+from ikns.experiments.visits import append_attempt
+folder, row = sys.argv[1], json.loads(sys.argv[2])
+sys.stdin.readline()  # all begin together
+for number in range(1, 21):
+    try:
+        append_attempt(folder, row | {"number": number})
+        print(number)
+    except InvalidInput as error:
+        assert "no attempt is overwritten" in str(error)
+"""
+
+
+def test_an_attempt_number_is_given_to_one_of_several_processes(visit: Path) -> None:
+    rows = [attempt_row(1, key=f"writer {k}") for k in range(3)]
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-c", WRITES, str(visit), json.dumps(row)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for row in rows
+    ]
+    for process in running:
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+    told = {}
+    for k, process in enumerate(running):
+        out, _ = process.communicate(timeout=300)
+        assert process.returncode == 0
+        for number in map(int, out.split()):
+            assert number not in told, "two were told that they wrote it"
+            told[number] = f"writer {k}"
+    attempts = read_visit(visit).attempts
+    assert {row["number"]: row["key"] for row in attempts} == told
+    assert len(told) == 20
+
+
+HOLDS = """
+import sys, time
+from ikns.experiments.visits import visit_lock
+with visit_lock(sys.argv[1]):
+    print("held", flush=True)
+    sys.stdin.readline()
+"""
+
+
+def test_a_visit_is_conducted_by_one_process(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "visits" / "sub-01_tracking"
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLDS, str(folder)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "held\n"
+        with pytest.raises(InvalidInput) as refused, visit_lock(folder):
+            pass
+        assert f"process {holder.pid} on {os.uname().nodename}" in str(refused.value)
+        assert "wait until it ends" in str(refused.value)
+        create_visit(folder, ABOUT)  # which the lock file does not disturb
+        holder.kill()
+    # The lock of a process that was killed is taken over, and that is said.
+    with visit_lock(folder):
+        append_attempt(folder, attempt_row(1))
+    said = capsys.readouterr().err
+    assert f"was still locked by process {holder.pid}, which has ended" in said
+    assert said.count("\n") == 1
+    assert {p.name for p in folder.iterdir()} == {"visit.json", "attempt-0001.parquet"}
+    with visit_lock(folder):
+        pass
+    assert capsys.readouterr().err == ""
+
+
+def test_a_visit_in_which_nothing_was_written_leaves_no_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "study" / "visits" / "sub-01_tracking"
+    with pytest.raises(KeyError), visit_lock(folder):
+        raise KeyError
+    assert list(tmp_path.iterdir()) == []
+    with visit_lock(folder):
+        create_visit(folder, ABOUT)
+    assert list_visits(tmp_path / "study") == [folder]

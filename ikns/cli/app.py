@@ -29,6 +29,7 @@ from ikns.cli.track import track
 from ikns.cli.ucm import ucm
 from ikns.cli.view import view
 from ikns.endings import BROKEN_PIPE, signal_exit_code
+from ikns.errors import DataLoss
 
 __all__ = ["app", "run_command"]
 
@@ -85,7 +86,8 @@ def run_command(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code.
+        0 on success, 1 when something recorded is not on disk, 2 on bad input, 128 + n
+        when signal n ended the command.
     """
     try:
         # Not standalone: typer then raises errors instead of printing several lines.
@@ -99,6 +101,9 @@ def run_command(argv: Sequence[str] | None = None) -> int:
         if not message:  # no arguments at all: the help was printed
             return 2
         message = f"{message.rstrip('.')}; see ikns --help."
+    except DataLoss as error:
+        sys.stderr.write(f"ikns: {' '.join(str(error).split())}\n")
+        return 1
     except ikns.IknsError as error:
         message = str(error)
     except BrokenPipeError:

@@ -124,7 +124,8 @@ def calibrate(
             f"only {' and '.join(given)}."
         )
     _check_input(context, live=live)
-    check_output_folder(out, FILES, force=force)
+    inputs = [static, *(exploration or []), marker_set, recordings]
+    check_output_folder(out, FILES, force=force, inputs=inputs)
     # Three times None is none of them.
     generic = (
         None

@@ -75,7 +75,7 @@ def compare(
     from ikns.analysis.compare import motion_crosstalk
     from ikns.calibration.simulated import is_simulated
 
-    refuse_picture(figure, force=force)
+    refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
     learned, own = calibrated.null_space_map, calibrated.chain
     with progress() as report:
@@ -118,7 +118,7 @@ def compare(
         each for each in found if each[0][0] == own and each[0][2] == found[0][0][2]
     ]
     if figure is not None:
-        _draw(figure, plain, across, simulated=simulated)
+        _draw(figure, plain, across, simulated=simulated, force=force)
     title = f"{'Simulated, ' if simulated else ''}{recording}"
     brackets = "; in brackets 95 % intervals" if intervals else ""
     show(
@@ -188,7 +188,9 @@ def _combinations(
     )
 
 
-def _draw(path: Path, found: list[Named], across: Any, *, simulated: bool) -> None:
+def _draw(
+    path: Path, found: list[Named], across: Any, *, simulated: bool, force: bool
+) -> None:
     from ikns.view.comparison import comparison_figure
 
     drawn = comparison_figure(
@@ -196,7 +198,7 @@ def _draw(path: Path, found: list[Named], across: Any, *, simulated: bool) -> No
         simulated=simulated,
         crosstalk=across,
     )
-    write_picture(path, drawn)
+    write_picture(path, drawn, force=force)
 
 
 def comparison_rows(

@@ -36,7 +36,7 @@ def control(
     """
     from ikns.live.control.recorded import control_table
 
-    refuse_overwriting(out, force=force)
+    refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
     frames = ikns.read(recording)
     with progress() as report:
@@ -44,7 +44,7 @@ def control(
             frames, chain=calibrated.chain, progress=partial(report, recording.name)
         )
     found = control_table(calibrated, motion, mode=mode)
-    write_csv(out, found.columns, found.rows)
+    write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
     show(
         {"recording": recording, "csv": out} | result,

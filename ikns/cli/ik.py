@@ -31,7 +31,7 @@ def ik(
     """
     from ikns.motion.table import motion_table
 
-    refuse_overwriting(out, force=force)
+    refuse_overwriting(out, force=force, inputs=[recording, subject])
     skeleton = ikns.Subject.load(subject).skeleton
     frames = ikns.read(recording)
     with progress() as report, naming(frames.source):
@@ -39,7 +39,7 @@ def ik(
             frames, progress=lambda done, total: report("joint angles", done, total)
         )
     found = motion_table(motion)
-    write_csv(out, found.columns, found.rows)
+    write_csv(out, found.columns, found.rows, force=force)
     summary = found.summary
     show(
         {"recording": recording, "csv": out} | summary,

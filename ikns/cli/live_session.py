@@ -37,31 +37,58 @@ def live_session(
     rate: float,
     participant: str,
     resume: bool,
+    losses: list[str],
 ) -> Iterator[RunWriter]:
-    """Open the next run of a session: a new one or, with `resume`, an existing one."""
-    from ikns.calibration.subject import FILES
-    from ikns.live.session import create_session, mend_session, open_run
+    """Open the next run of a session: a new one or, with `resume`, an existing one.
 
-    if resume:
-        for sentence in mend_session(folder):
-            say(sentence)
-    else:
+    A run without a frame is removed, and so is its session if it was begun with it: a
+    start that failed does not stand in the way of the next one. What is missing on disk
+    in the end is added to `losses`, a sentence per file.
+    """
+    from ikns.calibration.subject import FILES
+    from ikns.live.session import (
+        create_session,
+        discard_run,
+        mend_session,
+        next_run,
+        open_run,
+        session_lock,
+    )
+
+    about = {
+        name: (subject / name).read_text("utf-8")
+        for name in FILES
+        if (subject / name).is_file()
+    }
+    if not resume:
         create_session(folder, participant=participant)
-    with open_run(
-        folder,
-        labels=calibrated.skeleton.marker_set.labels,
-        joint_names=calibrated.skeleton.joint_names,
-        rate=rate,
-        n_dof=calibrated.null_space_map.n_dof,
-        configuration=configuration,
-        subject={
-            name: (subject / name).read_text("utf-8")
-            for name in FILES
-            if (subject / name).is_file()
-        },
-        on_fault=say,
-    ) as writer:
-        yield writer
+    writer = None
+    with session_lock(folder):
+        if resume:
+            for sentence in mend_session(folder):
+                say(sentence)
+        _, number = next_run(folder)
+        try:
+            with open_run(
+                folder,
+                labels=calibrated.skeleton.marker_set.labels,
+                joint_names=calibrated.skeleton.joint_names,
+                rate=rate,
+                n_dof=calibrated.null_space_map.n_dof,
+                configuration=configuration,
+                subject=about,
+                on_fault=say,
+            ) as writer:
+                yield writer
+        except BaseException:
+            for sentence in [] if writer is None else writer.losses:
+                say(sentence)
+            raise
+        finally:
+            if writer is None or not writer.rows("markers"):
+                discard_run(folder, number, whole=not resume)
+            else:
+                losses += writer.losses
 
 
 def say(sentence: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,16 @@ __all__ = ["refuse_picture", "write_picture"]
 _ENDINGS = (".png", ".svg", ".pdf")
 
 
-def refuse_picture(path: Path | None, *, force: bool) -> None:
+def refuse_picture(
+    path: Path | None, *, force: bool, inputs: Iterable[Path | None]
+) -> None:
     """Check, before any work, that a picture may be written.
 
     Raises
     ------
     InvalidInput
-        When its ending is unknown, or the file may not be written.
+        When its ending is unknown, or the file may not be written; see
+        :func:`ikns.output.file.refuse_overwriting`.
     """
     if path is None:
         return
@@ -27,12 +31,12 @@ def refuse_picture(path: Path | None, *, force: bool) -> None:
         raise InvalidInput(
             f"{path}: expected a picture with the ending {', '.join(_ENDINGS)}."
         )
-    refuse_overwriting(path, force=force)
+    refuse_overwriting(path, force=force, inputs=inputs)
 
 
-def write_picture(path: Path, figure: Any) -> None:
+def write_picture(path: Path, figure: Any, *, force: bool) -> None:
     """Write a matplotlib figure in the format of its ending."""
     from ikns.view.render import pdf, png, svg
 
     draw = {".png": png, ".svg": svg, ".pdf": pdf}[path.suffix.lower()]
-    write_bytes(path, draw(figure))
+    write_bytes(path, draw(figure), force=force)

@@ -26,8 +26,15 @@ def replay(
 ) -> None:
     """Compute c and the commands of a session again and compare them bit for bit."""
     from ikns.live.runtime import replay_run
-    from ikns.live.session import check_session, export_run, read_run
+    from ikns.live.session import (
+        check_export,
+        check_session,
+        export_run,
+        read_run,
+    )
 
+    if export is not None:
+        check_export(export, session, force=force)
     recorded = read_run(session, run)
     found = check_session(session)
     again = replay_run(recorded)

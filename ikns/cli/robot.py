@@ -63,7 +63,7 @@ def robot(
     from ikns.nullspace.map import MapWarning, robot_null_space_samples
     from ikns.recording.files.joint_angles import read_joint_angles
 
-    refuse_picture(figure, force=force)
+    refuse_picture(figure, force=force, inputs=[urdf, angles])
     arm = ikns.Robot.load(urdf, frame)
     time, q = read_joint_angles(angles, arm.joint_names)
     with naming(str(angles)), warnings.catch_warnings(record=True) as caught:
@@ -86,7 +86,8 @@ def robot(
         named = {
             f"{HELD[one]} held": each for one, each in zip(tasks, found, strict=True)
         }
-        write_picture(figure, comparison_figure(named, simulated=simulated))
+        drawn = comparison_figure(named, simulated=simulated)
+        write_picture(figure, drawn, force=force)
     title = f"{'Simulated, ' if simulated else ''}{angles}: {frame}"
     show(
         {

@@ -20,7 +20,7 @@ from ikns.cli.options import AsJson, SubjectFolder
 from ikns.cli.output import show, table
 from ikns.cli.stop_notice import STOPPED, stop_line, watch_stops
 from ikns.endings import signal_exit_code, stop_on_signals
-from ikns.errors import InvalidInput
+from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
     from ikns.live.runtime import LoopStatus, Report
@@ -102,6 +102,7 @@ def run(
         )
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
+        losses: list[str] = []
         writer = None
         if session is not None:
             configuration = {
@@ -121,6 +122,7 @@ def run(
                     rate=stream.rate,
                     participant=participant,
                     resume=resume,
+                    losses=losses,
                 )
             )
         arm = threading.Event()
@@ -147,7 +149,12 @@ def run(
             status_every=1 / 30 if view else _LINE_EVERY,
             realtime=realtime,
         )
-    result = _result(report) | {"session": session}
+    if writer is not None:
+        report.lost_rows = writer.lost  # counted on disk once it is closed
+        if not report.frames:
+            session = None
+            sys.stderr.write("ikns: no frame came, so no session was kept.\n")
+    result = _result(report) | {"session": session, "losses": losses}
     show(
         result,
         table(
@@ -162,6 +169,8 @@ def run(
         *([f"Wrote {session}"] if session else []),
         as_json=as_json,
     )
+    if losses:
+        raise DataLoss("; ".join(losses))
     code = signal_exit_code()
     if report.stopped and not dry_run:
         say(stop_line(report.stopped))
@@ -257,5 +266,5 @@ def _rows(report: Report) -> list[list[str]]:
             " / ".join(f"{1e3 * total.percentile(p):.2f}" for p in (50, 99, 100)),
         ],
         ["frames that took longer than a frame", str(report.misses)],
-        ["rows that could not be written", str(report.lost_rows)],
+        ["rows that are missing on disk", str(report.lost_rows)],
     ]

@@ -24,9 +24,9 @@ def scale(
     as_json: AsJson = False,
 ) -> None:
     """Write a URDF scaled from anthropometric tables."""
-    refuse_overwriting(out, force=force)
+    refuse_overwriting(out, force=force, inputs=[])
     skeleton = ikns.Skeleton.from_anthropometry(stature=stature, mass=mass, sex=sex)
-    write_text(out, skeleton.urdf)
+    write_text(out, skeleton.urdf, force=force)
     lengths = skeleton.segment_lengths
     show(
         {

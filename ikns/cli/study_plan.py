@@ -100,7 +100,7 @@ def plan(
     """
     from ikns.statistics.plan import plan_participants
 
-    refuse_picture(figure, force=force)
+    refuse_picture(figure, force=force, inputs=[study, pilot])
     design = resolve_plan(
         study,
         experiment,
@@ -144,7 +144,8 @@ def plan(
     )
     if figure is not None:
         note = _assumption(assumed.found, design)
-        _draw(figure, made, assumed, aim=aim, target=power, note=note)
+        drawn = _drawn(made, assumed, aim=aim, target=power, note=note)
+        write_picture(figure, drawn, force=force)
     warned = design.warnings + assumed.warnings
     show(
         _result(study, pilot, design, assumed, made)
@@ -255,18 +256,17 @@ def _result(
     }
 
 
-def _draw(
-    path: Path,
+def _drawn(
     made: SamplingPlan,
     assumed: PilotSpread,
     *,
     aim: str,
     target: float,
     note: str,
-) -> None:
+) -> Any:
     from ikns.view.power import power_figure
 
-    drawn = power_figure(
+    return power_figure(
         [power.design.subjects for power in made.curve],
         [power.power for power in made.curve],
         [[power.low for power in made.curve], [power.high for power in made.curve]],
@@ -277,4 +277,3 @@ def _draw(
         declared=None if made.declared is None else made.declared.design.subjects,
         note=textwrap.fill(note, 105),
     )
-    write_picture(path, drawn)

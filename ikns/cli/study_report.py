@@ -44,7 +44,7 @@ def report(
 
     place = study / "report" if out is None else out
     if study.is_dir():  # otherwise the study is missing, not the output
-        check_output_folder(place, report_files(), force=force)
+        check_output_folder(place, report_files(), force=force, inputs=[study])
     with progress() as on_progress:
         summary = summarize(study, workers=jobs, progress=on_progress)
         with output_folder(place) as folder:

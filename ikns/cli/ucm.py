@@ -56,7 +56,7 @@ def ucm(
     """
     from ikns.calibration.simulated import is_simulated
 
-    refuse_picture(figure, force=force)
+    refuse_picture(figure, force=force, inputs=[*recordings, subject])
     if len({path.resolve() for path in recordings}) < len(recordings):
         raise InvalidInput(
             "expected each recording once, as a repetition counts once, found "
@@ -87,7 +87,8 @@ def ucm(
     if figure is not None:
         from ikns.view.variance_split import variance_split_figure
 
-        write_picture(figure, variance_split_figure(**found.drawn, simulated=simulated))
+        drawn = variance_split_figure(**found.drawn, simulated=simulated)
+        write_picture(figure, drawn, force=force)
     show(
         {
             "recordings": recordings,

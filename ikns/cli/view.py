@@ -49,10 +49,11 @@ def view(
     """
     from ikns.calibration.simulated import is_simulated
 
-    refuse_overwriting(out, force=force)
+    inputs = [subject, recording]
+    refuse_overwriting(out, force=force, inputs=inputs)
     if png is not None:
-        refuse_overwriting(png, force=force)
-        if png.absolute() == out.absolute():
+        refuse_overwriting(png, force=force, inputs=inputs)
+        if png.resolve() == out.resolve():
             raise InvalidInput(f"{png}: expected two files, found one for both.")
     person = ikns.Subject.load(subject)
     learned, row = person.null_space_map, None if point is None else point - 1
@@ -90,10 +91,10 @@ def view(
         )
     page = scene_html(scene)
     picture = None if png is None else scene_picture(scene)
-    write_text(out, page)
+    write_text(out, page, force=force)
     remarks = []
     if png is not None and picture is not None:
-        write_bytes(png, picture.png)
+        write_bytes(png, picture.png, force=force)
         if picture.note:
             remarks.append(picture.note)
             sys.stderr.write(f"ikns: {picture.note}.\n")

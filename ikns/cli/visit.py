@@ -30,7 +30,7 @@ from ikns.cli.visit_drivers import (
 )
 from ikns.cli.visit_identity import VisitIdentity
 from ikns.endings import signal_exit_code, stop_on_signals
-from ikns.errors import InvalidInput
+from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Conductor, Driver, Experiment, HeldInput
@@ -82,10 +82,13 @@ def conduct(
         VisitLog,
         run_visit,
     )
+    from ikns.experiments.visits import visit_lock
 
-    subject, simulated = _checked(identity, arm, pages, conditions)
     session = arm.session or identity.folder / "session"
+    losses: list[str] = []
     with ExitStack() as stack:
+        stack.enter_context(visit_lock(identity.folder))
+        subject, simulated = _checked(identity, arm, pages, conditions)
         stop = stack.enter_context(stop_on_signals())
         if subject is not None:
             # A source that does not answer is reported before anything is written.
@@ -97,6 +100,7 @@ def conduct(
             "session": _relative(session, identity.folder) if subject else None,
         }
         log = VisitLog(identity.folder, common | dict(about))
+        stack.push(lambda kind, *_: log.discard_unused() if kind else None)
         if identity.study is not None:
             from ikns.experiments.study import save_declaration
 
@@ -135,7 +139,7 @@ def conduct(
             if arm.view:
                 address = _open_view(stack, subject, shown, simulated=simulated)
             drivers["ikns"] = lambda: arm_driver(
-                arm, subject, session, identity.participant, shown
+                arm, subject, session, identity.participant, shown, losses
             )
         presses: SimpleQueue[None] = SimpleQueue()
         if "ring" in conditions:
@@ -159,7 +163,9 @@ def conduct(
         )
         _announce(cockpit.url, cockpit.panel_url, browser=pages.browser)
         run_visit(conductor, drivers, stop=stop, rate=pages.rate)
-    _show_attempts(identity, conductor, as_json=as_json)
+    _show_attempts(identity, conductor, losses, as_json=as_json)
+    if losses:
+        raise DataLoss("; ".join(losses))
     if code := signal_exit_code():
         raise typer.Exit(code)
 
@@ -263,7 +269,7 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _show_attempts(
-    identity: VisitIdentity, conductor: Conductor, *, as_json: bool
+    identity: VisitIdentity, conductor: Conductor, losses: list[str], *, as_json: bool
 ) -> None:
     from ikns.statistics.wording import counted
 
@@ -276,6 +282,7 @@ def _show_attempts(
         "left": left,
         "stopped": conductor.emergency.is_set(),
         "attempts": results,
+        "losses": losses,
     }
     title = f"Visit of participant {identity.participant}"
     show(

@@ -139,10 +139,12 @@ def arm_driver(
     session: Path,
     participant: str,
     shown: Sequence[Callable[[LoopStatus], None]],
+    losses: list[str],
 ) -> AbstractContextManager[Driver]:
     """Run the live loop as driver, with a session of its own.
 
-    Every status goes to each callable in `shown`.
+    Every status goes to each callable in `shown`; what is missing on disk in the end is
+    added to `losses`.
     """
     from ikns.experiments.conduct.live import live_driver
     from ikns.live.control.settings import ControlSettings
@@ -166,6 +168,7 @@ def arm_driver(
             rate=source.rate,
             participant=participant,
             resume=(session / "dataset_description.json").exists(),
+            losses=losses,
         )
 
     def tell(status: LoopStatus) -> None:

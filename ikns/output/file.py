@@ -3,49 +3,132 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import os
+import secrets
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ikns.errors import InvalidInput
+from ikns.output.inputs import refuse_input
 
-__all__ = ["refuse_overwriting", "write_bytes", "write_csv", "write_text"]
+__all__ = [
+    "create_bytes",
+    "refuse_overwriting",
+    "sync_folder",
+    "write_bytes",
+    "write_csv",
+    "write_text",
+]
+
+#: What a file system answers that has no hard links.
+_NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 
 
-def refuse_overwriting(path: Path, *, force: bool) -> None:
+def refuse_overwriting(
+    path: Path, *, force: bool, inputs: Iterable[Path | str | None]
+) -> None:
     """Check, before any work, that a file may be written.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    force : bool
+        Whether an existing file may be replaced.
+    inputs : iterable of Path, str or None
+        Everything that is read, files and folders: never replaced.
 
     Raises
     ------
     InvalidInput
-        When it exists and `force` is not set, or its folder does not exist.
+        When it exists and `force` is not set, it is one of the inputs under whatever
+        name, it is not a file, or its folder does not exist.
     """
     if path.is_dir():
         raise InvalidInput(f"{path}: expected the name of a file, found a folder.")
-    if path.exists() and not force:
-        raise InvalidInput(f"{path}: exists already; use --force to overwrite it.")
+    if path.exists() and not path.is_file():
+        raise InvalidInput(f"{path}: expected the name of a file, found a device.")
+    if os.path.lexists(path):
+        refuse_input(path, inputs)
+        if not force:
+            raise InvalidInput(f"{path}: exists already; use --force to overwrite it.")
     if not path.absolute().parent.is_dir():
         raise InvalidInput(f"{path}: expected an existing folder to write into.")
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8, whole or not at all."""
-    write_bytes(path, text.encode("utf-8"))
+def write_text(path: Path, text: str, *, force: bool = True) -> None:
+    """Write a text file in UTF-8; see :func:`write_bytes`."""
+    write_bytes(path, text.encode("utf-8"), force=force)
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+def write_bytes(path: Path, content: bytes, *, force: bool = True) -> None:
+    """Write a file, whole or not at all: an interruption loses neither old nor new.
+
+    Parameters
+    ----------
+    path : Path
+    content : bytes
+    force : bool
+        Whether to replace a file that is there.
+
+    Raises
+    ------
+    InvalidInput
+        When it is there and `force` is not set.
+    OSError
+        When it cannot be written.
+    """
+    if not force:
+        if not create_bytes(path, content):
+            raise InvalidInput(
+                f"{path}: another program wrote it meanwhile; use --force to overwrite "
+                "it."
+            )
+        return
+    part = _write_part(path, content)
     try:
-        part.write_bytes(content)
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+    sync_folder(path.parent)
+
+
+def create_bytes(path: Path, content: bytes) -> bool:
+    """Write a new file, whole or not at all; of several writers one succeeds.
+
+    Returns
+    -------
+    bool
+        False when the file was there already; it stays as it was.
+
+    Raises
+    ------
+    OSError
+        When it cannot be written.
+    """
+    part = _write_part(path, content)
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        return False
+    except OSError as error:
+        if error.errno not in _NO_LINKS:
+            raise
+        return _claim(path, part)
+    finally:
+        part.unlink(missing_ok=True)
+    sync_folder(path.parent)
+    return True
 
 
 def write_csv(
-    path: Path, columns: Sequence[str], rows: Iterable[Sequence[float]]
+    path: Path,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[float]],
+    *,
+    force: bool = True,
 ) -> None:
     """Write a table of numbers; NaN becomes an empty cell."""
     text = io.StringIO()
@@ -53,4 +136,48 @@ def write_csv(
     writer.writerow(columns)
     for row in rows:
         writer.writerow(["" if v != v else f"{v:.9g}" for v in row])
-    write_text(path, text.getvalue())
+    write_text(path, text.getvalue(), force=force)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush the names in a folder to the disk."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # a file system that cannot
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def _write_part(path: Path, content: bytes) -> Path:
+    """Write a file under a hidden name next to its own and flush it to the disk."""
+    # The length of a name is limited.
+    part = path.with_name(
+        f".{path.name[:40]}.{os.getpid()}.{secrets.token_hex(4)}.part"
+    )
+    try:
+        with part.open("xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    return part
+
+
+def _claim(path: Path, part: Path) -> bool:
+    """Take a name that is free, then the content, where there are no hard links."""
+    try:
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    except FileExistsError:
+        return False
+    try:
+        part.replace(path)
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+    return True

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from ikns.errors import FileError, InvalidInput
+from ikns.output.inputs import refuse_input_folder
 
 __all__ = ["check_output_folder", "output_folder"]
 
 
 def check_output_folder(
-    folder: str | Path, files: Sequence[str], *, force: bool
+    folder: str | Path,
+    files: Sequence[str],
+    *,
+    force: bool,
+    inputs: Iterable[Path | str | None] = (),
 ) -> None:
     """Check, before any work, that a folder may be written.
 
@@ -26,12 +31,15 @@ def check_output_folder(
         Every file that such a folder may hold, relative to it.
     force : bool
         Whether to replace a folder of that kind.
+    inputs : iterable of Path, str or None
+        Everything that is read, files and folders: never replaced.
 
     Raises
     ------
     InvalidInput
-        When the path is a file, the current folder, a folder with other files (which no
-        run may delete), or one with results and without `force`.
+        When something is in the way that `force` does not cover: a file, the current
+        folder, or one that holds an input or anything else. So no run deletes what no
+        run wrote.
     """
     target = Path(folder)
     if not target.absolute().parent.is_dir():
@@ -44,6 +52,7 @@ def check_output_folder(
         raise InvalidInput(
             f"{target}: expected another folder than the one that you are in."
         )
+    refuse_input_folder(target, inputs)
     found = [path for path in sorted(target.rglob("*")) if not path.is_dir()]
     for path in found:
         if path.relative_to(target).as_posix() not in files:

@@ -86,6 +86,8 @@ function facts() {
   if (known(source.refused)) rows.push(["Pose", source.refused || "counts", source.refused ? "bad" : ""]);
   if ("residual" in source) rows.push(["Residual", number(known(source.residual) ? 1000 * source.residual : null, 1, " mm")]);
   if ("worst_residual" in source) rows.push(["Farthest marker", number(known(source.worst_residual) ? 1000 * source.worst_residual : null, 0, " mm")]);
+  if (known(source.session)) rows.push(["Session", source.session || "recorded", source.session ? "bad" : ""]);
+  if (source.lost_rows) rows.push(["Rows lost", String(source.lost_rows), "bad"]);
   if ("inside" in source) rows.push(["Hand", source.inside ? "inside the points" : "outside the points", source.inside ? "" : "bad"]);
   return rows;
 }

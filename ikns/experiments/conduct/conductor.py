@@ -189,7 +189,7 @@ class Conductor:
 
         Raises
         ------
-        FileError
+        DataLoss
             When an attempt cannot be written.
         """
         self.update(now)

@@ -131,7 +131,10 @@ class LiveDriver:
         status = self._status
         if status is None:
             return {"kind": "ikns"}
-        return {
+        session = {}
+        if self._writer is not None:
+            session = {"session": self._writer.fault, "lost_rows": self._writer.lost}
+        return session | {
             "kind": "ikns",
             "state": status.state,
             "finger": self._finger_state,

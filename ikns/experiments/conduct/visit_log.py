@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, IknsError, InvalidInput
+from ikns.errors import DataLoss, IknsError, InvalidInput
 from ikns.experiments.visits import append_attempt, create_visit, read_visit
 from ikns.experiments.visits.parquet import table_bytes
 
@@ -25,7 +26,7 @@ _FIXED = (
     "design",
     "align",
 )
-_LOG = "log.jsonl"
+_HEADER, _LOG = "visit.json", "log.jsonl"
 
 
 class VisitLog:
@@ -64,7 +65,8 @@ class VisitLog:
         self.attempts: list[dict[str, Any]] = []
         self.fault = ""
         self._unwritten: list[Mapping[str, Any]] = []
-        if (self.folder / "visit.json").exists():
+        self._new = not (self.folder / _HEADER).exists()
+        if not self._new:
             record = read_visit(self.folder, experiment=about["experiment"])
             _check_same(self.folder, record.about, about)
             self.attempts = list(record.attempts)
@@ -104,17 +106,28 @@ class VisitLog:
         except OSError as error:
             self.fault = f"{self.folder / _LOG}: cannot be written: {error.strerror}."
 
+    def discard_unused(self) -> None:
+        """Remove a visit that this run began and in which no attempt was made.
+
+        So a start that failed does not stand in the way of the next one.
+        """
+        if self._new and not self.attempts:
+            with suppress(OSError):
+                (self.folder / _LOG).unlink(missing_ok=True)
+                (self.folder / _HEADER).unlink()
+                self.folder.rmdir()  # unless something else is in it
+
     def close(self) -> None:
         """Write everything that is not on disk yet.
 
         Raises
         ------
-        FileError
+        DataLoss
             When something cannot be written.
         """
         self.flush()
         if self._unwritten:
-            raise FileError(
+            raise DataLoss(
                 f"{self.folder}: {len(self._unwritten)} attempts could not be written: "
                 f"{self.fault}"
             )

@@ -37,7 +37,7 @@ def run_visit(
     ------
     InvalidInput
         When the rate is not positive, or a condition has no source.
-    FileError
+    DataLoss
         When attempts could not be written.
     """
     if not 0 < rate <= 1000:

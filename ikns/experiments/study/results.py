@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +11,9 @@ from typing import Any
 from ikns.errors import FileError, InvalidInput
 from ikns.experiments.study.cells import Task, visit_name
 from ikns.experiments.study.declaration import FILE, Study
-from ikns.experiments.visits import EXPERIMENTS, list_visits
+from ikns.experiments.visits import EXPERIMENTS, has_attempts, list_visits
+from ikns.output.file import write_text
+from ikns.output.lock import hold_lock
 
 __all__ = ["check_declaration", "missing_tasks", "run_lock", "save_declaration"]
 
@@ -59,30 +60,27 @@ def save_declaration(folder: Path, study: Study) -> None:
     if kept == before:
         return
     place = folder / "visits" / _DECLARED
-    part = place.with_suffix(".part")
     place.parent.mkdir(exist_ok=True)
-    part.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    part.replace(place)
+    write_text(place, json.dumps(kept, indent=1) + "\n")
 
 
 @contextmanager
 def run_lock(folder: Path) -> Iterator[None]:
-    """Hold the lock of a study; the lock of a killed run is released.
+    """Hold the lock of a study; that of a killed run is taken over.
 
     Raises
     ------
     InvalidInput
         When another run holds it.
+    FileError
+        When the folder cannot be written.
     """
     visits = folder / "visits"
-    visits.mkdir(exist_ok=True)
-    with (visits / _LOCK).open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InvalidInput(
-                f"{folder}: expected to run a study once at a time, found another run."
-            ) from None
+    try:
+        visits.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{visits}: cannot be made: {error.strerror}.") from None
+    with hold_lock(visits / _LOCK, "to run a study"):
         yield
 
 
@@ -94,7 +92,7 @@ def missing_tasks(folder: Path, study: Study, *, participants: int) -> Iterator[
     Raises
     ------
     FileError
-        When a visit's folder exists without its ``visit.json``.
+        When a visit's folder exists without its ``visit.json`` or any attempts.
     """
     for variation in ("", *study.variations):
         for number in range(participants):
@@ -115,6 +113,11 @@ def _done(visit: Path) -> bool:
     if not (visit / "visit.json").is_file():
         raise FileError(
             f"{visit}: expected a visit with visit.json, found none; move the folder "
+            "away."
+        )
+    if not has_attempts(visit):
+        raise FileError(
+            f"{visit}: expected a visit with attempts, found none; move the folder "
             "away."
         )
     return True

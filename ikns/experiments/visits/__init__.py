@@ -12,8 +12,15 @@ repeating one adds another. Times are in s, c from 0 to 1. Reading and writing n
 """
 
 from ikns.experiments.visits.header import FORMAT
+from ikns.experiments.visits.lock import visit_lock
 from ikns.experiments.visits.parquet import table_bytes
-from ikns.experiments.visits.reading import VisitRecord, list_visits, read_visit
+from ikns.experiments.visits.reading import (
+    VisitRecord,
+    empty_visits,
+    has_attempts,
+    list_visits,
+    read_visit,
+)
 from ikns.experiments.visits.rows import (
     EXPERIMENTS,
     counted_attempts,
@@ -34,11 +41,14 @@ __all__ = [
     "append_attempt",
     "counted_attempts",
     "create_visit",
+    "empty_visits",
+    "has_attempts",
     "list_visits",
     "read_visit",
     "table_bytes",
     "tracking_record",
     "tracking_row",
+    "visit_lock",
     "write_attempts",
     "write_visit",
 ]

@@ -10,7 +10,13 @@ from ikns.errors import FileError
 from ikns.experiments.visits.header import HEADER, read_header
 from ikns.experiments.visits.parquet import read_rows
 
-__all__ = ["VisitRecord", "list_visits", "read_visit"]
+__all__ = [
+    "VisitRecord",
+    "empty_visits",
+    "has_attempts",
+    "list_visits",
+    "read_visit",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +58,7 @@ def read_visit(folder: str | Path, *, experiment: str | None = None) -> VisitRec
     found = about["experiment"]
     if experiment is not None and found != experiment:
         raise FileError(f"{path}: expected a visit of {experiment}, found {found}.")
-    attempts = [
-        row
-        for file in sorted(path.glob("*.parquet"))
-        if not file.name.startswith(".")
-        for row in read_rows(file, found)
-    ]
+    attempts = [row for file in _attempt_files(path) for row in read_rows(file, found)]
     attempts.sort(key=lambda row: row["number"])
     for expected, row in enumerate(attempts, start=1):
         if row["number"] != expected:
@@ -80,16 +81,38 @@ def list_visits(study: str | Path) -> list[Path]:
     FileError
         When there is no such study folder.
     """
+    return [path for path in _visit_folders(study) if _is_visit(path)]
+
+
+def empty_visits(study: str | Path) -> list[Path]:
+    """Return the folders of a study that are named like visits but hold none.
+
+    See :func:`list_visits` for their order and for errors.
+    """
+    return [path for path in _visit_folders(study) if not _is_visit(path)]
+
+
+def has_attempts(visit: Path) -> bool:
+    """Whether a visit has any file of attempts, without reading it."""
+    return bool(_attempt_files(visit))
+
+
+def _visit_folders(study: str | Path) -> list[Path]:
     top = Path(study)
     if not top.is_dir():
         raise FileError(f"{top}: expected the folder of a study, found none.")
     visits = top / "visits"
-    found = sorted(p for p in visits.glob("sub-*") if _is_visit(p))
+    found = sorted(p for p in visits.glob("sub-*") if p.is_dir())
     return found + sorted(
-        p for p in visits.glob("*/sub-*") if _is_visit(p) and p.parent.name[0] != "."
+        p for p in visits.glob("*/sub-*") if p.is_dir() and p.parent.name[0] != "."
     )
+
+
+def _attempt_files(visit: Path) -> list[Path]:
+    """Return the files of attempts, unfinished ones excluded."""
+    return [p for p in sorted(visit.glob("*.parquet")) if not p.name.startswith(".")]
 
 
 def _is_visit(path: Path) -> bool:
     """Whether a folder is a visit, even a damaged one."""
-    return (path / HEADER).exists() or any(path.glob("*.parquet"))
+    return (path / HEADER).exists() or has_attempts(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -11,7 +10,9 @@ from typing import Any
 
 from ikns.errors import FileError, InvalidInput
 from ikns.experiments.visits.header import FORMAT, HEADER, header_fault, read_header
+from ikns.experiments.visits.lock import LOCK
 from ikns.experiments.visits.parquet import table_bytes
+from ikns.output.file import create_bytes, sync_folder
 
 __all__ = ["append_attempt", "create_visit", "write_attempts", "write_visit"]
 
@@ -52,7 +53,7 @@ def create_visit(folder: str | Path, about: Mapping[str, Any]) -> Path:
     if path.exists() and not path.is_dir():
         raise InvalidInput(f"{path}: expected the name of a folder, found a file.")
     held = [p.name for p in path.iterdir()] if path.exists() else []
-    held = [name for name in sorted(held) if not name.endswith(_PART)]
+    held = [n for n in sorted(held) if not n.endswith(_PART) and n != LOCK]
     if held:
         raise InvalidInput(
             f"{path}: expected a new folder for a visit, found one that holds "
@@ -93,14 +94,14 @@ def append_attempt(folder: str | Path, row: Mapping[str, Any]) -> Path:
     """
     path = Path(folder)
     content = table_bytes(read_header(path)["experiment"], [row])
-    return _new(path / f"attempt-{int(row['number']):04d}.parquet", content)
+    return _write(path / f"attempt-{int(row['number']):04d}.parquet", content)
 
 
 def write_attempts(folder: str | Path, rows: Iterable[Mapping[str, Any]]) -> Path:
     """Write all attempts of a visit as one file; see :func:`append_attempt`."""
     path = Path(folder)
     content = table_bytes(read_header(path)["experiment"], list(rows))
-    return _new(path / _ALL_ATTEMPTS, content)
+    return _write(path / _ALL_ATTEMPTS, content)
 
 
 def write_visit(
@@ -142,39 +143,19 @@ def write_visit(
         _write(part / name, content)
     try:
         part.rename(path)
-        _sync(path.parent)
+        sync_folder(path.parent)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
     return path
-
-
-def _new(path: Path, content: bytes) -> Path:
-    if path.exists():
-        raise InvalidInput(f"{path}: is there already, and no attempt is overwritten.")
-    return _write(path, content)
 
 
 def _write(path: Path, content: bytes) -> Path:
-    """Write a file under another name, flush it to the disk, then rename it."""
-    part = path.with_name(f".{path.name}.{os.getpid()}{_PART}")
+    """Write a new file; of several writers one succeeds."""
     try:
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-        _sync(path.parent)
+        new = create_bytes(path, content)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
-    finally:
-        part.unlink(missing_ok=True)
+    if not new:
+        kind = "visit" if path.name == HEADER else "attempt"
+        raise InvalidInput(f"{path}: is there already, and no {kind} is overwritten.")
     return path
-
-
-def _sync(folder: Path) -> None:
-    """Flush the names in a folder to the disk."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -82,7 +82,8 @@ class Report:
     source : dict
         Counts of frames that were dropped, late, repeated or out of order.
     lost_rows : int
-        Rows of the session that could not be written.
+        Rows of the session that were given up so far; :class:`RunWriter` counts those
+        that are missing on disk once it is closed.
     stopped : str
         Why the finger was in its safe state at the end; empty if it was not.
     """

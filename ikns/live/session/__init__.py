@@ -18,8 +18,14 @@ channels file. Missing values are ``n/a``.
 
 from ikns.live.session.channels import Channel, marker_channels, micro, model_channels
 from ikns.live.session.check import check_session, mend_session
-from ikns.live.session.dataset import create_session, next_run, open_run
-from ikns.live.session.export import export_run
+from ikns.live.session.dataset import (
+    create_session,
+    discard_run,
+    next_run,
+    open_run,
+    session_lock,
+)
+from ikns.live.session.export import check_export, export_run
 from ikns.live.session.reader import Run, read_run, runs
 from ikns.live.session.writer import RunWriter
 
@@ -27,8 +33,10 @@ __all__ = [
     "Channel",
     "Run",
     "RunWriter",
+    "check_export",
     "check_session",
     "create_session",
+    "discard_run",
     "export_run",
     "marker_channels",
     "mend_session",
@@ -38,4 +46,5 @@ __all__ = [
     "open_run",
     "read_run",
     "runs",
+    "session_lock",
 ]

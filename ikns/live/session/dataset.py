@@ -3,32 +3,42 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from ikns.errors import FileError, InvalidInput
-from ikns.live.session.channels import STATES, Channel, marker_channels, model_channels
+from ikns.live.session.channels import Channel, marker_channels, model_channels
+from ikns.live.session.sidecars import (
+    EVENTS_ABOUT,
+    TASK,
+    json_text,
+    write_json,
+    write_new,
+    write_sidecars,
+)
 from ikns.live.session.writer import RunWriter
+from ikns.output.lock import hold_lock
 
 __all__ = [
     "BIDS_VERSION",
     "EVENTS",
     "FORMAT",
-    "TASK",
     "create_session",
+    "discard_run",
     "next_run",
     "open_run",
     "run_files",
+    "session_lock",
 ]
 
 #: Version of the standard that the files follow.
 BIDS_VERSION = "1.10.0"
 #: Version of the conventions of this package within it.
 FORMAT = 1
-TASK = "ikns"
 #: Columns of the events file.
 EVENTS = (
     Channel("onset", "", "s"),
@@ -45,6 +55,13 @@ control signal c and the flexion commanded, sent and measured; rows of the two f
 correspond. `sourcedata` has the configuration and the subject of each run. `ikns
 replay` computes c and the commands again from the markers.
 """
+#: Files of the session as a whole.
+_SESSION_FILES = (
+    "dataset_description.json",
+    "README.md",
+    "participants.tsv",
+    "participants.json",
+)
 _LABEL = re.compile(r"[0-9A-Za-z]+")
 
 
@@ -79,27 +96,87 @@ def create_session(folder: str | Path, *, participant: str = "01") -> Path:
             f"{place}: exists already; use --resume to add a run to a session, or "
             "another folder."
         )
+    about = {
+        "Name": "Intrinsic kinematic null space session",
+        "BIDSVersion": BIDS_VERSION,
+        "DatasetType": "raw",
+        "GeneratedBy": [{"Name": "ikns"}],
+        "IknsFormat": FORMAT,
+    }
+    columns = {"participant_id": {"Description": "Pseudonym of the person."}}
+    texts = {
+        # The first decides between two programs that create it at once.
+        "dataset_description.json": json_text(about),
+        "README.md": _README,
+        "participants.tsv": f"participant_id\nsub-{participant}\n",
+        "participants.json": json_text(columns),
+    }
+    new, made = not place.exists(), []
     try:
         place.mkdir(parents=True, exist_ok=True)
-        _json(
-            place / "dataset_description.json",
-            {
-                "Name": "Intrinsic kinematic null space session",
-                "BIDSVersion": BIDS_VERSION,
-                "DatasetType": "raw",
-                "GeneratedBy": [{"Name": "ikns"}],
-                "IknsFormat": FORMAT,
-            },
-        )
-        _text(place / "README.md", _README)
-        _text(place / "participants.tsv", f"participant_id\nsub-{participant}\n")
-        _json(
-            place / "participants.json",
-            {"participant_id": {"Description": "Pseudonym of the person."}},
-        )
+        for name, text in texts.items():
+            write_new(place / name, text)
+            made.append(place / name)
     except OSError as error:
+        with suppress(OSError):
+            for path in made:
+                path.unlink()
+            if new:
+                place.rmdir()
         raise _fault(place, error) from None
     return place
+
+
+@contextmanager
+def session_lock(session: str | Path) -> Iterator[None]:
+    """Hold a session while a run is recorded; a folder left empty is removed.
+
+    Raises
+    ------
+    InvalidInput
+        When another process records into it.
+    FileError
+        When the folder is not a session or cannot be written.
+    """
+    next_run(session)
+    place = Path(session)
+    try:
+        with hold_lock(place / ".lock", "to record a session"):
+            yield
+    finally:
+        with suppress(OSError):  # what is recorded is in it
+            place.rmdir()
+
+
+def discard_run(session: str | Path, number: int, *, whole: bool = False) -> None:
+    """Remove a run in which nothing was recorded.
+
+    Parameters
+    ----------
+    session : str or Path
+    number : int
+        Of the run; the files of others are left alone.
+    whole : bool
+        Whether to remove the session, too, if it has no other run.
+    """
+    place = Path(session)
+    participant, _ = next_run(place)
+    files = run_files(place, participant, number)
+    kept = place / "sourcedata" / f"sub-{participant}" / f"run-{number:02d}"
+    shutil.rmtree(kept, ignore_errors=True)
+    for path in files.values():
+        stem = path.name.removesuffix("_motion.tsv")
+        for name in (f"{stem}_channels.tsv", f"{stem}_channels.json", path.name):
+            path.with_name(name).unlink(missing_ok=True)
+        path.with_suffix(".json").unlink(missing_ok=True)
+    for folder in (*files["events"].parents[:2], *kept.parents[:2]):
+        with suppress(OSError):  # of another run
+            folder.rmdir()
+    if whole and next_run(place)[1] == 1:
+        for name in _SESSION_FILES:
+            (place / name).unlink(missing_ok=True)
+        with suppress(OSError):  # something else is in it, its lock say
+            place.rmdir()
 
 
 def next_run(session: str | Path) -> tuple[str, int]:
@@ -124,10 +201,15 @@ def next_run(session: str | Path) -> tuple[str, int]:
             f"{place}: expected format version {FORMAT}, found {version!r}; use the "
             "version of ikns that wrote it."
         )
+    # A crash may have left the one without the other.
+    runs = (
+        *place.glob("sub-*/motion/*_events.tsv"),
+        *place.glob("sourcedata/sub-*/run-*"),
+    )
     numbers = [
         int(found.group(1))
-        for path in place.glob("sub-*/motion/*_events.tsv")
-        if (found := re.search(r"_run-(\d+)_", path.name))
+        for path in runs
+        if (found := re.search(r"(?:^|_)run-(\d+)(?:_|$)", path.name))
     ]
     return participant, max(numbers, default=0) + 1
 
@@ -199,92 +281,27 @@ def open_run(
         files["events"].parent.mkdir(parents=True, exist_ok=True)
         kept = place / "sourcedata" / f"sub-{participant}" / f"run-{run:02d}"
         kept.mkdir(parents=True)
-        _json(kept / "configuration.json", configuration)
+        write_json(kept / "configuration.json", configuration)
         for name, text in (subject or {}).items():
             (kept / "subject").mkdir(exist_ok=True)
-            _text(kept / "subject" / name, text)
+            write_new(kept / "subject" / name, text)
         for name, channels in columns.items():
-            _sidecars(files[name], name, channels, rate)
-            _text(files[name], "")
-        _json(files["events"].with_suffix(".json"), _EVENTS_ABOUT)
+            write_sidecars(files[name], name, channels, rate)
+            write_new(files[name], "")
+        write_json(files["events"].with_suffix(".json"), EVENTS_ABOUT)
         header = "\t".join(channel.name for channel in EVENTS)
-        _text(files["events"], f"{header}\n")
+        write_new(files["events"], f"{header}\n")
         return RunWriter(
             {name: (files[name], columns[name]) for name in columns}
             | {"events": (files["events"], EVENTS)},
             on_fault=on_fault,
         )
-    except OSError as error:
+    except (OSError, InvalidInput) as error:
+        if not isinstance(error, FileExistsError):  # of another program
+            discard_run(place, run)
+        if isinstance(error, InvalidInput):
+            raise
         raise _fault(place, error) from None
-
-
-_EVENTS_ABOUT = {
-    "trial_type": {"Description": "What happened."},
-    "value": {"Description": "Its reason or size."},
-}
-
-
-def _sidecars(path: Path, name: str, channels: Sequence[Channel], rate: float) -> None:
-    kinds = [channel.type for channel in channels]
-    names = [channel.name for channel in channels]
-    if len(set(names)) < len(names):
-        twice = next(n for n in names if names.count(n) > 1)
-        raise InvalidInput(f"two columns of the session are called '{twice}'.")
-    points = {c.tracked_point for c in channels if c.type == "POS"}
-    counts = {
-        f"{'Misc' if kind == 'MISC' else kind}ChannelCount": kinds.count(kind)
-        for kind in sorted(set(kinds))
-    }
-    _json(
-        path.with_suffix(".json"),
-        {
-            "TaskName": TASK,
-            "TaskDescription": "A wearable robot driven by the arm's null space.",
-            "SamplingFrequency": rate,
-            "TrackingSystemName": name,
-            "MotionChannelCount": len(channels),
-            "TrackedPointsCount": len(points),
-            "MissingValues": "n/a",
-            **counts,
-        },
-    )
-    fields = ("name", "component", "type", "tracked_point", "units", "reference_frame")
-    rows = [
-        (c.name, c.component, c.type, c.tracked_point, c.units, c.frame)
-        for c in channels
-    ]
-    stem = path.name.removesuffix("_motion.tsv")
-    table = "".join("\t".join(row) + "\n" for row in [fields, *rows])
-    _text(path.with_name(f"{stem}_channels.tsv"), table)
-    # World: as the cameras were calibrated. Thorax: axes of the ISB.
-    levels = {
-        "world": {"SpatialAxes": "n/a", "RotationRule": "right-hand"},
-        "thorax": {"SpatialAxes": "ASR", "RotationRule": "right-hand"},
-    }
-    used = {c.frame for c in channels} & set(levels)
-    about: dict[str, Any] = {
-        "reference_frame": {
-            "Levels": {
-                frame: {"RotationOrder": "n/a", **levels[frame]}
-                for frame in sorted(used)
-            }
-        }
-    }
-    if "state" in names:
-        about["state"] = {"Levels": {str(k): s for k, s in enumerate(STATES)}}
-    _json(path.with_name(f"{stem}_channels.json"), about)
-
-
-def _json(path: Path, value: Mapping[str, Any]) -> None:
-    _text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
-
-
-def _text(path: Path, text: str) -> None:
-    """Write a new file and sync it to the disk."""
-    with path.open("x", encoding="utf-8", newline="") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
 
 
 def _fault(place: Path, error: OSError) -> FileError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,27 @@ from scipy.io import savemat
 
 from ikns.errors import InvalidInput
 from ikns.live.session.reader import Run
+from ikns.output.file import refuse_overwriting, write_bytes, write_text
 from ikns.recording.files import write_c3d
 from ikns.recording.recording import Recording
 
-__all__ = ["FORMATS", "export_run"]
+__all__ = ["FORMATS", "check_export", "export_run"]
 
 FORMATS = ("csv", "mat", "c3d")
+
+
+def check_export(path: Path, session: Path, *, force: bool) -> None:
+    """Check, before any work, that a run of a session may be exported to a file.
+
+    Raises
+    ------
+    InvalidInput
+        When the extension is not that of a format, or the file may not be written; see
+        :func:`ikns.output.file.refuse_overwriting`.
+    """
+    if path.suffix.lower().removeprefix(".") not in FORMATS:
+        raise InvalidInput(f"{path}: expected a name that ends in .csv, .mat or .c3d.")
+    refuse_overwriting(path, force=force, inputs=[session])
 
 
 def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
@@ -35,25 +51,20 @@ def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
     Raises
     ------
     InvalidInput
-        When the extension is another one, the file exists, or the run has too few
-        frames for a C3D file.
+        See :func:`check_export`; or when the run has too few frames for a C3D file.
     """
     target = Path(path)
+    check_export(target, run.session, force=force)
     kind = target.suffix.lower().removeprefix(".")
-    if kind not in FORMATS:
-        raise InvalidInput(
-            f"{target}: expected a name that ends in .csv, .mat or .c3d."
-        )
-    if target.exists() and not force:
-        raise InvalidInput(f"{target}: exists already; use --force to overwrite it.")
     timing = {
         "frame": run.frame,
         "device_time": run.device_time,
         "receive_time": run.receive_time,
     }
     if kind == "mat":
+        table = io.BytesIO()
         savemat(
-            target,
+            table,
             {
                 **timing,
                 **run.model,
@@ -63,6 +74,7 @@ def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
             },
             oned_as="column",
         )
+        write_bytes(target, table.getvalue(), force=force)
     elif kind == "c3d":
         # Dropped frames are missing in this file: C3D has a rate but no times.
         time = np.arange(len(run.frame)) / run.rate
@@ -74,8 +86,9 @@ def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
             zip(names, run.markers.reshape(len(run.frame), -1).T, strict=True)
         )
         columns = timing | markers | run.model
-        with target.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            for row in zip(*(c.tolist() for c in columns.values()), strict=True):
-                writer.writerow(["" if value != value else value for value in row])
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(columns)
+        for row in zip(*(c.tolist() for c in columns.values()), strict=True):
+            writer.writerow(["" if value != value else value for value in row])
+        write_text(target, text.getvalue(), force=force)

@@ -1,33 +1,28 @@
-"""Append rows to files without waiting for the disk.
+"""Append rows to the files of a run without waiting for the disk.
 
 Rows go into a queue; a thread formats them, writes them five times per second and syncs
 the files once per second. A killed process loses what is in the queue; a machine that
 loses power, about a second. Rows are written completely or not at all: after a fault
 (such as a full disk) the file is cut back to its last complete row, rows wait in
-memory, and the thread tries again. Deleted files are reported too.
+memory, and the thread tries again. Files that another program deletes, moves, replaces
+or changes are reported too. How many rows are missing is counted in the closed files.
 """
 
 from __future__ import annotations
 
-import os
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from ikns.errors import InvalidInput
 from ikns.live.session.channels import Channel
+from ikns.live.session.row_file import RowFile
 
 __all__ = ["RunWriter"]
 
-Row = tuple[float | str, ...]
-
 #: Time between writes, and between syncs to the disk, s.
 _FLUSH, _SYNC = 0.2, 0.8
-#: Rows per file that wait in memory while it cannot be written: ten minutes at 100 Hz.
-_WAITING = 60_000
 
 
 class RunWriter:
@@ -38,15 +33,13 @@ class RunWriter:
     files : mapping of name to (path, channels)
         Each file must exist, empty or with a header.
     on_fault : callable, optional
-        Called from the writing thread with a message when a file cannot be written, and
-        again when it can be.
+        Called from the writing thread with a message when a file cannot be written or
+        was changed by another program, and again when all is well.
 
     Attributes
     ----------
     fault : str
         Present fault; empty if there is none.
-    lost : int
-        Number of rows lost.
     """
 
     def __init__(
@@ -58,16 +51,45 @@ class RunWriter:
         self.fault = ""
         self._on_fault = on_fault
         self._files = {
-            name: _File(path, channels) for name, (path, channels) in files.items()
+            name: RowFile(path, channels) for name, (path, channels) in files.items()
         }
+        self._lost: dict[str, int] | None = None
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="session", daemon=True)
         self._thread.start()
 
     @property
     def lost(self) -> int:
-        """Number of rows lost."""
-        return sum(file.lost for file in self._files.values())
+        """Number of rows that are missing on disk; before closing, that were dropped.
+
+        Rows that still wait count when the writer is closed, and so do those that
+        another program removed.
+        """
+        if self._lost is None:
+            return sum(file.dropped for file in self._files.values())
+        return sum(self._lost.values())
+
+    @property
+    def losses(self) -> list[str]:
+        """One sentence per file that lacks rows or had a fault in the end.
+
+        They are complete once the writer is closed.
+        """
+        found = []
+        for name, file in self._files.items():
+            lost = file.dropped if self._lost is None else self._lost[name]
+            reason = f" ({file.fault})" if file.fault else ""
+            if lost:
+                found.append(
+                    f"{file.path}: {lost} of {file.rows} rows are missing{reason}."
+                )
+            elif file.fault:
+                found.append(f"{file.path}: {file.fault}.")
+        return found
+
+    def rows(self, name: str) -> int:
+        """Return how many rows were handed over for a file."""
+        return self._files[name].rows
 
     def row(self, name: str, values: Sequence[float | str]) -> None:
         """Append a row to a file, without waiting.
@@ -88,11 +110,13 @@ class RunWriter:
         file.put(tuple(v if isinstance(v, str) else float(v) for v in values))
 
     def close(self) -> None:
-        """Write and sync all rows; harmless when repeated."""
+        """Write and sync all rows, and count those on disk; harmless when repeated."""
         self._closing.set()
         self._thread.join()
-        for file in self._files.values():
-            file.close()
+        if self._lost is None:
+            for file in self._files.values():
+                file.close()
+            self._lost = {name: file.lost() for name, file in self._files.items()}
 
     def __enter__(self) -> RunWriter:
         """Return itself."""
@@ -107,10 +131,15 @@ class RunWriter:
         while True:
             last = self._closing.wait(_FLUSH)
             sync = last or time.monotonic() - synced >= _SYNC
-            faults = [file.write(sync=sync) for file in self._files.values()]
+            for file in self._files.values():
+                file.write(sync=sync)
             if sync:
                 synced = time.monotonic()
-            self._report("; ".join(fault for fault in faults if fault))
+            self._report(
+                "; ".join(
+                    f"{f.path}: {f.fault}" for f in self._files.values() if f.fault
+                )
+            )
             if last:
                 return
 
@@ -119,88 +148,3 @@ class RunWriter:
             self.fault = fault
             if self._on_fault:
                 self._on_fault(fault or "the session is written again.")
-
-
-class _File:
-    """One file and the rows waiting for it."""
-
-    def __init__(self, path: Path, channels: Sequence[Channel]) -> None:
-        self.path, self.width, self.lost = path, len(channels), 0
-        self._forms = [channel.form for channel in channels]
-        self._line = "\t".join(self._forms) + "\n"
-        self._rows: deque[Row] = deque()
-        self._descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
-        self._size = os.fstat(self._descriptor).st_size
-        self._torn = self._deleted = False
-
-    def put(self, row: Row) -> None:
-        if len(self._rows) >= _WAITING:
-            self._rows.popleft()
-            self.lost += 1
-        self._rows.append(row)
-
-    def write(self, *, sync: bool) -> str:
-        """Write the waiting rows; return the fault, or an empty string."""
-        rows = []
-        while self._rows:
-            rows.append(self._rows.popleft())
-        if self._deleted:
-            self.lost += len(rows)
-            return self._fault("it has been deleted")
-        try:
-            if self._torn:
-                self._cut()
-            if rows:
-                self._append("".join(map(self._print, rows)).encode())
-            if sync:
-                os.fsync(self._descriptor)
-                # Writing to a deleted file succeeds without effect.
-                self._deleted = os.fstat(self._descriptor).st_nlink == 0
-        except OSError as error:
-            self._requeue(rows)
-            with suppress(OSError):
-                self._cut()
-            return self._fault((error.strerror or str(error)).lower())
-        return self._fault("it has been deleted") if self._deleted else ""
-
-    def _fault(self, reason: str) -> str:
-        return f"{self.path}: cannot be written: {reason}"
-
-    def close(self) -> None:
-        if self._descriptor >= 0:
-            os.close(self._descriptor)
-            self._descriptor = -1
-            self.lost += len(self._rows)
-            self._rows.clear()
-
-    def _append(self, data: bytes) -> None:
-        self._torn = True
-        view = memoryview(data)
-        while view:
-            view = view[os.write(self._descriptor, view) :]
-        self._size += len(data)
-        self._torn = False
-
-    def _cut(self) -> None:
-        """Cut back to the last complete row."""
-        os.ftruncate(self._descriptor, self._size)
-        self._torn = False
-
-    def _requeue(self, rows: list[Row]) -> None:
-        if self._torn:  # otherwise they are written but not yet synced
-            self._rows.extendleft(reversed(rows))
-        while len(self._rows) > _WAITING:
-            self._rows.popleft()
-            self.lost += 1
-
-    def _print(self, row: Row) -> str:
-        if all(type(value) is float and value == value for value in row):
-            return self._line % row
-        return "\t".join(map(_cell, self._forms, row)) + "\n"
-
-
-def _cell(form: str, value: float | str) -> str:
-    if isinstance(value, str):
-        # No tabs or line breaks within a cell.
-        return " ".join(value.split()) or "n/a"
-    return form % value if value == value else "n/a"

@@ -18,6 +18,7 @@ from ikns.experiments.tracking import error_over_time, measure
 from ikns.experiments.visits import (
     VisitRecord,
     counted_attempts,
+    has_attempts,
     read_visit,
     tracking_record,
 )
@@ -109,6 +110,8 @@ def digest_visit(folder: Path) -> Digest | ExcludedVisit:
     try:
         with naming(str(folder)):
             visit = read_visit(folder)
+            if not has_attempts(folder):
+                raise FileError("expected a visit with attempts, found none.")
             if visit.about["experiment"] == "tracking":
                 return _tracking(visit)
             return _picking(visit)

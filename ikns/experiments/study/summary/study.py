@@ -14,7 +14,7 @@ from ikns.experiments.study.summary.accumulate import VisitAccumulator
 from ikns.experiments.study.summary.digest import Digest, ExcludedVisit, digest_visit
 from ikns.experiments.study.summary.picking import PickingSummary, summarize_picking
 from ikns.experiments.study.summary.tracking import TrackingSummary, summarize_tracking
-from ikns.experiments.visits import list_visits
+from ikns.experiments.visits import empty_visits, list_visits
 
 __all__ = ["Group", "StudySummary", "summarize"]
 
@@ -93,13 +93,15 @@ def summarize(
     single = (top / "visit.json").is_file()
     paths = [top] if single else list_visits(top)
     plan = {} if single else _plan(top)
+    left_out = [] if single else _empty(top)
+    if not paths and left_out:
+        raise FileError(left_out[0].reason)
     if not paths:
         raise FileError(
             f"{top}: expected a study with visits, or a visit, found none; "
             "`ikns study run` simulates them, `ikns track` and `ikns pick` make them."
         )
     groups: dict[tuple[bool, str], VisitAccumulator] = {}
-    left_out: list[ExcludedVisit] = []
     used = 0
     for done, digest in enumerate(_digests(paths, workers), start=1):
         progress("reading visits", done, len(paths))
@@ -162,6 +164,14 @@ def _digests(
         n_jobs=workers or -1, return_as="generator"
     )(delayed(digest_visit)(path) for path in paths)
     return done
+
+
+def _empty(folder: Path) -> list[ExcludedVisit]:
+    """Name folders that are called like visits and hold none."""
+    return [
+        ExcludedVisit(path, f"{path}: expected a visit with visit.json, found none.")
+        for path in empty_visits(folder)
+    ]
 
 
 def _plan(folder: Path) -> dict[str, Any]:

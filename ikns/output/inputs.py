@@ -1,0 +1,81 @@
+"""What a command reads, it never replaces, whatever name the file goes by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from ikns.errors import InvalidInput
+
+__all__ = ["refuse_input", "refuse_input_folder"]
+
+#: Device and number of a file on it: the same for all names of one file.
+Identity = tuple[int, int]
+
+
+def refuse_input(path: Path, inputs: Iterable[Path | str | None]) -> None:
+    """Refuse to replace a file that is read, or one in a folder that is read.
+
+    Files are compared by identity, so links, relative paths, other spellings on a file
+    system that ignores case, and ``/dev/stdin`` make no difference.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    inputs : iterable of Path, str or None
+        Files and folders; None is no input.
+
+    Raises
+    ------
+    InvalidInput
+        When it is one of them or in one of them.
+    """
+    own = _identity(path)
+    if own is None:  # a new file
+        return
+    for source in _given(inputs):
+        held = source.rglob("*") if source.is_dir() else [source]
+        if any(_identity(each) == own for each in held if not each.is_dir()):
+            raise InvalidInput(
+                f"{path}: expected another file to write, found one that is read as "
+                f"{source}; choose another name."
+            )
+
+
+def refuse_input_folder(folder: Path, inputs: Iterable[Path | str | None]) -> None:
+    """Refuse to replace a folder that is read, or that holds what is read.
+
+    Raises
+    ------
+    InvalidInput
+        When an input is the folder, lies in it, or is a file of it under another name.
+    """
+    own = _identity(folder)
+    if own is None:
+        return
+    held = {_identity(path) for path in folder.rglob("*") if not path.is_dir()}
+    for source in _given(inputs):
+        place = source.resolve()
+        around = {_identity(each) for each in (place, *place.parents)}
+        if own in around or (not source.is_dir() and _identity(source) in held):
+            raise InvalidInput(
+                f"{folder}: expected another folder to write, found one with {source}, "
+                "which is read; choose another name."
+            )
+
+
+def _given(inputs: Iterable[Path | str | None]) -> Iterator[Path]:
+    """Yield the inputs that exist; a missing one is reported by who reads it."""
+    for source in inputs:
+        if source is not None and _identity(Path(source)) is not None:
+            yield Path(source)
+
+
+def _identity(path: Path) -> Identity | None:
+    """Return which file a path leads to; None where it leads to none."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):  # a null byte, in the name of a marker set say
+        return None
+    return found.st_dev, found.st_ino
