@@ -94,9 +94,7 @@ def run(
     calibrated = ikns.Subject.load(subject)
     device = open_finger(finger, safety=Safety(safe_state=safe_state))
     with ExitStack() as stack:
-        stream = stack.enter_context(
-            open_source(source, needs=calibrated.skeleton.marker_set)
-        )
+        stream = stack.enter_context(open_source(source, subject=calibrated))
         ikns.warm_up()
         writer = None
         if session is not None:

@@ -25,6 +25,7 @@ from ikns.live.runtime.priority import realtime_priority
 from ikns.live.runtime.report import LoopStatus, Report
 from ikns.live.session import RunWriter
 from ikns.live.stream import Source
+from ikns.live.stream.subjects import check_one_subject
 
 __all__ = ["run"]
 
@@ -82,7 +83,7 @@ def run(
     InvalidInput
         When the system does not allow real-time priority.
     MarkerMismatch
-        When the source has none of the subject's markers.
+        When the source has none of the subject's markers, or those of several people.
     FingerError
         When the finger cannot be connected.
 
@@ -104,13 +105,14 @@ def run(
     5
     """
     marker_set = subject.skeleton.marker_set
-    missing = [label for label in marker_set.labels if label not in source.labels]
-    if len(missing) == len(marker_set.labels):
+    check_one_subject(source.name, source.labels, marker_set)
+    columns = marker_set.columns(source.labels)
+    if (columns < 0).all():
         raise MarkerMismatch(
             f"{source.name}: expected markers of the subject such as "
-            f"{', '.join(missing[:6])}, found {', '.join(source.labels[:6])}."
+            f"{', '.join(marker_set.labels[:6])}, found "
+            f"{', '.join(source.labels[:6])}."
         )
-    columns = marker_set.columns(source.labels)
     controller, twin = (
         Controller(
             FrameSolver(subject.skeleton, subject.null_space_map, subject.chain),
