@@ -82,7 +82,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 on success, 2 on bad input, 130 when interrupted.
+        0 on success, 2 on bad input, 3 when a finger never moved or ended in its safe
+        state, 130 when interrupted.
     """
     try:
         # Not standalone: typer then raises errors instead of printing several lines.

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 import ikns
-from ikns.cli.live_session import live_session, software, stopped_by_signals
+from ikns.cli.live_session import live_session, say, software, stopped_by_signals
 from ikns.cli.options import AsJson, SubjectFolder
 from ikns.cli.output import show, table
 from ikns.errors import InvalidInput
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["run"]
 
+#: Exit code of a run whose finger never moved, or ended in its safe state.
+_DID_NOT_MOVE = 3
 #: Interval of the status line on the terminal, s.
 _LINE_EVERY = 0.2
 
@@ -74,6 +76,8 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
+
+    Exits with 3 when it ran but the finger never moved, or ended in its safe state.
 
     Research software, not a medical device.
     """
@@ -138,6 +142,7 @@ def run(
             stop=stop,
             on_status=_each(shown) if shown else None,
             status_every=1 / 30 if view else _LINE_EVERY,
+            on_notice=say,
             realtime=realtime,
         )
     result = _result(report) | {"session": session}
@@ -148,13 +153,23 @@ def run(
             {"quantity": "s", "value": "s"},
             _rows(report),
         ),
+        *([f"Note: {report.problem}"] if report.problem else []),
         *(
             f"{c.time:9.3f} s  {c.before} to {c.after}: {c.reason}"
             for c in report.transitions[-12:]
         ),
+        *(f"{n} frames: {reason}" for reason, n in _most(report.rejections)),
         *([f"Wrote {session}"] if session else []),
         as_json=as_json,
     )
+    if report.problem:
+        say(report.problem)
+        raise typer.Exit(_DID_NOT_MOVE)
+
+
+def _most(rejections: dict[str, int]) -> list[tuple[str, int]]:
+    """Return the most frequent reasons."""
+    return list(rejections.items())[:12]
 
 
 @contextmanager
@@ -214,6 +229,9 @@ def _result(report: Report) -> dict[str, Any]:
             for name, times in report.stages.items()
         },
         "source": report.source,
+        "problem": report.problem,
+        "rejections": report.rejections,
+        "notices": report.notices,
         "transitions": [change._asdict() for change in report.transitions],
         "lost_rows": report.lost_rows,
     }
@@ -225,6 +243,7 @@ def _rows(report: Report) -> list[list[str]]:
     return [
         ["frames", str(report.frames)],
         ["seconds", f"{report.seconds:.1f}"],
+        ["frames rejected", str(sum(report.rejections.values()))],
         [
             "dropped, late, repeated, out of order",
             ", ".join(

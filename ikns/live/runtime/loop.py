@@ -42,6 +42,7 @@ def run(
     on_status: Callable[[LoopStatus], None] | None = None,
     status_every: float = 0.2,
     on_decision: Callable[[float, float, Decision], None] | None = None,
+    on_notice: Callable[[str], None] | None = None,
     realtime: bool = False,
 ) -> Report:
     """Drive a finger with a person's null space until the source ends.
@@ -71,6 +72,10 @@ def run(
         Called after each frame's command with the time of receipt (s, of
         `time.monotonic`), the commanded flexion and the :class:`Decision`; also from
         within the loop.
+    on_notice : callable, optional
+        Called with a sentence: why the finger does not move yet, half a second after
+        the start; that it is in its safe state, and why; and events of the source.
+        Also from within the loop.
     realtime : bool
         Give the loop priority over ordinary programs, where the system allows it.
 
@@ -120,7 +125,7 @@ def run(
         )
         for _ in range(2)
     )
-    loop = FrameLoop(source, controller, twin, columns, finger, session)
+    loop = FrameLoop(source, controller, twin, columns, finger, session, on_notice)
     # Compile or load everything before the finger is connected.
     controller.solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     controller.solver.reset()
