@@ -8,6 +8,7 @@ import socket
 import struct
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from types import TracebackType
 
 import numpy as np
@@ -59,7 +60,8 @@ class QtmServer:
         self.streaming.clear()
         while self._clients:
             client = self._clients.pop()
-            client.shutdown(socket.SHUT_RDWR)
+            with suppress(OSError):  # the client has left already
+                client.shutdown(socket.SHUT_RDWR)
             client.close()
 
     def _accept(self) -> None:

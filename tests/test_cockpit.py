@@ -37,13 +37,14 @@ from ikns.view.scene.browser import HOW_TO_GET_ONE, browser_options, find_browse
 PAGES = ("gamepad", "keyboard", "mouse")
 #: A gamepad as browsers give it; the test moves its stick.
 GAMEPAD = """
-    window.stick = { axes: [0, 0, 0, 0], pressed: false, there: true };
+    window.stick = {
+        axes: [0, 0, 0, 0], pressed: false, there: true, mapping: "standard" };
     const button = () => ({ pressed: false, touched: false, value: 0 });
     navigator.getGamepads = () => {
         if (!stick.there) return [null, null, null, null];
         const buttons = Array.from({ length: 17 }, button);
         buttons[0] = { pressed: stick.pressed, touched: stick.pressed, value: 1 };
-        return [null, { id: "Test", index: 1, connected: true, mapping: "standard",
+        return [null, { id: "Test", index: 1, connected: true, mapping: stick.mapping,
             axes: stick.axes, buttons, timestamp: performance.now() }, null, null];
     };
 """
@@ -132,13 +133,13 @@ class Served:
     def let_pass(self, seconds: float) -> None:
         """Let the visit's clock go on."""
         self.clock.let_pass(seconds)
-        self.heard = self.conductor.shown["source"].get("told", 0)
+        self.heard = self.conductor.shown["source"].get("received", 0)
 
     def hears(self, c: float, within: float = 0.0) -> None:
         """Wait until a page has told a control signal at the present time."""
 
         def told(shown: Any) -> bool:
-            new = shown["source"].get("told", 0) > self.heard
+            new = shown["source"].get("received", 0) > self.heard
             return new and abs(shown["c"] - c) <= within
 
         self.wait(told)
@@ -351,6 +352,20 @@ def test_an_unplugged_gamepad_gives_no_signal(chromium: Any, tmp_path: Path) -> 
         page.keyboard.press("Space")
         visit.wait(lambda shown: "button of the gamepad" in shown["message"])
         assert visit.conductor.shown["state"] == "waiting"
+
+
+def test_both_pages_say_which_gamepad_is_read(chromium: Any, tmp_path: Path) -> None:
+    with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1) as visit:
+        panel, page = visit.panel(), visit.participant(script=GAMEPAD)
+        visit.hears(0.0)
+        says(page, "input", "Test: left stick")
+        shown = "() => document.getElementById('facts').innerText.includes('{}')"
+        panel.wait_for_function(shown.format("Test: left stick"))
+        # One whose layout the browser does not know is no longer believed.
+        page.evaluate("stick.mapping = ''")
+        visit.wait(lambda shown: not shown["c"] == shown["c"])
+        panel.wait_for_function(shown.format("Test is not understood: push"))
+        assert "not understood" in page.inner_text("#input")
 
 
 @pytest.mark.parametrize("how", ["button", "panel key", "participant key"])

@@ -13,11 +13,12 @@ import small_person
 from ikns.calibration.subject import FILES, Subject
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.finger import SimulatedFinger
+from ikns.live.control.rejection_count import kind_of
 from ikns.live.control.settings import ControlSettings
 from ikns.live.runtime import replay_run, run
 from ikns.live.session import check_session, create_session, open_run, read_run
 from ikns.live.session.channels import STATES
-from ikns.live.stream import Source
+from ikns.live.stream import Event, Source
 from ikns.live.stream.replay import Replay
 from ikns.recording.recording import Recording
 
@@ -309,6 +310,81 @@ def test_every_decision_is_handed_on_with_its_time(subject, exploring, tmp_path)
     assert list(when) == sorted(when)
     np.testing.assert_array_equal(flexion, record.model["flexion_asked"])
     np.testing.assert_array_equal([d.flexion for d in decisions], flexion)
+
+
+def test_events_of_the_source_are_told_and_recorded(subject, exploring, tmp_path):
+    folder, told = tmp_path / "session", []
+    with session_for(subject, folder, tmp_path) as session:
+        with source(exploring, speed=0) as stream:
+            stream.events.append(Event(0.0, "lab: before the\tstart."))
+            frames = iter(range(1000))
+
+            def meanwhile(*_):
+                if next(frames) == 40:
+                    stream.events.append(Event(1.0, "lab: one."))
+                    stream.events.append(Event(1.0, "lab: two."))
+
+            report = run(
+                stream,
+                subject,
+                session=session,
+                on_decision=meanwhile,
+                on_notice=told.append,
+            )
+    assert told == ["lab: before the\tstart.", "lab: one.", "lab: two."]
+    assert report.notices == told
+    assert report.problem == ""
+    recorded = [e[3] for e in read_run(folder).events if e[2] == "notice"]
+    assert recorded == ["lab: before the start.", "lab: one.", "lab: two."]
+    assert replay_run(read_run(folder)).same
+    assert check_session(folder) == []
+
+
+class Mute(Replay):
+    """A source that sends nothing."""
+
+    def poll(self, timeout):
+        time.sleep(min(timeout, 0.02))
+
+
+def test_without_any_frame_that_is_the_reason(subject, exploring):
+    told = []
+    with Source(Mute(exploring)) as stream:
+        report = run(stream, subject, duration=0.8, on_notice=told.append)
+    # The source reports its silence, too.
+    (why,) = (sentence for sentence in told if "does not move yet" in sentence)
+    assert why.endswith(" s: no frame came.")
+    assert report.problem == "the finger never moved: no frame came."
+
+
+def test_each_new_reason_is_told_once(subject, exploring):
+    # A frame with every marker, and noise: none is equal to another.
+    whole = exploring.markers[np.isfinite(exploring.markers).all(axis=(1, 2))][0]
+    noise = np.random.default_rng(4).normal(scale=1e-4, size=exploring.markers.shape)
+    told, markers = [], whole + noise
+    markers[:80, exploring.labels.index("RFIN")] = np.nan
+    markers[80:, exploring.labels.index("RUPA"), 0] += 0.4
+    there = dataclasses.replace(exploring, markers=markers)
+    with source(there) as stream:
+        report = run(stream, subject, on_notice=told.append)
+    first, *others = told
+    assert first.endswith(": the right hand is not in sight.")
+    assert others
+    assert all("RUPA" in sentence for sentence in others)
+    assert len(others) == len({kind_of(n.partition(": ")[2]) for n in others})
+    assert sum(report.rejections.values()) == report.frames
+    assert report.rejections["the right hand is not in sight"] == 80
+    assert all("up to" in why for why in report.rejections if "RUPA" in why)
+
+
+def test_a_wrong_unit_is_a_reason_where_it_was_not_refused(subject, exploring):
+    there = dataclasses.replace(exploring, markers=100 * exploring.markers)
+    with source(there, speed=0) as stream:
+        report = run(stream, subject)
+    (why,) = (w for w in report.rejections if "in sight" not in w)
+    assert why == (
+        "the body is 100 times as large as at calibration; the unit may be wrong"
+    )
 
 
 def test_warming_caches_changes_nothing(subject, exploring, tmp_path):

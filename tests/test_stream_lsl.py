@@ -25,9 +25,9 @@ from ikns.live.stream import (
     broadcast,
     open_source,
 )
-from ikns.live.stream.lsl_feed import ANY_MOCAP
 from ikns.live.stream.lsl_layout import read_lsl_layout
 from ikns.live.stream.lsl_library import lsl, lsl_settings
+from ikns.live.stream.lsl_search import ANY_MOCAP
 from ikns.recording.recording import Recording
 
 
@@ -179,10 +179,12 @@ def vendor(
     kind: str = "Mocap",
     rate: float = 100.0,
     form: str = "float32",
+    source_id: str | None = None,
 ) -> Any:
     """Make an outlet as another program would."""
     pylsl = lsl("a test", this_machine=True)
-    info = pylsl.StreamInfo(name, kind, max(1, len(channels)), rate, form, name)
+    own = name if source_id is None else source_id
+    info = pylsl.StreamInfo(name, kind, max(1, len(channels)), rate, form, own)
     node = info.desc().append_child("channels")
     for fields in channels:
         channel = node.append_child("channel")
@@ -209,13 +211,17 @@ def test_channels_of_another_program_are_sorted_out(name: str) -> None:
     ]  # fmt: skip
     outlet = vendor(name, channels)
     with opened(name) as source:
-        outlet.push_sample([3, 9, 9, 9, 10, 8, 1, 30, 20, float("nan")], 50.0)
+        outlet.push_sample([3, 9, 9, 9, 10, 8, 1, 30, 20, 2], 50.0)
         frame = next(source)
+        outlet.push_sample([3, 9, 9, 9, 10, 8, 1, 30, 20, float("nan")], 50.01)
+        hidden = next(source)
         assert source.labels == ("B", "A")
     np.testing.assert_allclose(
-        frame.markers, [[1, np.nan, 3], [0.010, 0.020, 0.030]], rtol=1e-15
+        frame.markers, [[1, 2, 3], [0.010, 0.020, 0.030]], rtol=1e-15
     )
     assert frame.device_time == 50.0
+    # As in files: a point with a missing coordinate was not seen.
+    assert np.isnan(hidden.markers).all(axis=1).tolist() == [True, False]
 
 
 AXES = [marker("A", axis) for axis in "XYZ"]
@@ -228,7 +234,14 @@ AXES = [marker("A", axis) for axis in "XYZ"]
         ([{"label": "Fz", "type": "Force"}], "found Force"),
         (AXES[:2], "PositionX, PositionY and PositionZ of marker A, found only x, y"),
         ([*AXES, AXES[0]], "one PositionX channel for marker A, found two"),
-        ([*AXES[:2], marker("A", "Z", "feet")], "meters or millimeters, found feet"),
+        (
+            [*AXES[:2], marker("A", "Z", "feet")],
+            "mm, cm or m for channel A_Z, found f",
+        ),
+        (
+            [*AXES[:2], marker("A", "Z", "")],
+            "found none; say which it is with the op",
+        ),
     ],
 )
 def test_a_description_without_markers_is_refused(
@@ -244,6 +257,39 @@ def test_a_description_without_markers_is_refused(
     assert says in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("said", "option", "meters"),
+    [
+        ("centimetres", None, 0.01),
+        ("", "mm", 1e-3),
+        ("", "m", 1.0),
+        ("meters", "cm", 0.01),  # the option counts, where the description is wrong
+        ("furlongs", "mm", 1e-3),
+    ],
+)
+def test_a_unit_is_that_of_the_option_or_of_the_description(
+    said: str, option: str | None, meters: float
+) -> None:
+    channels = "".join(
+        "<channel>"
+        + "".join(f"<{k}>{v}</{k}>" for k, v in marker("A", axis, said).items())
+        + "</channel>"
+        for axis in "XYZ"
+    )
+    layout = read_lsl_layout(f"<info>{channels}</info>", "lsl:x", unit=option)
+    np.testing.assert_array_equal(layout.markers(np.array([1.0, 2.0, 4.0])),
+                                  [[meters, 2 * meters, 4 * meters]])  # fmt: skip
+
+
+def test_a_stream_without_a_unit_is_read_with_the_option_only(name: str) -> None:
+    outlet = vendor(name, [marker("A", axis, "") for axis in "XYZ"])
+    with pytest.raises(StreamError, match=rf"as in lsl:{name}\?unit=mm\.$"):
+        opened(name)
+    with open_source(f"lsl:{name}?scope=machine&timeout=10&unit=mm") as source:
+        outlet.push_sample([100.0, 200.0, 400.0], 50.0)
+        np.testing.assert_allclose(next(source).markers, [[0.1, 0.2, 0.4]], rtol=1e-15)
+
+
 @pytest.mark.parametrize("kind", ["MoCap", "Mocap", "MOCAP"])
 def test_without_a_name_any_stream_of_the_type_is_found(name: str, kind: str) -> None:
     pylsl = lsl("a test", this_machine=True)
@@ -257,7 +303,6 @@ def test_without_a_name_any_stream_of_the_type_is_found(name: str, kind: str) ->
     ("options", "says"),
     [
         ({"kind": "EEG"}, "of type MoCap, found EEG"),
-        ({"rate": 0}, "rate above 0 frames/s, found 0"),
         ({"form": "int16"}, "channels of float32 or double64"),
     ],
 )

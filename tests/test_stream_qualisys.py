@@ -60,6 +60,17 @@ def test_frames_arrive_with_number_time_markers_and_what_the_cameras_lost() -> N
     assert source.continuity.counts.dropped == 0
 
 
+def test_zeros_are_a_marker_that_was_not_seen() -> None:
+    markers = MARKERS[1].copy()
+    markers[2] = 0.0
+    markers[0, :2] = 0.0  # on the axis of the laboratory, but seen
+    with QtmServer(LABELS) as server, opened(server) as source:
+        server.send(101, 5_010_000, markers)
+        _, frame = read(source, 2)
+    seen = np.isfinite(frame.markers).all(axis=1)
+    assert seen.tolist() == [True, True, False]
+
+
 def test_frames_that_qtm_leaves_out_are_counted() -> None:
     with QtmServer(LABELS) as server, opened(server) as source:
         for k in (1, 2, 5, 6, 6, 9):

@@ -132,3 +132,17 @@ def test_in_real_time_no_frame_comes_before_its_time() -> None:
     assert len(frames) == 20
     waited = np.array([f.receive_time - frames[0].receive_time for f in frames])
     assert (waited >= np.arange(20) / 200 - 1e-9).all()
+
+
+def test_zeros_are_a_gap_live_as_in_files() -> None:
+    seen = np.array([0.0, 0.0, 1e-300])  # not exactly zero
+    markers = np.stack([np.zeros(3), -np.zeros(3), seen, [0.1, np.nan, 0.2]])
+    there = Recording([0.0, 0.01], [markers, markers], ["A", "B", "C", "D"])
+    with Source(Replay(there, speed=0)) as source:
+        frames = list(source)
+    for frame in frames:
+        gap = np.isnan(frame.markers)
+        assert gap.all(axis=1).tolist() == [True, True, False, True]
+        np.testing.assert_array_equal(frame.markers[2], seen)
+    # What is played stays as it is.
+    np.testing.assert_array_equal(there.markers[0, 0], np.zeros(3))

@@ -47,6 +47,14 @@ def test_frames_arrive_in_meters_with_hidden_markers_as_nan(
         assert frame.device_time == frame.number / 100
 
 
+def test_zeros_are_a_marker_that_was_not_seen(stage: vicon_sdk.Stage) -> None:
+    # Not flagged as occluded, as some versions of the software send it.
+    stage.frames.put((1, {"Ann:RSHO": (0.0, 0.0, 0.0), "Ann:RELB": (0.0, 0.0, 9.0)}))
+    with open_source("vicon:cameras?timeout=10") as source:
+        frame = next(source)
+    assert np.isnan(frame.markers).all(axis=1).tolist() == [True, False]
+
+
 def test_a_connection_that_breaks_is_made_again(stage: vicon_sdk.Stage) -> None:
     stage.frames.put((1, {}))
     with open_source("vicon:cameras?timeout=10") as source:

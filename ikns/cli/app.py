@@ -86,8 +86,9 @@ def run_command(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 on success, 1 when something recorded is not on disk, 2 on bad input, 128 + n
-        when signal n ended the command.
+        0 on success, 1 when something recorded is not on disk, 2 on bad input, 3 when a
+        finger never moved or ended in its safe state, 128 + n when signal n ended the
+        command.
     """
     try:
         # Not standalone: typer then raises errors instead of printing several lines.

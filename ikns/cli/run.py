@@ -78,6 +78,8 @@ def run(
 ) -> None:
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
 
+    Exits with 3 when it ran but the finger never moved, or ended in its safe state.
+
     Research software, not a medical device.
     """
     from ikns.calibration.simulated import is_simulated
@@ -97,9 +99,7 @@ def run(
     calibrated = ikns.Subject.load(subject)
     device = open_finger(finger, safety=Safety(safe_state=safe_state))
     with ExitStack() as stack:
-        stream = stack.enter_context(
-            open_source(source, needs=calibrated.skeleton.marker_set)
-        )
+        stream = stack.enter_context(open_source(source, subject=calibrated))
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
         losses: list[str] = []
@@ -147,6 +147,7 @@ def run(
             arm=arm,
             on_status=_each(shown),
             status_every=1 / 30 if view else _LINE_EVERY,
+            on_notice=say,
             realtime=realtime,
         )
     if writer is not None:
@@ -162,10 +163,12 @@ def run(
             {"quantity": "s", "value": "s"},
             _rows(report),
         ),
+        *([f"Note: {report.problem}"] if report.problem else []),
         *(
             f"{c.time:9.3f} s  {c.before} to {c.after}: {c.reason}"
             for c in report.transitions[-12:]
         ),
+        *(f"{n} frames: {reason}" for reason, n in _most(report.rejections)),
         *([f"Wrote {session}"] if session else []),
         as_json=as_json,
     )
@@ -175,8 +178,16 @@ def run(
     if report.stopped and not dry_run:
         say(stop_line(report.stopped))
         code = STOPPED
+    elif report.problem:
+        say(report.problem)
+        code = STOPPED
     if code:
         raise typer.Exit(code)
+
+
+def _most(rejections: dict[str, int]) -> list[tuple[str, int]]:
+    """Return the most frequent reasons."""
+    return list(rejections.items())[:12]
 
 
 @contextmanager
@@ -243,6 +254,9 @@ def _result(report: Report) -> dict[str, Any]:
             for name, times in report.stages.items()
         },
         "source": report.source,
+        "problem": report.problem,
+        "rejections": report.rejections,
+        "notices": report.notices,
         "transitions": [change._asdict() for change in report.transitions],
         "lost_rows": report.lost_rows,
     }
@@ -254,6 +268,7 @@ def _rows(report: Report) -> list[list[str]]:
     return [
         ["frames", str(report.frames)],
         ["seconds", f"{report.seconds:.1f}"],
+        ["frames rejected", str(sum(report.rejections.values()))],
         [
             "dropped, late, repeated, out of order",
             ", ".join(

@@ -126,11 +126,11 @@ def arm_is_simulated(subject: ikns.Subject, arm: ArmOptions) -> bool:
 def open_arm_source(
     arm: ArmOptions, subject: ikns.Subject
 ) -> AbstractContextManager[Source]:
-    """Connect to the source; it must have every marker of the subject."""
+    """Connect to the source; its markers and their size must be the subject's."""
     from ikns.live.stream import open_source
 
     assert arm.source is not None
-    return open_source(arm.source, needs=subject.skeleton.marker_set)
+    return open_source(arm.source, subject=subject)
 
 
 def arm_driver(

@@ -42,7 +42,9 @@ class Hub(Protocol):
     def leave(self, page: ConnectedPage) -> None:
         """Remove a page; if it was in control, the next one is."""
 
-    def steer(self, condition: str, now: float, c: float, round_trip: float) -> None:
+    def steer(
+        self, condition: str, now: float, c: float, round_trip: float, device: str
+    ) -> None:
         """Take a control signal from the page in control."""
 
     def press(self) -> None:

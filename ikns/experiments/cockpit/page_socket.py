@@ -79,6 +79,7 @@ class PageSocket(CheckedSocket):
             received = json.loads(message)
             name = received.get("command")
             text = str(received.get("text", ""))[:_MAX_TEXT]
+            device = str(received.get("device", ""))[:_MAX_TEXT]
             number, c = int(received.get("n", 0)), received.get("c")
             value = math.nan if c is None else float(c)
         except (ValueError, TypeError, AttributeError, RecursionError):
@@ -89,7 +90,7 @@ class PageSocket(CheckedSocket):
             self._submit(str(name), text)
         if self.role == "participant" and "c" in received:
             condition = str(received.get("condition"))
-            self.cockpit.steer(condition, now, value, round_trip)
+            self.cockpit.steer(condition, now, value, round_trip, device)
 
     def _submit(self, name: str, text: str) -> None:
         """Pass a command on if the page's role allows it."""

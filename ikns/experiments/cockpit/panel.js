@@ -75,6 +75,7 @@ function facts() {
   const source = shown.source, rows = [["c", number(shown.c, 3), known(shown.c) ? "" : "bad"]];
   if (source.kind === "page") {
     rows.push(["Participant's page", shown.page_connected ? "connected" : "none", shown.page_connected ? "good" : "bad"]);
+    if (source.device) rows.push(["Gamepad", source.device, known(shown.c) ? "" : "bad"]);
     rows.push(["Screen to answer, p99", number(known(source.round_trip) ? 1000 * source.round_trip : null, 0, " ms")]);
   }
   if (known(source.state)) rows.push(["Safety", source.state, source.state === "active" ? "good" : source.state === "safe" ? "bad" : ""]);

@@ -66,7 +66,8 @@ function showTrial() {
 function steer() {
   if (shown === null) return;
   const c = hands.c(shown.condition);
-  if (hello.role === "participant" && shown.page_condition) send({ condition: shown.condition, c, n: shown.n });
+  const device = shown.condition === "gamepad" ? hands.gamepad : "";
+  if (hello.role === "participant" && shown.page_condition) send({ condition: shown.condition, c, n: shown.n, device });
   else send({ n: shown.n });
 }
 
@@ -77,15 +78,16 @@ function frame() {
     const done = shown.trials - shown.trials_left, training = shown.step?.kind === "training";
     write("place", shown.trials_left ? `${training ? "Training, " : ""}${done + 1} of ${shown.trials}` : "");
     write("hint", hint());
-    write("input", shown.page_condition && !known(shown.c) && hello.role === "participant" ? noInput() : "");
+    write("input", shown.page_condition && hello.role === "participant" ? input() : "");
     showTrial();
   }
   requestAnimationFrame(frame);
 }
 
-function noInput() {
-  if (shown.condition === "gamepad") return "No gamepad yet: press one of its buttons";
-  if (shown.condition === "mouse") return "Move the mouse over this page";
+// Which device is read, or what to do for a signal.
+function input() {
+  if (shown.condition === "gamepad") return hands.gamepad;
+  if (shown.condition === "mouse" && !known(shown.c)) return "Move the mouse over this page";
   return "";
 }
 

@@ -132,10 +132,13 @@ class Cockpit:
             self.conductor.submit(Command("page_disconnected"))
             self._choose()
 
-    def steer(self, condition: str, now: float, c: float, round_trip: float) -> None:
+    def steer(
+        self, condition: str, now: float, c: float, round_trip: float, device: str
+    ) -> None:
         """Take a control signal from the page in control."""
         if condition in self._held:
-            self._held[condition].put(now, c, round_trip=round_trip)
+            held = self._held[condition]
+            held.put(now, c, round_trip=round_trip, device=device)
 
     def press(self) -> None:
         """Take a press of the ring button."""

@@ -119,8 +119,16 @@ class HeldInput:
         self._newest = Sample(-math.inf, math.nan)
         self._lock = threading.Lock()
         self._delays, self._count = Delays(), 0
+        self._device = ""
 
-    def put(self, now: float, c: float, *, round_trip: float = math.nan) -> None:
+    def put(
+        self,
+        now: float,
+        c: float,
+        *,
+        round_trip: float = math.nan,
+        device: str = "",
+    ) -> None:
         """Set the signal.
 
         Parameters
@@ -131,10 +139,13 @@ class HeldInput:
             Clipped to 0 to 1.
         round_trip : float
             From sending a state to the page to this answer, s, where it is known.
+        device : str
+            Which device and control the signal is from, or why there is none.
         """
         c = min(max(c, 0.0), 1.0) if math.isfinite(c) else math.nan
         with self._lock:
             self._newest = Sample(now, c)
+            self._device = device
             self._count += 1
             if math.isfinite(round_trip) and round_trip >= 0:
                 self._delays.add(round_trip)
@@ -143,7 +154,7 @@ class HeldInput:
         """Forget the signal: its sender is gone."""
         with self._lock:
             self._newest = Sample(-math.inf, math.nan)
-            self._delays = Delays()
+            self._delays, self._device = Delays(), ""
 
     def take(self, now: float) -> list[Sample]:
         """Return the signal that holds now."""
@@ -151,10 +162,15 @@ class HeldInput:
         return [Sample(now, c if now - received <= self._timeout else math.nan)]
 
     def status(self) -> dict[str, Any]:
-        """Return the count of signals, and the 99th percentile of round trips, s."""
+        """Return device, count of signals, and 99th percentile of round trips, s."""
         with self._lock:
-            delay = self._delays.percentile(99)
-        return {"kind": "page", "received": self._count, "round_trip": delay}
+            delay, device = self._delays.percentile(99), self._device
+        return {
+            "kind": "page",
+            "device": device,
+            "received": self._count,
+            "round_trip": delay,
+        }
 
     def halt(self) -> None:
         """Do nothing: nothing moves here."""

@@ -22,6 +22,7 @@ from ikns.live.calibration.judge import Judge
 from ikns.live.calibration.protocol import Change, Key, LiveProtocol, ProtocolStep
 from ikns.live.calibration.verdict import Verdict
 from ikns.live.stream import Frame, Source
+from ikns.live.stream.subjects import check_one_subject
 from ikns.recording.files import read
 
 __all__ = ["accepted_recordings", "run_protocol", "check_labels", "restore"]
@@ -43,9 +44,10 @@ def check_labels(
     Raises
     ------
     MarkerMismatch
-        With the labels that are missing.
+        With the labels that are missing, or when they are those of several people.
     """
     moving = MarkerSet.load(marker_set).without_static()
+    check_one_subject(source.name, source.labels, moving)
     needed = sorted(
         column
         for own, _ in sight_needs(generic.with_nominal_markers(moving), chain).values()

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ikns.calibration import say_apart, segment_pairs, sight_needs
 from ikns.live.control.frame import ControlFrame, FrameSolver
 from ikns.live.control.settings import ControlSettings
+from ikns.motion.marker_ik.size import power_of_ten, say_size
 
 __all__ = ["fits_markers", "rejection_reason"]
 
@@ -65,8 +66,11 @@ def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
 
 
 def _apart(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
-    """Name the two markers of a segment whose distance is farthest off."""
+    """Name the two markers of a segment whose distance is farthest off, or the unit."""
     pairs, calibrated = segment_pairs(solver.skeleton, solver.chain)
+    power = power_of_ten(solver.skeleton, solver.chain, markers[None])
+    if power:
+        return f"{say_size(power)}; the unit may be wrong"
     first, second = markers[pairs.T]
     change = np.linalg.norm(first - second, axis=1) - calibrated
     k = int(np.nanargmax(np.abs(change)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 
 import numpy as np
@@ -12,10 +13,17 @@ from numpy.typing import NDArray
 from ikns.errors import IknsError
 from ikns.finger import Finger
 from ikns.live.control.controller import Controller, Decision
+from ikns.live.control.rejection_count import RejectionCount
 from ikns.live.control.safety import Changes
 from ikns.live.runtime.cache_warmer import CacheWarmer
+from ikns.live.runtime.notices import Notices
 from ikns.live.runtime.report import LoopStatus, Report
-from ikns.live.runtime.session_log import write_frame, write_stop, write_transition
+from ikns.live.runtime.session_log import (
+    write_frame,
+    write_notice,
+    write_stop,
+    write_transition,
+)
 from ikns.live.session import RunWriter, micro
 from ikns.live.stream import Frame, Source
 
@@ -41,6 +49,8 @@ class FrameLoop:
         Where the markers of the subject's set are among the source's; -1 where missing.
     finger : Finger, optional
     session : RunWriter, optional
+    on_notice : callable, optional
+        See :func:`ikns.live.runtime.run`.
 
     Attributes
     ----------
@@ -55,6 +65,7 @@ class FrameLoop:
         columns: NDArray[np.int64],
         finger: Finger | None,
         session: RunWriter | None,
+        on_notice: Callable[[str], None] | None = None,
     ) -> None:
         self._source, self._controller = source, controller
         self._columns, self._absent = columns, np.flatnonzero(columns < 0)
@@ -69,6 +80,9 @@ class FrameLoop:
         self._status_time, self._status_frames = 0.0, 0
         self._armed_at = -math.inf
         self._stopped = self._alert = self._refusal = ""
+        self._on_notice = on_notice
+        self._notices = Notices(source, self._notice)
+        self._rejections = RejectionCount()
         self.report = Report()
 
     def arm(self) -> None:
@@ -120,6 +134,10 @@ class FrameLoop:
         sent = self._command()
         done = time.monotonic()
         self._check_finger(receive_time)
+        if decision.rejection:
+            self._rejections.add(decision.rejection)
+        self._notices.frame(receive_time, decision.rejection)
+        self._notices.check(receive_time)
         report.frames += 1
         report.misses += done - received > self._period
         report.stages["solve"].add(decided - began)
@@ -158,6 +176,7 @@ class FrameLoop:
         self._apply(self._controller.check(now))
         self._command()
         self._check_finger(now)
+        self._notices.check(now)
 
     def disarm(self, reason: str) -> None:
         """Disarm the safety machine and complete the report."""
@@ -165,6 +184,9 @@ class FrameLoop:
         self.report.stopped = self._stop_reason()
         self._apply(self._controller.machine.disarm(now, reason))
         self.report.seconds = now
+        self.report.was_active = self._notices.was_active
+        self.report.why = self._notices.why
+        self.report.rejections = self._rejections.table()
         self.report.source = asdict(self._source.continuity.counts)
         if self._session:
             self.report.lost_rows = self._session.lost
@@ -230,5 +252,14 @@ class FrameLoop:
                 self._stopped, self._refusal = change.reason, ""
                 if self._finger is not None:
                     self._finger.make_safe(change.reason)
+            self._notices.transition(change)
             if self._session:
                 write_transition(self._session, change)
+
+    def _notice(self, now: float, sentence: str) -> None:
+        self.report.notices.append(sentence)
+        del self.report.notices[:-1000]
+        if self._session:
+            write_notice(self._session, now, sentence)
+        if self._on_notice:
+            self._on_notice(sentence)

@@ -25,6 +25,7 @@ from ikns.live.runtime.priority import realtime_priority
 from ikns.live.runtime.report import LoopStatus, Report
 from ikns.live.session import RunWriter
 from ikns.live.stream import Source
+from ikns.live.stream.subjects import check_one_subject
 
 __all__ = ["run"]
 
@@ -42,6 +43,7 @@ def run(
     on_status: Callable[[LoopStatus], None] | None = None,
     status_every: float = 0.2,
     on_decision: Callable[[float, float, Decision], None] | None = None,
+    on_notice: Callable[[str], None] | None = None,
     realtime: bool = False,
 ) -> Report:
     """Drive a finger with a person's null space until the source ends.
@@ -74,6 +76,10 @@ def run(
         Called after each frame's command with the time of receipt (s, of
         `time.monotonic`), the commanded flexion and the :class:`Decision`; also from
         within the loop.
+    on_notice : callable, optional
+        Called with a sentence: why the finger does not move yet, half a second after
+        the start; that it is in its safe state, and why; and events of the source.
+        Also from within the loop.
     realtime : bool
         Give the loop priority over ordinary programs, where the system allows it.
 
@@ -86,7 +92,7 @@ def run(
     InvalidInput
         When the system does not allow real-time priority.
     MarkerMismatch
-        When the source has none of the subject's markers.
+        When the source has none of the subject's markers, or those of several people.
     FingerError
         When the finger cannot be connected.
 
@@ -108,13 +114,14 @@ def run(
     5
     """
     marker_set = subject.skeleton.marker_set
-    missing = [label for label in marker_set.labels if label not in source.labels]
-    if len(missing) == len(marker_set.labels):
+    check_one_subject(source.name, source.labels, marker_set)
+    columns = marker_set.columns(source.labels)
+    if (columns < 0).all():
         raise MarkerMismatch(
             f"{source.name}: expected markers of the subject such as "
-            f"{', '.join(missing[:6])}, found {', '.join(source.labels[:6])}."
+            f"{', '.join(marker_set.labels[:6])}, found "
+            f"{', '.join(source.labels[:6])}."
         )
-    columns = marker_set.columns(source.labels)
     controller, twin = (
         Controller(
             FrameSolver(subject.skeleton, subject.null_space_map, subject.chain),
@@ -122,7 +129,7 @@ def run(
         )
         for _ in range(2)
     )
-    loop = FrameLoop(source, controller, twin, columns, finger, session)
+    loop = FrameLoop(source, controller, twin, columns, finger, session, on_notice)
     # Compile or load everything before the finger is connected.
     controller.solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     controller.solver.reset()

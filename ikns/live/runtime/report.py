@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -79,6 +80,14 @@ class Report:
         to command), ``loop`` (a whole iteration, logging included).
     transitions : list of Transition
         State transitions; the last thousand.
+    was_active : bool
+        Whether the finger ever followed the signal.
+    why : str
+        Why the last frame was rejected, or that none came; empty if it was valid.
+    rejections : dict of str to int
+        Number of frames that were rejected, by reason, the most frequent first.
+    notices : list of str
+        What was told during the run; the last thousand.
     source : dict
         Counts of frames that were dropped, late, repeated or out of order.
     lost_rows : int
@@ -98,6 +107,29 @@ class Report:
         }
     )
     transitions: list[Transition] = field(default_factory=list)
+    was_active: bool = False
+    why: str = ""
+    rejections: dict[str, int] = field(default_factory=dict)
+    notices: list[str] = field(default_factory=list)
     source: dict[str, Any] = field(default_factory=dict)
     lost_rows: int = 0
     stopped: str = ""
+
+    @property
+    def problem(self) -> str:
+        """Why the finger did not move, or no longer; empty if it did to the end.
+
+        >>> Report(rejections={"the right hand is not in sight": 5775}).problem
+        'the finger never moved: 5775 frames: the right hand is not in sight.'
+        """
+        for change, last in [*pairwise(self.transitions)][-1:]:
+            if last.before == "safe":
+                stayed = max(0.0, last.time - change.time)
+                return (
+                    f"the finger was in its safe state for the last {stayed:.1f} of "
+                    f"{self.seconds:.1f} s: {change.reason}."
+                )
+        if self.was_active:
+            return ""
+        reasons = [f"{n} frames: {reason}" for reason, n in self.rejections.items()]
+        return f"the finger never moved: {'; '.join(reasons) or self.why}."

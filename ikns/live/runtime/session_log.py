@@ -10,7 +10,7 @@ from ikns.live.control.safety import Transition
 from ikns.live.session import RunWriter
 from ikns.live.session.channels import STATES
 
-__all__ = ["write_frame", "write_stop", "write_transition"]
+__all__ = ["write_frame", "write_notice", "write_stop", "write_transition"]
 
 
 def write_frame(
@@ -69,3 +69,9 @@ def write_transition(session: RunWriter, change: Transition) -> None:
     """Write a state transition as an event."""
     words = f"{change.before} to {change.after}: {change.reason}"
     session.row("events", [max(0.0, change.time), 0.0, change.after, words])
+
+
+def write_notice(session: RunWriter, time: float, sentence: str) -> None:
+    """Write what was told during the run as an event."""
+    words = " ".join(sentence.split())
+    session.row("events", [max(0.0, time), 0.0, "notice", words])

@@ -2,27 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from urllib.parse import parse_qsl
 
 from ikns.body.marker_set import MarkerSet
+from ikns.calibration.subject import Subject
 from ikns.errors import IknsError, InvalidInput, MarkerMismatch
 from ikns.live.stream import qualisys, vicon
 from ikns.live.stream.frame import Feed
 from ikns.live.stream.lsl_feed import LslFeed
+from ikns.live.stream.lsl_search import Wanted
 from ikns.live.stream.replay import Replay
+from ikns.live.stream.size_check import check_size, first_frames
 from ikns.live.stream.source import Source
+from ikns.live.stream.subjects import SubjectFeed, check_one_subject, subjects_of
 from ikns.recording.files import read
 
 __all__ = ["open_source"]
 
 _KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST"
+#: So many frames of a recording show the size of the body.
+_GLANCES = 1000
+
+Options = dict[str, str]
 
 
 def open_source(
     address: str,
     *,
     needs: MarkerSet | None = None,
+    subject: Subject | None = None,
     read_timeout: float = 10.0,
     late_after: float | None = None,
 ) -> Source:
@@ -33,10 +43,18 @@ def open_source(
     address : str
         ``replay:FILE`` (``?speed=2``, ``?speed=max`` for as fast as frames are read,
         ``?loop=yes``), ``lsl:NAME`` (``?scope=machine`` for streams of this machine
-        only), ``qualisys:HOST`` or ``vicon:HOST`` (also ``HOST:PORT``). All but a
-        replay also take ``?timeout=SECONDS``; options are joined by ``&``.
+        only, ``?source_id=ID`` and ``?host=HOST`` for one of several streams of that
+        name, ``?unit=mm``, cm or m for positions whose description names no unit or a
+        wrong one), ``qualisys:HOST`` or ``vicon:HOST`` (also ``HOST:PORT``). All take
+        ``?subject=NAME`` for one of several subjects (``NAME:RSHO`` or ``NAME_RSHO``),
+        and all but a replay ``?timeout=SECONDS``; options are joined by ``&``.
     needs : MarkerSet, optional
-        All its markers except static-only ones must be among the labels.
+        All its markers except static-only ones must be among the labels, of one
+        subject.
+    subject : Subject, optional
+        Who is tracked: as `needs` with its marker set, and the distances within
+        segments must not be ten times those at calibration, or a tenth of them. The
+        frames of a live source that are looked at for this are not read again.
     read_timeout : float
         Iterating raises an error after this time without a frame, s.
     late_after : float, optional
@@ -53,9 +71,11 @@ def open_source(
     FileError
         When the file is not a recording.
     StreamError
-        When the source does not answer, or is of the wrong kind.
+        When the source does not answer, is of the wrong kind, or is one of several
+        that the address could mean; an LSL stream is searched for one second longer
+        than until the first answers. Also for a body of another size than `subject`.
     MarkerMismatch
-        When a marker of `needs` is missing.
+        When a marker of `needs` is missing, or they are those of several subjects.
 
     Examples
     --------
@@ -90,27 +110,47 @@ def open_source(
         if str(error).startswith(tuple(filter(None, (f"{scheme}:", place)))):
             raise
         raise type(error)(f"{address}: {error}") from None
-    source = Source(feed, read_timeout=read_timeout, late_after=late_after)
     try:
-        if needs is not None:
-            _check_labels(source, needs.without_static())
+        chosen = _one_subject(feed, options)
+        worn = subject.skeleton.marker_set if subject else needs
+        if worn is not None:
+            _check_labels(chosen, worn.without_static())
+        if subject is not None:
+            _check_size(feed, options, subject)
+        return Source(chosen, read_timeout=read_timeout, late_after=late_after)
     except BaseException:
-        source.close()
+        feed.close()
         raise
-    return source
 
 
-def _check_labels(source: Source, needs: MarkerSet) -> None:
+def _one_subject(feed: Feed, options: Options) -> Feed:
+    return SubjectFeed(feed, options["subject"]) if "subject" in options else feed
+
+
+def _check_labels(source: Feed, needs: MarkerSet) -> None:
+    check_one_subject(source.name, source.labels, needs)
     columns = needs.columns(source.labels)
     missing = [label for label, c in zip(needs.labels, columns, strict=True) if c < 0]
     if missing:
+        hint = "".join(
+            f"; those of {name} are read with the option subject, as in ?subject={name}"
+            for name in subjects_of(source.labels, needs)
+        )
         raise MarkerMismatch(
             f"{source.name}: expected markers {', '.join(missing)}, found only "
-            f"{', '.join(source.labels)}."
+            f"{', '.join(source.labels)}{hint}."
         )
 
 
-Options = dict[str, str]
+def _check_size(feed: Feed, options: Options, subject: Subject) -> None:
+    if isinstance(feed, Replay):  # looked at without starting its clock
+        again = _one_subject(Replay(feed.recording, speed=0), options)
+        markers, labels = first_frames(again, _GLANCES), again.labels
+    else:
+        chosen = _one_subject(feed, options)
+        markers, labels = first_frames(chosen), chosen.labels
+    unit = feed.meters_per_unit if isinstance(feed, LslFeed) else math.nan
+    check_size(feed.name, labels, markers, subject, meters_per_unit=unit)
 
 
 def _replay(path: str, options: Options) -> Feed:
@@ -129,7 +169,15 @@ def _lsl(stream: str, options: Options) -> Feed:
     scope = options.get("scope", "network")
     if scope not in ("machine", "network"):
         raise InvalidInput(f"expected scope=machine or network, found scope={scope}.")
-    return LslFeed(stream, timeout=_timeout(options), this_machine=scope == "machine")
+    unit = options.get("unit")
+    if unit is not None and unit not in ("mm", "cm", "m"):
+        raise InvalidInput(f"expected unit=mm, cm or m, found unit={unit}.")
+    return LslFeed(
+        Wanted(stream, options.get("source_id"), options.get("host")),
+        unit=unit,
+        timeout=_timeout(options),
+        this_machine=scope == "machine",
+    )
 
 
 def _qualisys(host: str, options: Options) -> Feed:
@@ -141,10 +189,10 @@ def _vicon(host: str, options: Options) -> Feed:
 
 
 _KINDS: dict[str, tuple[Callable[[str, Options], Feed], tuple[str, ...]]] = {
-    "replay": (_replay, ("speed", "loop")),
-    "lsl": (_lsl, ("timeout", "scope")),
-    "qualisys": (_qualisys, ("timeout",)),
-    "vicon": (_vicon, ("timeout",)),
+    "replay": (_replay, ("speed", "loop", "subject")),
+    "lsl": (_lsl, ("timeout", "scope", "source_id", "host", "unit", "subject")),
+    "qualisys": (_qualisys, ("timeout", "subject")),
+    "vicon": (_vicon, ("timeout", "subject")),
 }
 
 

@@ -9,16 +9,16 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ikns.errors import StreamError
 from ikns.live.stream.frame import Event, Frame
 from ikns.live.stream.lsl_layout import LslLayout, read_lsl_layout
 from ikns.live.stream.lsl_library import lsl
 from ikns.live.stream.lsl_numbers import Numbers
+from ikns.live.stream.lsl_search import Wanted, find_stream, find_successor
 
-__all__ = ["ANY_MOCAP", "LslFeed"]
-
-#: Query for streams of type MoCap in any case; XPath 1.0 has no lower-case().
-ANY_MOCAP = "translate(type,'MOCAP','mocap')='mocap'"
+__all__ = ["LslFeed"]
 
 #: Longest call into liblsl, s, so that Ctrl-C is handled.
 _SLICE = 0.2
@@ -26,56 +26,76 @@ _SLICE = 0.2
 _BUFFER = 10
 #: After this many seconds without a frame a stream is checked for being alive.
 _SILENCE = 5.0
+#: Frames are counted for so long where the stream names no rate, s.
+_COUNTED = 1.0
 #: Seconds it then has to respond over the network.
 _ALIVE_TIMEOUT = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Open:
+    found: Any
     inlet: Any
     layout: LslLayout
     rate: float
     clock_offset: float
-    search: str
-    uid: str
 
 
 class LslFeed:
-    """Read one LSL stream, and reconnect to it after a break.
+    """Read one LSL stream, and reconnect to it after a break, to no other.
 
     Parameters
     ----------
-    stream : str
-        Name of the stream; empty for any MoCap stream.
+    wanted : Wanted
+        The stream; without a name, any MoCap stream.
+    unit : str, optional
+        Unit of its positions, whatever its description says.
     timeout : float
         Seconds for the stream to answer.
     this_machine : bool
         Search on this machine only.
 
+    Attributes
+    ----------
+    meters_per_unit : float
+        Length of the unit of most positions, m.
+
     Raises
     ------
     StreamError
-        When there is no such stream, it is not of type MoCap, or it has no rate.
+        When there is no such stream or more than one, when it is not of type MoCap, has
+        no unit, or has no rate and sends no frames that show one.
     """
 
     speed = 1.0
 
     def __init__(
-        self, stream: str, *, timeout: float = 5.0, this_machine: bool = False
+        self,
+        wanted: Wanted,
+        *,
+        unit: str | None = None,
+        timeout: float = 5.0,
+        this_machine: bool = False,
     ) -> None:
-        self.name = f"lsl:{stream}"
+        self.name = f"lsl:{wanted.name}"
         self.events: deque[Event] = deque(maxlen=1000)
         self._pylsl = lsl(self.name, this_machine=this_machine)
-        self._timeout = timeout
-        opened = self._connect(self._find(stream))
-        self.labels, self.rate = opened.layout.labels, opened.rate
+        self._timeout, self._unit = timeout, unit
+        try:
+            found = find_stream(self._pylsl, wanted, timeout=timeout)
+        except StreamError as error:
+            raise StreamError(f"{self.name}: {error}") from None
+        opened = self._connect(found)
+        self.labels, self._nominal_rate = opened.layout.labels, opened.rate
+        self.meters_per_unit = float(np.median(opened.layout.scale))
+        self.rate = self._nominal_rate or self._count_rate(opened.inlet)
         self._open: _Open | None = opened
         self._reading: _Open | None = opened
         self._silent_since = time.monotonic()
         self._checking = False
         self._first_offset, self._ahead = opened.clock_offset, 0.0
-        self._search = opened.search
-        self._found = threading.Condition()
+        self._first = found
+        self._changed = threading.Condition()
         self._closed = False
         self._numbers = Numbers(self.rate)
         self._told_uneven = False
@@ -95,9 +115,9 @@ class LslFeed:
         give_up = time.monotonic() + timeout
         while True:
             left = max(0.0, give_up - time.monotonic())
-            with self._found:
+            with self._changed:
                 if self._open is None:
-                    self._found.wait(min(left, _SLICE))
+                    self._changed.wait(min(left, _SLICE))
                 opened = self._open
             if opened is not None:
                 try:
@@ -123,7 +143,7 @@ class LslFeed:
         if opened is not self._reading:  # reconnected since the last frame
             self._reading = opened
             self._numbers.bridge()
-            # It may come from another machine; times continue in the first one's clock.
+            # Its machine may have been restarted; times continue in the first clock.
             self._ahead = opened.clock_offset - self._first_offset
         device_time = stamp + self._ahead
         number = self._numbers.next(device_time)
@@ -134,34 +154,39 @@ class LslFeed:
 
     def close(self) -> None:
         """Close the stream."""
-        with self._found:
+        with self._changed:
             self._closed = True
             self._open = self._reading = None
-            self._found.notify_all()
+            self._changed.notify_all()
 
     def _tell(self, text: str) -> None:
         self.events.append(Event(time.monotonic(), f"{self.name}: {text}"))
 
-    def _find(self, stream: str) -> Any:
-        predicate = "name=" + _quoted(stream) if stream else ANY_MOCAP
-        found = self._resolve(predicate, self._timeout)
-        if found:
-            return found[0]
-        there = ", ".join(
-            sorted(f"{info.name()} ({info.type()})" for info in self._streams())
+    def _count_rate(self, inlet: Any) -> float:
+        """Count frames for a second, for a stream without a nominal rate."""
+        stamps: list[float] = []
+        give_up = time.monotonic() + self._timeout + _COUNTED
+        while time.monotonic() < give_up:
+            try:
+                sample, stamp = inlet.pull_sample(_SLICE)
+            except RuntimeError:
+                break
+            if sample is not None:
+                stamps.append(stamp)
+                if stamp - stamps[0] >= _COUNTED:
+                    break
+        seconds = max(stamps) - min(stamps) if stamps else 0.0
+        if not seconds > 0:
+            raise StreamError(
+                f"{self.name}: expected a nominal rate, or frames to count it, found a "
+                f"rate of 0 and {len(stamps)} frames within {self._timeout:g} s."
+            )
+        rate = (len(stamps) - 1) / seconds
+        self._tell(
+            f"the stream has no nominal rate; {rate:.1f} frames/s were counted in its "
+            f"first {seconds:.1f} s."
         )
-        raise StreamError(
-            f"{self.name}: expected an LSL stream {stream or 'of type MoCap'} to "
-            f"answer within {self._timeout:g} s, found {there or 'no stream at all'}."
-        )
-
-    def _resolve(self, predicate: str, timeout: float) -> list[Any]:
-        # liblsl searches in waves 0.5 or 1.25 s apart; a timeout that coincides with
-        # one is missed, and the call then takes 5 s longer.
-        return list(self._pylsl.resolve_bypred(predicate, 1, 0.97 * timeout))
-
-    def _streams(self) -> list[Any]:
-        return list(self._pylsl.resolve_streams(min(self._timeout, 1.0)))
+        return rate
 
     def _connect(self, found: Any) -> _Open:
         """Open a stream; frames are buffered from the end of this call on."""
@@ -171,9 +196,9 @@ class LslFeed:
                 f"{found.type() or 'no type'}."
             )
         rate = float(found.nominal_srate())
-        if not (math.isfinite(rate) and rate > 0):
+        if not (math.isfinite(rate) and rate >= 0):  # 0 stands for irregular
             raise StreamError(
-                f"{self.name}: expected a rate above 0 frames/s, found {rate:g}."
+                f"{self.name}: expected a rate of 0 frames/s or more, found {rate:g}."
             )
         if found.channel_format() not in (
             self._pylsl.cf_float32,
@@ -184,7 +209,8 @@ class LslFeed:
             inlet = self._pylsl.StreamInlet(
                 found, max_buflen=_BUFFER, max_chunklen=1, recover=False, as_numpy=True
             )
-            layout = read_lsl_layout(inlet.info(self._timeout).as_xml(), self.name)
+            xml = inlet.info(self._timeout).as_xml()
+            layout = read_lsl_layout(xml, self.name, unit=self._unit)
             offset = inlet.time_correction(self._timeout)
             offset += time.monotonic() - self._pylsl.local_clock()
             inlet.open_stream(self._timeout)
@@ -195,21 +221,19 @@ class LslFeed:
             ) from None
         except RuntimeError as error:  # the root of pylsl's errors
             raise StreamError(f"{self.name}: cannot be opened ({error}).") from None
-        source_id = found.source_id()
-        search = "source_id=" if source_id else "name="
-        search += _quoted(source_id or found.name())
-        return _Open(inlet, layout, rate, offset, search, found.uid())
+        return _Open(found, inlet, layout, rate, offset)
 
     def _check(self, opened: _Open) -> None:
         """Drop a silent stream unless it responds; a cut cable closes no connection."""
-        answers = self._resolve(f"uid='{opened.uid}'", _ALIVE_TIMEOUT)
+        uid = opened.found.uid()
+        answers = self._pylsl.resolve_byprop("uid", uid, 1, 0.97 * _ALIVE_TIMEOUT)
         if not answers and opened is self._open:
             self._lose()
         self._silent_since = time.monotonic()
         self._checking = False
 
     def _lose(self) -> None:
-        with self._found:
+        with self._changed:
             if self._open is None:  # noticed already, or closed
                 return
             self._open = self._reading = None
@@ -220,36 +244,34 @@ class LslFeed:
         """Search for the stream until it is back with the same markers."""
         told = ""
         while not self._closed:
-            for found in self._resolve(self._search, 1.0):
-                try:
-                    opened = self._connect(found)
-                    if (opened.layout.labels, opened.rate) != (self.labels, self.rate):
-                        raise StreamError(
-                            f"{self.name}: came back with other markers or another "
-                            "rate and is not read."
-                        )
-                except StreamError as error:
-                    if str(error) != told:
-                        told = str(error)
-                        self.events.append(Event(time.monotonic(), told))
-                    time.sleep(_SLICE)
+            try:
+                found = find_successor(self._pylsl, self._first, timeout=1.0)
+                if found is None:
                     continue
-                with self._found:
-                    if not self._closed:
-                        self._open = opened
-                        self._silent_since = time.monotonic()
-                        self._tell("the stream is back.")
-                    self._found.notify_all()
-                return
-
-
-def _quoted(text: str) -> str:
-    """Quote for XPath 1.0, which has no escapes.
-
-    >>> print(_quoted("it's"))
-    "it's"
-    """
-    mark = '"' if "'" in text else "'"
-    if mark in text:
-        raise StreamError(f"expected a name without one of the quotes, found {text}.")
-    return f"{mark}{text}{mark}"
+                opened = self._connect(found)
+                if (opened.layout.labels, opened.rate) != (
+                    self.labels,
+                    self._nominal_rate,
+                ):
+                    raise StreamError(
+                        "came back with other markers or another rate and is not read."
+                    )
+            except StreamError as error:
+                text = str(error).removeprefix(f"{self.name}: ")
+                if text != told:
+                    told = text
+                    self._tell(text)
+                time.sleep(_SLICE)
+                continue
+            with self._changed:
+                if not self._closed:
+                    self._open = opened
+                    self._silent_since = time.monotonic()
+                    self._tell(
+                        "the stream is back."
+                        if found.source_id()
+                        else "a stream of the same name and host is back; without a "
+                        "source id it may be another."
+                    )
+                self._changed.notify_all()
+            return

@@ -2,7 +2,7 @@
 
 The convention is the MoCap metadata of XDF (https://github.com/sccn/xdf/wiki), as
 written by the vendors' LSL apps: channels of type PositionX, PositionY and PositionZ
-that name their marker, in meters. Channels that name an object are rigid bodies.
+that name their marker and their unit. Channels that name an object are rigid bodies.
 """
 
 from __future__ import annotations
@@ -15,14 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import StreamError
+from ikns.recording.files.conversion import METERS
 
 __all__ = ["LslLayout", "channel_fields", "read_lsl_layout"]
-
-_UNITS = {
-    **dict.fromkeys(["", "m", "meter", "meters", "metre", "metres"], 1.0),
-    **dict.fromkeys(["mm", "millimeter", "millimeters"], 1e-3),
-    **dict.fromkeys(["millimetre", "millimetres"], 1e-3),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +54,7 @@ def channel_fields(labels: Iterable[str]) -> Iterator[dict[str, str]]:
             }
 
 
-def read_lsl_layout(xml: str, source: str) -> LslLayout:
+def read_lsl_layout(xml: str, source: str, *, unit: str | None = None) -> LslLayout:
     """Read a stream's description.
 
     Parameters
@@ -68,11 +63,13 @@ def read_lsl_layout(xml: str, source: str) -> LslLayout:
         The full stream info, as ``StreamInfo.as_xml`` writes it.
     source : str
         Address of the stream, for messages.
+    unit : str, optional
+        Unit of all positions, whatever the description says.
 
     Raises
     ------
     StreamError
-        When there are no markers, or one lacks a coordinate or has an unknown unit.
+        When there are no markers, or one lacks a coordinate or a unit that is known.
     """
     places: dict[str, dict[str, tuple[int, float]]] = {}
     types = []
@@ -85,18 +82,19 @@ def read_lsl_layout(xml: str, source: str) -> LslLayout:
         label = channel.findtext("label", "").strip()
         marker = channel.findtext("marker", "").strip()
         marker = marker or label.removesuffix(f"_{axis}").removesuffix(f"_{kind[-1]}")
-        unit = channel.findtext("unit", "").strip()
-        if unit.casefold() not in _UNITS:
+        said = unit or channel.findtext("unit", "").strip()
+        if said.casefold() not in METERS:
             raise StreamError(
-                f"{source}: expected meters or millimeters, found {unit} for "
-                f"channel {label or column + 1}."
+                f"{source}: expected a unit of mm, cm or m for channel "
+                f"{label or column + 1}, found {said or 'none'}; say which it is with "
+                f"the option unit, as in {source}?unit=mm."
             )
         axes = places.setdefault(marker, {})
         if axis in axes:
             raise StreamError(
                 f"{source}: expected one {kind} channel for marker {marker}, found two."
             )
-        axes[axis] = column, _UNITS[unit.casefold()]
+        axes[axis] = column, METERS[said.casefold()]
     if not places:
         found = ", ".join(sorted(set(types))) or "no description of channels"
         raise StreamError(

@@ -55,6 +55,10 @@ class Replay:
     loop : bool
         Start over at the end; frame numbers and device times continue.
 
+    Attributes
+    ----------
+    recording : Recording
+
     Raises
     ------
     InvalidInput
@@ -76,7 +80,7 @@ class Replay:
         self.labels = recording.labels
         self.speed = speed
         self.events: deque[Event] = deque(maxlen=1000)
-        self._recording = recording
+        self.recording = recording
         self._loop = loop
         self._number = 0
         self._start = math.nan
@@ -89,25 +93,25 @@ class Replay:
     @property
     def ended(self) -> bool:
         """Whether all frames have been read."""
-        return not self._loop and self._number >= len(self._recording.time)
+        return not self._loop and self._number >= len(self.recording.time)
 
     def poll(self, timeout: float) -> Frame | None:
         """Return the next frame when it is due, None after `timeout` seconds."""
         if self.ended:
             return None
-        loops, row = divmod(self._number, len(self._recording.time))
-        device_time = float(self._recording.time[row]) + loops * self._loop_seconds
+        loops, row = divmod(self._number, len(self.recording.time))
+        device_time = float(self.recording.time[row]) + loops * self._loop_seconds
         now = time.monotonic()
         if math.isnan(self._start):
             self._start = now
         if self.speed:
-            first = float(self._recording.time[0])
+            first = float(self.recording.time[0])
             due = self._start + (device_time - first) / self.speed
             if due > now + timeout:
                 wait_until(now + timeout)
                 return None
             now = wait_until(due)
-        frame = Frame(self._number, device_time, now, self._recording.markers[row])
+        frame = Frame(self._number, device_time, now, self.recording.markers[row])
         self._number += 1
         return frame
 

@@ -9,12 +9,15 @@ from collections.abc import Iterator
 from ikns.errors import StreamError
 from ikns.live.stream.continuity import Continuity
 from ikns.live.stream.frame import Event, Feed, Frame
+from ikns.recording.files.conversion import mark_gaps
 
 __all__ = ["Source"]
 
 
 class Source:
     """Frames from a feed; a context manager and an iterator.
+
+    A point at exactly zero was not seen and becomes NaN, as in files.
 
     Parameters
     ----------
@@ -87,6 +90,9 @@ class Source:
         frame = None if self.ended else self._feed.poll(timeout)
         now = time.monotonic()
         if frame is not None:
+            markers = frame.markers.copy()
+            mark_gaps(markers)
+            frame = Frame(frame.number, frame.device_time, frame.receive_time, markers)
             if self._silent:
                 self._add_event(f"frames again after {now - self._last:.1f} s.")
                 self._silent = False

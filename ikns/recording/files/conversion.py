@@ -18,19 +18,25 @@ from ikns.errors import FileError, InvalidInput
 from ikns.recording.recording import Recording
 
 __all__ = [
+    "METERS",
     "checked_rate",
     "existing_file",
     "is_unlabeled",
+    "mark_gaps",
     "meters_per",
     "shown",
     "to_recording",
 ]
 
-#: Meters in one unit, by the spellings that camera software writes.
-_METERS = {
-    **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre"), 1e-3),
-    **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetre"), 1e-2),
-    **dict.fromkeys(("m", "meter", "meters", "metre"), 1.0),
+#: Meters in one unit, by the spellings that cameras' software writes.
+METERS = {
+    short: meters
+    for unit, name, meters in (
+        ("mm", "millimet", 1e-3),
+        ("cm", "centimet", 1e-2),
+        ("m", "met", 1.0),
+    )
+    for short in (unit, f"{name}er", f"{name}ers", f"{name}re", f"{name}res")
 }
 
 #: Nexus writes ``*12`` and Qualisys ``uname*12`` for a trajectory without a name.
@@ -87,7 +93,7 @@ def meters_per(path: Path, unit: str) -> float:
     0.001
     """
     try:
-        return _METERS[unit.strip().lower()]
+        return METERS[unit.strip().lower()]
     except KeyError:
         raise FileError(
             f"{path}: expected positions in mm, cm or m, found unit {shown(unit)}."
@@ -113,6 +119,27 @@ def is_unlabeled(label: str) -> bool:
     (True, False)
     """
     return not label or _UNLABELED.fullmatch(label) is not None
+
+
+def mark_gaps(markers: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Make every point that was not seen NaN, in place, and return where that is.
+
+    That is a point with a missing coordinate, and one at exactly zero: many systems
+    write "not seen" so, and no camera measures three zeros.
+
+    Parameters
+    ----------
+    markers : (..., 3) array
+
+    Examples
+    --------
+    >>> markers = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, np.nan, 1.0]])
+    >>> mark_gaps(markers).tolist(), np.isnan(markers[:, 0]).tolist()
+    ([True, False, True], [True, False, True])
+    """
+    gap = np.isnan(markers).any(axis=-1) | (markers == 0).all(axis=-1)
+    markers[gap] = np.nan
+    return gap
 
 
 def to_recording(
@@ -155,9 +182,7 @@ def to_recording(
             f"{path}: expected printable marker labels, found {shown(unreadable[0])}, "
             f"so the file is damaged."
         )
-    gap = np.isnan(markers).any(axis=2) | (markers == 0).all(axis=2)
-    markers[gap] = np.nan
-    if gap.all():
+    if mark_gaps(markers).all():
         raise FileError(
             f"{path}: expected positions, but none of its {len(labels)} markers "
             f"is seen in any of its {len(time)} frames."
