@@ -132,13 +132,13 @@ class Served:
     def let_pass(self, seconds: float) -> None:
         """Let the visit's clock go on."""
         self.clock.let_pass(seconds)
-        self.heard = self.conductor.shown["source"].get("told", 0)
+        self.heard = self.conductor.shown["source"].get("received", 0)
 
     def hears(self, c: float, within: float = 0.0) -> None:
         """Wait until a page has told a control signal at the present time."""
 
         def told(shown: Any) -> bool:
-            new = shown["source"].get("told", 0) > self.heard
+            new = shown["source"].get("received", 0) > self.heard
             return new and abs(shown["c"] - c) <= within
 
         self.wait(told)
