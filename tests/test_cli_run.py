@@ -288,7 +288,9 @@ def test_the_body_is_shown_live_on_this_machine(files, monkeypatch, capfd):
 
     def look(url):
         # What a browser would ask for first, while the command runs.
-        with urllib.request.urlopen(url, timeout=30) as page:
+        cookies = urllib.request.HTTPCookieProcessor()
+        browser = urllib.request.build_opener(cookies)
+        with browser.open(url, timeout=30) as page:
             seen[url] = page.read().decode()
         return True
 

@@ -52,6 +52,7 @@ def test_a_virtual_operator_plays_by_itself_and_goes_on(
     assert result["simulated"] is True
     assert len(pages.addresses) == 2
     assert all(a.startswith("http://127.0.0.1:") for a in pages.addresses)
+    assert all("?token=" in a for a in pages.addresses)
     visit = read_visit(folder, experiment="tracking")
     assert visit.about["simulated"] is True
     assert visit.about["input"] == {"virtual": "virtual operator"}

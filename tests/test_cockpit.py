@@ -6,7 +6,7 @@ everything else is waited for.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +19,7 @@ import pytest
 
 from ikns.experiments.cockpit import Cockpit, page_socket
 from ikns.experiments.conduct import (
+    Command,
     Conductor,
     HeldInput,
     PickingExperiment,
@@ -27,6 +28,7 @@ from ikns.experiments.conduct import (
     run_visit,
     visit_loop,
 )
+from ikns.experiments.conduct.measured import recent_values
 from ikns.experiments.conduct.ring import ring_driver
 from ikns.experiments.picking import pick_schedule
 from ikns.experiments.tracking import measure, schedule
@@ -56,6 +58,7 @@ class Clock:
     """The time of a visit, s, in place of the module ``time``: it has to be moved."""
 
     def __init__(self) -> None:
+        self.stop = Event()
         self._now, self._turns, self._news = time.monotonic(), 0, Condition()
 
     def monotonic(self) -> float:
@@ -67,6 +70,9 @@ class Clock:
             self._turns += 1
             self._news.notify_all()
         time.sleep(0.005)
+        while self.stop.is_set():  # the visit hangs, and time passes
+            time.sleep(0.05)
+            self._now += 0.05
 
     def let_pass(self, seconds: float) -> None:
         """Move on, and return when a whole turn of the loop has seen it."""
@@ -74,6 +80,15 @@ class Clock:
             self._now += seconds
             seen = self._turns + 2
             assert self._news.wait_for(lambda: self._turns >= seen, 60)
+
+
+class StillArm(HeldInput):
+    """An arm that is held still; a test sets what the panel shows of it."""
+
+    shown: Mapping[str, Any] | None = None
+
+    def status(self) -> dict[str, Any]:
+        return super().status() if self.shown is None else dict(self.shown)
 
 
 @dataclass
@@ -84,6 +99,7 @@ class Served:
     cockpit: Cockpit
     clock: Clock
     chromium: Any
+    source: "StillArm"
     complaints: list[str] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
     pages: list[Any] = field(default_factory=list)
@@ -174,7 +190,11 @@ def chromium() -> Iterator[Any]:
 
 @contextmanager
 def at_work(
-    chromium: Any, folder: Path, conditions: list[str], **design: Any
+    chromium: Any,
+    folder: Path,
+    conditions: list[str],
+    fingers: list[SimulatedFinger] | None = None,
+    **design: Any,
 ) -> Iterator[Served]:
     """A visit that goes on in a thread, as the command carries it out."""
     picking = conditions == ["ring"]
@@ -202,16 +222,22 @@ def at_work(
     conductor = Conductor(experiment, log, page_conditions=[*PAGES, "ring"])
     clock = Clock()
     held = {name: HeldInput() for name in conditions if name in PAGES}
-    arm = HeldInput(timeout=3600.0)  # an arm that is held still
+    arm = StillArm(timeout=3600.0)
     arm.put(clock.monotonic(), 0.5)
     presses: SimpleQueue[None] = SimpleQueue()
     drivers: Any = {
         name: lambda one=one: nullcontext(one) for name, one in held.items()
     }
     drivers["ikns"] = lambda: nullcontext(arm)
-    # A busy machine may keep anything waiting.
-    finger = SimulatedFinger(safety=Safety(command_timeout=60.0))
-    drivers["ring"] = lambda: ring_driver(presses, lambda: finger)
+    made_fingers = [] if fingers is None else fingers
+
+    def make_finger() -> SimulatedFinger:
+        # A busy machine may keep anything waiting.
+        finger = SimulatedFinger(safety=Safety(command_timeout=60.0))
+        made_fingers.append(finger)
+        return finger
+
+    drivers["ring"] = lambda: ring_driver(presses, make_finger)
     stop = Event()
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -223,12 +249,12 @@ def at_work(
             target=run_visit, args=(conductor, drivers), kwargs={"stop": stop}
         )
         thread.start()
-        made = Served(conductor, cockpit, clock, chromium)
+        made = Served(conductor, cockpit, clock, chromium, arm)
         try:
             yield made
             assert made.complaints == []
             # Nothing came from anywhere else.
-            home = cockpit.url
+            home = cockpit.url.partition("?")[0]
             assert {url[: len(home)] for url in made.asked} == {home}
         finally:
             for page in made.pages:
@@ -341,6 +367,24 @@ def test_a_page_that_closes_and_one_that_watches(chromium: Any, tmp_path: Path) 
         assert visit.conductor.shown["step"]["repeat"] == row["repeat"] + 1
 
 
+def test_a_browser_without_the_token_is_refused(chromium: Any, tmp_path: Path) -> None:
+    """Another user of this machine finds the port, but not the token."""
+    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as visit:
+        panel = visit.panel()
+        home = visit.cockpit.url.partition("?")[0]
+        assert panel.url == f"{home}panel"  # the token has left the address bar
+        stranger = chromium.new_page()
+        try:
+            for path in ("", "panel"):
+                answer = stranger.goto(home + path)
+                assert answer.status == 403
+                assert "open the address that the command" in stranger.inner_text(
+                    "body"
+                )
+        finally:
+            stranger.close()
+
+
 def test_an_unplugged_gamepad_gives_no_signal(chromium: Any, tmp_path: Path) -> None:
     with at_work(chromium, tmp_path / "v", ["gamepad"], repeats=1) as visit:
         page = visit.participant(script=GAMEPAD)
@@ -397,6 +441,61 @@ def test_the_arm_does_not_depend_on_a_page(chromium: Any, tmp_path: Path) -> Non
         visit.pages.remove(page)
         visit.wait(lambda shown: not shown["page_connected"])
         assert visit.conductor.shown["state"] in ("align", "track")
+
+
+def test_a_stopped_finger_is_connected_again(chromium: Any, tmp_path: Path) -> None:
+    fingers: list[SimulatedFinger] = []
+    with at_work(chromium, tmp_path / "v", ["ring"], fingers=fingers) as visit:
+        panel = visit.panel()
+        visit.participant()
+        visit.wait(lambda shown: shown["c"] == 0.0)
+        assert panel.is_hidden("#banner")
+        panel.wait_for_function("() => !document.getElementById('begin').disabled")
+        fingers[-1].make_safe("servo: overheating")
+        visit.wait(lambda shown: shown["stopped"] is not None)
+        panel.wait_for_selector("#banner", state="visible")
+        says(panel, "stopped", "Finger stopped")
+        says(panel, "reason", "Servo: overheating.")
+        assert "Connect again" in panel.inner_text("#remedy")
+        size = "e => parseFloat(getComputedStyle(e).fontSize)"
+        assert panel.eval_on_selector("#stopped", size) >= 32
+        panel.wait_for_function("() => document.getElementById('begin').disabled")
+        # The button is not all: the command is refused as well.
+        visit.conductor.submit(Command("begin"))
+        visit.wait(lambda shown: "finger stopped" in shown["message"].lower())
+        assert visit.conductor.state == "waiting"
+        panel.click("#connect")
+        panel.wait_for_selector("#banner", state="hidden")
+        visit.wait(lambda shown: shown["stopped"] is None and shown["c"] == 0.0)
+        assert visit.conductor.shown["message"] == ""  # it no longer holds
+        assert fingers[-1].state().mode == "active"
+        panel.click("#begin")
+        visit.until("ready")
+
+
+def test_old_values_are_shown_as_unknown(chromium: Any, tmp_path: Path) -> None:
+    """First those of a stream that is gone, then all of a visit that hangs."""
+    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1) as visit:
+        panel = visit.panel()
+        assert panel.is_hidden("#lost")
+        pose = {"refused": "", "residual": 0.001, "inside": True}
+        arm = visit.source
+        for age, told in ((0.1, "valid"), (3.0, "unknown")):
+            arm.shown = {"kind": "ikns"} | recent_values((pose, age))
+            panel.wait_for_function(
+                "told => [...document.querySelectorAll('#facts dt')].some(e =>"
+                " e.textContent === 'Pose' && e.nextSibling.textContent === told)",
+                arg=told,
+            )
+            assert ("inside the points" in panel.inner_text("#facts")) == (age < 1)
+        visit.clock.stop.set()
+        try:
+            says_news = "() => document.getElementById('lost').textContent"
+            panel.wait_for_function(f"{says_news}.startsWith('No news for ')")
+            panel.wait_for_selector("#lost", state="visible")
+        finally:
+            visit.clock.stop.clear()
+        panel.wait_for_selector("#lost", state="hidden")
 
 
 def test_an_object_by_the_ring_button(chromium: Any, tmp_path: Path) -> None:

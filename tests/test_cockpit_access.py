@@ -1,4 +1,4 @@
-"""Access to the cockpit: no foreign page, and from other machines with the token."""
+"""Access to the cockpit: no foreign page, and no one without the token."""
 
 import asyncio
 import http.client
@@ -56,6 +56,10 @@ def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cockpit]:
         yield cockpit
 
 
+def cookie(cockpit: Cockpit) -> str:
+    return f"{cockpit.access.cookie}={cockpit.access.token}"
+
+
 def ask(
     cockpit: Cockpit, path: str, *, method: str = "GET", **headers: str
 ) -> tuple[int, dict[str, str], bytes]:
@@ -73,9 +77,12 @@ def open_socket(
     *,
     role: str = "panel",
     messages: tuple[str, ...] = (),
+    known: bool = True,
     **headers: str,
 ) -> dict[str, object] | int:
     """Open a web socket; return the first message, or the status of the refusal."""
+    if known:
+        headers = {"Cookie": cookie(cockpit)} | headers
 
     async def connect() -> dict[str, object] | int:
         url = f"ws://127.0.0.1:{cockpit.access.port}/link?role={role}"
@@ -111,12 +118,11 @@ def own(cockpit: Cockpit) -> str:
 def test_by_default_only_this_machine_is_listened_to(here: Cockpit) -> None:
     assert {urlsplit(a).hostname for a in (here.url, here.panel_url)} == {"127.0.0.1"}
     assert here._socket.getsockname()[0] == "127.0.0.1"
-    assert here.access.token == ""
 
 
 @pytest.mark.parametrize("path", PAGES)
 def test_pages_are_served_and_may_load_nothing_else(here: Cockpit, path: str) -> None:
-    status, headers, body = ask(here, path)
+    status, headers, body = ask(here, path, Cookie=cookie(here))
     assert status == 200
     assert body
     policy = headers["Content-Security-Policy"]
@@ -134,7 +140,9 @@ def test_pages_are_served_and_may_load_nothing_else(here: Cockpit, path: str) ->
 def test_a_foreign_host_name_is_refused(here: Cockpit, path: str, host: str) -> None:
     # DNS rebinding: the name of a foreign page resolves to this machine.
     named = host.format(port=here.access.port)
-    status, _, body = ask(here, path, Host=named, Origin=f"http://{named}")
+    status, _, body = ask(
+        here, path, Host=named, Origin=f"http://{named}", Cookie=cookie(here)
+    )
     assert status == 403
     assert b"<html" not in body
 
@@ -168,7 +176,9 @@ def test_our_own_page_is_accepted(here: Cockpit) -> None:
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"])
 def test_nothing_can_be_posted(here: Cockpit, method: str) -> None:
     for origin in (own(here), "http://evil.example"):
-        status, headers, _ = ask(here, "/", method=method, Origin=origin)
+        status, headers, _ = ask(
+            here, "/", method=method, Origin=origin, Cookie=cookie(here)
+        )
         assert status == 405
         assert "Access-Control-Allow-Origin" not in headers
 
@@ -212,52 +222,69 @@ def test_a_participant_cannot_send_commands_of_the_experimenter(tmp_path: Path) 
         assert cockpit.conductor.update(1.0)["state"] == "paused"
 
 
-# --- with another address -----------------------------------------------------------
+# --- the token ----------------------------------------------------------------------
 
 
-def test_other_machines_need_the_token(remote: Cockpit) -> None:
-    token = remote.access.token
-    assert len(token) >= 32  # 24 bytes
-    assert f"token={token}" in remote.url
-    wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
-    cookie = f"{remote.access.cookie}={wrong}"
-    for path in [*PAGES, f"/?token={wrong}", "/?token=", "/link"]:
-        assert ask(remote, path)[0] == 403, path
-        assert ask(remote, path, Cookie=cookie)[0] == 403, path
-        assert token.encode() not in ask(remote, path)[2]
-    assert open_socket(remote, Origin=own(remote)) == 403
-    assert open_socket(remote, Origin=own(remote), Cookie=cookie) == 403
-
-
-def test_the_token_is_exchanged_for_a_cookie_and_leaves_the_address(
-    remote: Cockpit,
+@pytest.mark.parametrize("where", ["here", "remote"])
+def test_no_one_gets_in_without_the_token(
+    where: str, request: pytest.FixtureRequest
 ) -> None:
-    status, headers, _ = ask(remote, f"/panel?token={remote.access.token}")
+    """Neither another machine nor another user of this one."""
+    cockpit: Cockpit = request.getfixturevalue(where)
+    token = cockpit.access.token
+    assert len(token) >= 32  # 24 bytes
+    assert f"token={token}" in cockpit.url
+    assert f"token={token}" in cockpit.panel_url
+    wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
+    stale = f"{cockpit.access.cookie}={wrong}"
+    for path in [*PAGES, f"/?token={wrong}", "/?token=", "/link"]:
+        assert ask(cockpit, path)[0] == 403, path
+        assert ask(cockpit, path, Cookie=stale)[0] == 403, path
+        assert token.encode() not in ask(cockpit, path)[2]
+    assert open_socket(cockpit, Origin=own(cockpit), known=False) == 403
+    assert open_socket(cockpit, Origin=own(cockpit), Cookie=stale) == 403
+
+
+@pytest.mark.parametrize("where", ["here", "remote"])
+def test_the_token_is_exchanged_for_a_cookie_and_leaves_the_address(
+    where: str, request: pytest.FixtureRequest
+) -> None:
+    cockpit: Cockpit = request.getfixturevalue(where)
+    status, headers, _ = ask(cockpit, f"/panel?token={cockpit.access.token}")
     assert status == 302
     assert headers["Location"] == "/panel"
-    cookie = headers["Set-Cookie"]
-    assert "HttpOnly" in cookie
-    assert "SameSite=Lax" in cookie
-    mine = cookie.partition(";")[0]
-    assert ask(remote, "/panel", Cookie=mine)[0] == 200
-    message = open_socket(remote, Origin=own(remote), Cookie=mine)
+    given = headers["Set-Cookie"]
+    assert "HttpOnly" in given
+    assert "SameSite=Lax" in given
+    mine = given.partition(";")[0]
+    assert ask(cockpit, "/panel", Cookie=mine)[0] == 200
+    message = open_socket(cockpit, Origin=own(cockpit), Cookie=mine)
     assert isinstance(message, dict)
     assert message["kind"] == "hello"
     # The token is of use to our own pages only.
-    assert open_socket(remote, Origin="http://evil.example", Cookie=mine) == 403
+    assert open_socket(cockpit, Origin="http://evil.example", Cookie=mine) == 403
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "lab.example", ""])
-def test_no_other_address_without_a_token(host: str) -> None:
+def test_only_the_panel_learns_the_address_of_the_view(tmp_path: Path) -> None:
+    view = "http://127.0.0.1:9/?token=secret"
+    with serving(tmp_path, about={"view": view}) as cockpit:
+        for role, told in (("panel", view), ("participant", ""), ("", "")):
+            message = open_socket(cockpit, role=role, Origin=own(cockpit))
+            assert isinstance(message, dict)
+            assert message["view"] == told
+        policy = ask(cockpit, "/panel", Cookie=cookie(cockpit))[1]
+        assert "secret" not in policy["Content-Security-Policy"]
+
+
+@pytest.mark.parametrize(
+    "host",
+    ["127.0.0.1", "127.0.0.2", "::1", "0.0.0.0", "::", "192.168.1.7", "lab.example"],
+)
+def test_no_address_goes_without_a_token(host: str) -> None:
     with pytest.raises(InvalidInput, match="token"):
-        WebAccess(host, 80)
+        WebAccess(host, 80, "")
     assert len(WebAccess.at(host, 80).token) >= 32
     assert WebAccess.at(host, 80).token != WebAccess.at(host, 80).token
-
-
-@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1"])
-def test_loopback_needs_none(host: str) -> None:
-    assert WebAccess.at(host, 8000).token == ""
 
 
 @given(st.text(), st.text())
@@ -265,11 +292,12 @@ def test_only_the_token_itself_is_the_token(token: str, told: str) -> None:
     access = WebAccess("10.0.0.1", 80, "t" + token)
     assert access.accepts_token(told) == (told == "t" + token)
     assert not access.accepts_token(None)
+    assert not access.accepts_token("\udc80")
 
 
 @given(st.text())
 def test_an_origin_is_ours_only_letter_by_letter(origin: str) -> None:
-    access = WebAccess("127.0.0.1", 8000)
+    access = WebAccess("127.0.0.1", 8000, "t")
     ours = origin == "http://127.0.0.1:8000"
     assert access.same_origin(origin, "127.0.0.1:8000") == ours
 

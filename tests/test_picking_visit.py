@@ -85,7 +85,7 @@ def test_a_visit_can_always_be_brought_to_its_end(sequence):
             visit.begin(now).stop(now + 5.0, "success")
             assert visit.finish()
     assert set(visit.ended) == set(KEYS)
-    with pytest.raises(InvalidInput, match="found none"):
+    with pytest.raises(InvalidInput, match="none is left"):
         visit.begin(now)
 
 

@@ -8,6 +8,7 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -33,11 +34,17 @@ def _live() -> Iterator[LiveView]:
 
 
 def port(view: LiveView) -> int:
-    return int(view.url.rsplit(":", 1)[1].strip("/"))
+    return int(urlsplit(view.url).port or 0)
+
+
+def browser() -> urllib.request.OpenerDirector:
+    """Return what keeps cookies, as a browser does."""
+    return urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
 
 
 def frames(view: LiveView) -> IO[bytes]:
-    return urllib.request.urlopen(view.url + "frames", timeout=10)
+    asked = view.url.replace("/?", "/frames?")
+    return urllib.request.urlopen(asked, timeout=10)
 
 
 def next_frame(stream: IO[bytes]) -> dict[str, Any]:
@@ -79,10 +86,11 @@ def test_an_unknown_posture_moves_nothing(live: LiveView) -> None:
 
 
 def test_the_page_listens_to_its_own_server_only(live: LiveView) -> None:
-    with urllib.request.urlopen(live.url, timeout=10) as answer:
+    with browser().open(live.url, timeout=10) as answer:
         page = answer.read().decode()
+        assert "token" not in answer.url
     assert "connect-src 'self'" in page
-    assert '"live":"/frames"' in page
+    assert '"live":"/frames?' in page
     assert "set_animation" not in page.split("</script>")[0]
     assert "Simulated subject" in page
 
@@ -115,13 +123,48 @@ def test_the_server_binds_to_loopback_alone(live: LiveView) -> None:
 def test_a_foreign_name_and_an_unknown_path_are_refused(
     live: LiveView, path: str, host: str | None, code: int
 ) -> None:
-    request = urllib.request.Request(live.url + path)
+    request = urllib.request.Request(live.url.replace("/?", f"/{path}?"))
     if host is not None:
         request.add_header("Host", host)
     with pytest.raises(urllib.error.HTTPError) as refused:
         urllib.request.urlopen(request, timeout=10)
     refused.value.close()
     assert refused.value.code == code
+
+
+@pytest.mark.parametrize("path", ["/", "/frames", "/other"])
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {},
+        {"Cookie": "ikns-{port}=wrong"},
+        {"Cookie": "ikns-{port}="},
+        {"Cookie": '="; ikns-{port}=\\'},
+        {"Sec-Fetch-Dest": "iframe"},
+    ],
+)
+@pytest.mark.parametrize("query", ["", "?token=", "?token=wrong", "?token=%ff&token"])
+def test_no_one_gets_in_without_the_token(
+    live: LiveView, path: str, headers: dict[str, str], query: str
+) -> None:
+    place = f"http://127.0.0.1:{port(live)}"
+    request = urllib.request.Request(place + path + query)
+    for name, value in headers.items():
+        request.add_header(name, value.format(port=port(live)))
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        urllib.request.urlopen(request, timeout=10)
+    token = urlsplit(live.url).query.removeprefix("token=")
+    assert refused.value.code == 403
+    assert token.encode() not in refused.value.read()
+    refused.value.close()
+
+
+def test_a_frame_of_the_panel_needs_no_cookie(live: LiveView) -> None:
+    """Where the panel has another name, browsers keep no cookies in its frames."""
+    request = urllib.request.Request(live.url, headers={"Sec-Fetch-Dest": "iframe"})
+    with urllib.request.urlopen(request, timeout=10) as answer:
+        assert b"Simulated subject" in answer.read()
+        assert answer.headers["Referrer-Policy"] == "no-referrer"
 
 
 def test_closing_ends_the_stream_the_server_and_its_thread() -> None:

@@ -10,10 +10,19 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
-from tornado.httpclient import HTTPRequest
+from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.websocket import websocket_connect
 
 __all__ = ["Page", "play"]
+
+
+async def token_cookie(address: str) -> str:
+    """Exchange the token in an address for a cookie, as a browser does."""
+    answer = await AsyncHTTPClient().fetch(
+        address, follow_redirects=False, raise_error=False
+    )
+    assert answer.code == 302, answer
+    return answer.headers["Set-Cookie"].partition(";")[0]
 
 
 class Page:
@@ -30,9 +39,8 @@ class Page:
     async def come(self, address: str) -> None:
         origin = "{0.scheme}://{0.netloc}".format(urlsplit(address))
         url = f"{origin.replace('http', 'ws')}/link?role={self.role}"
-        self.link = await websocket_connect(
-            HTTPRequest(url, headers={"Origin": origin})
-        )
+        headers = {"Origin": origin, "Cookie": await token_cookie(address)}
+        self.link = await websocket_connect(HTTPRequest(url, headers=headers))
         self.there.append(self)
         await self.wait(lambda shown: bool(shown))
 

@@ -69,8 +69,8 @@ Realtime = Annotated[
 Host = Annotated[
     str,
     typer.Option(
-        help="Address to serve the pages at; other than on this machine, they need the "
-        "token in the printed address and are not encrypted."
+        help="Address to serve the pages at. They need the token in the printed "
+        "address; to other machines they are sent unencrypted."
     ),
 ]
 Port = Annotated[int, typer.Option(help="Port of the pages; 0 takes a free one.")]

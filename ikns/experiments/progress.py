@@ -92,9 +92,9 @@ class Progress(Generic[S, A]):
         """
         step = self.current
         if step is None:
-            raise InvalidInput("expected a trial to begin, found none left.")
+            raise InvalidInput("all trials are done; none is left to begin.")
         if step.kind == "rest":
-            raise InvalidInput("expected a trial to begin, found a rest.")
+            raise InvalidInput("a rest is running; skip it to begin a trial.")
         if running:
             raise InvalidInput("a trial is already running.")
         return step
@@ -113,7 +113,7 @@ class Progress(Generic[S, A]):
         for attempt in reversed(self.attempts):
             if attempt.key in ended:
                 return attempt.key
-        raise InvalidInput("expected a finished step to repeat, found none.")
+        raise InvalidInput("no step is finished yet, so none can be repeated.")
 
     def rest(self, now: float) -> float:
         """Return the time left of the current rest, s; 0 without one or at its end."""

@@ -1,4 +1,4 @@
-"""Who may use a web server of this package: this machine, or who knows the token."""
+"""Who may use a web server of this package: whoever knows its token."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ class WebAccess:
         Address that the server listens on.
     port : int
     token : str
-        Secret that a browser must send; empty for none, which only a loopback address
-        allows.
+        Secret that a browser must send, on loopback too: other users of this machine
+        can connect there.
 
     Raises
     ------
     InvalidInput
-        Without a token on an address that other machines can reach.
+        Without a token.
 
     Examples
     --------
-    >>> access = WebAccess("127.0.0.1", 8000)
+    >>> access = WebAccess("127.0.0.1", 8000, "secret")
     >>> access.accepts_host("localhost:8000"), access.accepts_host("evil.example:8000")
     (True, False)
     >>> access.same_origin("http://localhost:8000", "localhost:8000")
@@ -52,19 +52,19 @@ class WebAccess:
 
     host: str
     port: int
-    token: str = ""
+    token: str
 
     def __post_init__(self) -> None:
-        """Check that others need a token."""
-        if not self.token and not _is_loopback(self.host):
+        """Check that there is a token."""
+        if not self.token:
             raise InvalidInput(
-                f"expected a token for {self.host}, which others can reach, found none."
+                f"expected a token for port {self.port} of {self.host}, found none."
             )
 
     @classmethod
     def at(cls, host: str, port: int) -> WebAccess:
-        """Return the rule for an address, with a new token where one is needed."""
-        return cls(host, port, "" if _is_loopback(host) else secrets.token_urlsafe(24))
+        """Return the rule for an address, with a new token."""
+        return cls(host, port, secrets.token_urlsafe(24))
 
     def accepts_host(self, header: str | None) -> bool:
         """Whether the ``Host`` header of a request names this server.
@@ -91,9 +91,8 @@ class WebAccess:
 
     def accepts_token(self, token: str | None) -> bool:
         """Whether this is the token, compared in constant time."""
-        if not self.token:
-            return True
-        return hmac.compare_digest((token or "").encode(), self.token.encode())
+        given = (token or "").encode("utf-8", "surrogatepass")
+        return hmac.compare_digest(given, self.token.encode())
 
     @property
     def cookie(self) -> str:

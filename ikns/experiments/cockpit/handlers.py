@@ -48,6 +48,11 @@ class _CheckedHandler(RequestHandler):
         elif not access.accepts_token(self.get_cookie(access.cookie)):
             self._refuse("open the address that the command printed")
 
+    def in_address(self, name: str) -> str:
+        """Return an argument in the address, whatever bytes it holds; else nothing."""
+        found = self.request.query_arguments.get(name, [b""])
+        return found[-1].decode("utf-8", "replace")
+
     def _refuse(self, reason: str) -> None:
         self.set_status(403)
         self.set_header("Content-Type", "text/plain; charset=utf-8")
@@ -59,9 +64,9 @@ class PageHandler(_CheckedHandler):
 
     def prepare(self) -> None:
         """Exchange a token in the address for a cookie, or check access."""
-        access, token = self.cockpit.access, self.get_query_argument("token", None)
+        access, token = self.cockpit.access, self.in_address("token")
         known = access.accepts_host(self.request.headers.get("Host"))
-        if known and access.token and token is not None and access.accepts_token(token):
+        if known and access.accepts_token(token):
             self.set_cookie(access.cookie, access.token, httponly=True, samesite="Lax")
             # The token leaves the address bar, and with it history and screenshots.
             self.redirect(self.request.path)

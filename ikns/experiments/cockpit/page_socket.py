@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import time
 from collections import OrderedDict
@@ -13,6 +12,7 @@ from tornado.websocket import WebSocketClosedError
 
 from ikns.experiments.cockpit.handlers import CheckedSocket
 from ikns.experiments.cockpit.hub import Hub, Role
+from ikns.experiments.cockpit.messages import read_message
 from ikns.experiments.conduct import Command
 from ikns.output.strict_json import strict_json
 
@@ -24,8 +24,6 @@ _MAX_UNANSWERED = 12
 _PARTICIPANT = frozenset({"begin", "emergency", "press", "toggle"})
 #: Messages from the server to the conductor, and the ring button: not for the panel.
 _NOT_PANEL = frozenset({"page_connected", "page_disconnected", "press"})
-#: Longest reason or comment, characters.
-_MAX_TEXT = 500
 
 
 class PageSocket(CheckedSocket):
@@ -43,8 +41,7 @@ class PageSocket(CheckedSocket):
     def open(self, *_: str, **__: str) -> None:
         """Join the cockpit in the role that the address names."""
         self.set_nodelay(True)
-        wanted = self.get_query_argument("role", "")
-        self.role = "panel" if wanted == "panel" else "viewer"
+        self.role = "panel" if self.in_address("role") == "panel" else "viewer"
         self.cockpit.join(self)
 
     def on_close(self) -> None:
@@ -53,7 +50,10 @@ class PageSocket(CheckedSocket):
 
     def hello(self) -> None:
         """Send the page its role and what the visit is."""
-        self._write({"kind": "hello", "role": self.role, **self.cockpit.about})
+        about = dict(self.cockpit.about)
+        if self.role != "panel":  # its address holds a token
+            about["view"] = ""
+        self._write({"kind": "hello", "role": self.role, **about})
 
     def push(self) -> None:
         """Send the newest state, unless the page is behind."""
@@ -69,28 +69,26 @@ class PageSocket(CheckedSocket):
                 self._versions[name] = table["version"]
                 self._write({"kind": name} | table)
         self._number += 1
-        self._sent[self._number] = time.monotonic()
-        self._write({"kind": "now", "n": self._number} | conductor.shown)
+        now, shown = time.monotonic(), conductor.shown
+        self._sent[self._number] = now
+        age = max(0.0, now - shown["time"])
+        self._write({"kind": "now", "n": self._number, "now_age": age} | shown)
 
     def on_message(self, message: str | bytes) -> None:
         """Take a message of the page; one that is malformed closes the connection."""
         now = time.monotonic()
         try:
-            received = json.loads(message)
-            name = received.get("command")
-            text = str(received.get("text", ""))[:_MAX_TEXT]
-            device = str(received.get("device", ""))[:_MAX_TEXT]
-            number, c = int(received.get("n", 0)), received.get("c")
-            value = math.nan if c is None else float(c)
-        except (ValueError, TypeError, AttributeError, RecursionError):
+            received = read_message(message)
+        except ValueError:
             self.close(1003, "expected JSON as the page sends it")
             return
-        round_trip = self._answered(number, now)
-        if name is not None:
-            self._submit(str(name), text)
-        if self.role == "participant" and "c" in received:
-            condition = str(received.get("condition"))
-            self.cockpit.steer(condition, now, value, round_trip, device)
+        round_trip = self._answered(received.n, now)
+        if received.command:
+            self._submit(received.command, received.text)
+        if self.role == "participant" and received.c is not None:
+            self.cockpit.steer(
+                received.condition, now, received.c, round_trip, received.device
+            )
 
     def _submit(self, name: str, text: str) -> None:
         """Pass a command on if the page's role allows it."""

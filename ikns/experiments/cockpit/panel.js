@@ -78,18 +78,26 @@ function facts() {
     if (source.device) rows.push(["Gamepad", source.device, known(shown.c) ? "" : "bad"]);
     rows.push(["Screen to answer, p99", number(known(source.round_trip) ? 1000 * source.round_trip : null, 0, " ms")]);
   }
-  if (known(source.state)) rows.push(["Safety", source.state, source.state === "active" ? "good" : source.state === "safe" ? "bad" : ""]);
-  if (known(source.finger)) rows.push(["Finger", source.finger, source.finger.startsWith("safe") ? "bad" : ""]);
-  if ("flexion" in source) rows.push(["Flexion commanded", number(source.flexion, 2)], ["Flexion measured", number(source.measured, 2)]);
-  if ("rate" in source) rows.push(["Frames", number(source.rate, 0, " /s")]);
-  if ("latency" in source) rows.push(["Receipt to command, p99", number(known(source.latency) ? 1000 * source.latency : null, 2, " ms")]);
-  if ("misses" in source) rows.push(["Late frames", String(source.misses), source.misses ? "" : "good"]);
-  if (known(source.refused)) rows.push(["Pose", source.refused || "counts", source.refused ? "bad" : ""]);
-  if ("residual" in source) rows.push(["Residual", number(known(source.residual) ? 1000 * source.residual : null, 1, " mm")]);
-  if ("worst_residual" in source) rows.push(["Farthest marker", number(known(source.worst_residual) ? 1000 * source.worst_residual : null, 0, " mm")]);
+  const milli = (value, digits, unit) => number(known(value) ? 1000 * value : null, digits, unit);
+  // A value that was measured too long ago is unknown, whatever it was.
+  const add = (key, name, text, kind = () => "") => {
+    if (!(key in source)) return;
+    const old = (source.unknown ?? []).includes(key);
+    rows.push(old ? [name, "unknown", "bad"] : [name, text(source[key]), kind(source[key])]);
+  };
+  add("state", "Control", String, (state) => ({ active: "good", stopped: "bad" })[state] ?? "");
+  if (source.finger !== "") add("finger", "Finger", String, (finger) => (finger.startsWith("stopped") ? "bad" : ""));
+  add("flexion", "Flexion commanded", (value) => number(value, 2));
+  add("measured", "Flexion measured", (value) => number(value, 2));
+  add("rate", "Frames", (value) => number(value, 0, " /s"));
+  add("latency", "Receipt to command, p99", (value) => milli(value, 2, " ms"));
+  add("misses", "Late frames", String, (count) => (count ? "" : "good"));
+  add("refused", "Pose", (reason) => reason || "valid", (reason) => (reason ? "bad" : ""));
+  add("residual", "Residual", (value) => milli(value, 1, " mm"));
+  add("worst_residual", "Farthest marker", (value) => milli(value, 0, " mm"));
+  add("inside", "Hand", (inside) => (inside ? "inside the points" : "outside the points"), (inside) => (inside ? "" : "bad"));
   if (known(source.session)) rows.push(["Session", source.session || "recorded", source.session ? "bad" : ""]);
   if (source.lost_rows) rows.push(["Rows lost", String(source.lost_rows), "bad"]);
-  if ("inside" in source) rows.push(["Hand", source.inside ? "inside the points" : "outside the points", source.inside ? "" : "bad"]);
   return rows;
 }
 
@@ -138,7 +146,7 @@ function allow(id, yes) {
 function showControls() {
   const { state } = shown, running = ["align", "track", "ready", "running", "judge"].includes(state);
   const ready = state === "waiting", idle = !running && state !== "stopped";
-  allow("begin", ready);
+  allow("begin", ready && shown.stopped === null);
   allow("abort", running);
   allow("skip", running || ready || state === "rest");
   allow("repeat", idle && shown.attempts.length > 0);
@@ -149,8 +157,16 @@ function showControls() {
   allow("dropped", state === "running" || state === "judge");
   write("toggle", state === "ready" ? "Start the clock" : "Stop the clock");
   write("pause", state === "paused" ? "Continue" : "Pause");
-  find("connect").hidden = !shown.can_connect;
   write("end", state === "stopped" ? "Acknowledge and end the run" : "End the run");
+}
+
+function showBanner() {
+  const { stopped } = shown;
+  find("banner").hidden = stopped === null;
+  write("stopped", stopped?.title ?? "");
+  write("reason", stopped?.reason ?? "");
+  write("remedy", stopped?.remedy ?? "");
+  find("connect").hidden = !shown.can_connect;
 }
 
 function frame() {
@@ -162,10 +178,11 @@ function frame() {
     const left = state === "align" || state === "rest" ? shown.countdown : trial.time_left;
     write("clock", known(left) ? `${left.toFixed(1)} s` : "");
     write("place", `${shown.trials - shown.trials_left} of ${shown.trials} done`);
-    const pages = shown.page_connected ? "Participant's page is open" : shown.page_condition ? `Open ${location.origin}/ for the participant` : "";
-    write("page", pages);
-    write("message", shown.fault || shown.message);
-    find("message").classList.toggle("fault", Boolean(shown.fault) || state === "stopped");
+    write("page", shown.page_connected ? "Participant's page is open" : "");
+    find("open").hidden = shown.page_connected || !shown.page_condition;
+    showBanner();
+    write("message", shown.unsaved || shown.message);
+    find("message").classList.toggle("fault", Boolean(shown.unsaved) || state === "stopped");
     const gauge = find("gauge");
     gauge.classList.toggle("none", !known(shown.c));
     gauge.firstElementChild.style.width = `${100 * Math.min(1, Math.max(0, shown.c ?? 0))}%`;

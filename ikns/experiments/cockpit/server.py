@@ -39,7 +39,7 @@ class Cockpit:
     on_press : callable, optional
         Called when the ring button is pressed on the participant's page.
     host : str
-        Address to listen on. Any but a loopback address needs the token in :attr:`url`.
+        Address to listen on. Pages need the token in :attr:`url`.
     port : int
         0 takes a free one.
     about : mapping
@@ -83,20 +83,19 @@ class Cockpit:
 
     @property
     def url(self) -> str:
-        """Address of the participant's page."""
+        """Address of the participant's page, with the token."""
         return self._address("/")
 
     @property
     def panel_url(self) -> str:
-        """Address of the experimenter's panel."""
+        """Address of the experimenter's panel, with the token."""
         return self._address("/panel")
 
     def _address(self, path: str) -> str:
         access = self.access
         host = socket.gethostname() if access.host in ("0.0.0.0", "::") else access.host
         host = f"[{host}]" if ":" in host else host
-        token = f"?token={access.token}" if access.token else ""
-        return f"http://{host}:{access.port}{path}{token}"
+        return f"http://{host}:{access.port}{path}?token={access.token}"
 
     def close(self) -> None:
         """Stop the server; calling it again does nothing."""

@@ -15,7 +15,12 @@ from typing import Any
 
 from ikns.errors import InvalidInput
 from ikns.experiments.conduct.experiment import COMMANDS, Command, Experiment
-from ikns.experiments.conduct.screen import plan_steps, progress_facts, prompt
+from ikns.experiments.conduct.screen import (
+    EMERGENCY,
+    plan_steps,
+    progress_facts,
+    prompt,
+)
 from ikns.experiments.conduct.visit_log import VisitLog
 from ikns.experiments.conduct.visit_state import VisitState
 
@@ -136,9 +141,23 @@ class Conductor:
         """Forget the signal: the condition changes, or its source is gone."""
         self._visit.signal.clear()
 
-    def set_source_status(self, status: Mapping[str, Any], *, fault: str = "") -> None:
-        """Set the status of the source of the signal, and why there is none."""
-        self._visit.signal.source, self._visit.signal.fault = status, fault
+    def set_source_status(
+        self, status: Mapping[str, Any], *, fault: str = "", moved_finger: bool = False
+    ) -> None:
+        """Set the status of the source, or why there is none.
+
+        Parameters
+        ----------
+        status : mapping
+            See :class:`ikns.experiments.conduct.signal_monitor.SignalMonitor`.
+        fault : str
+            Why there is no source.
+        moved_finger : bool
+            Whether a finger followed the source that is gone.
+        """
+        signal = self._visit.signal
+        signal.source, signal.fault = status, fault
+        signal.moved_finger = moved_finger
 
     def set_event_listener(
         self, call: Callable[[str, str, float], None] | None
@@ -173,7 +192,7 @@ class Conductor:
             try:
                 self._execute(command, now)
             except InvalidInput as error:
-                self._visit.message = str(error)
+                self._visit.refuse(str(error), now)
             self._visit.record(now)
             self._visit.remaining = self.experiment.visit.remaining
         if self.emergency.is_set() and not self._visit.stopped:
@@ -201,7 +220,7 @@ class Conductor:
     def _execute(self, command: Command, now: float) -> None:
         name, text = command.name, " ".join(command.text.split())
         reason, visit = text or "by the experimenter", self._visit
-        visit.message = ""
+        visit.clear_message()
         if name not in COMMANDS | self.experiment.commands:
             raise InvalidInput(f"unknown command '{name}'.")
         if name == "emergency":
@@ -211,13 +230,14 @@ class Conductor:
             visit.end(now, "the run was ended")
         elif name in ("page_connected", "page_disconnected"):
             visit.set_page(name == "page_connected", now)
-        elif name == "connect":
-            self._reconnect = True
         elif visit.stopped:
             raise InvalidInput("the run was stopped; end it and start it again.")
         elif name == "arm":
             for call in self.on_arm:
                 call()
+        elif name == "connect":
+            visit.reconnect(now)
+            self._reconnect = True
         elif name in self.experiment.commands:
             self.experiment.execute(name, text, now)
         elif name == "begin":
@@ -249,12 +269,14 @@ class Conductor:
         visit, trial = self._visit, self.experiment.view(now)
         state, condition = visit.name, visit.condition
         shown = {
+            "time": now,
             "experiment": self.experiment.name,
             "state": state,
             "prompt": prompt(self.experiment, state),
             "condition": condition,
             "message": visit.message,
             "fault": self.log.fault or visit.signal.fault,
+            "unsaved": self.log.fault,
             "attempts": self.results[-_LISTED:],
             "plan": self.plan["version"],
             "curve": self.curve["version"],
@@ -262,6 +284,8 @@ class Conductor:
         }
         shown |= progress_facts(self.experiment, visit.remaining)
         shown |= visit.signal.snapshot(condition)
+        if visit.stopped:
+            shown |= {"stopped": EMERGENCY, "can_connect": False}
         if state == "rest":
             shown["countdown"] = visit.rest_left(now)
         elif trial:

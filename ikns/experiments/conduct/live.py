@@ -12,6 +12,7 @@ from typing import Any
 from ikns.calibration.subject import Subject
 from ikns.errors import IknsError
 from ikns.experiments.conduct.inputs import Sample, SampleQueue
+from ikns.experiments.conduct.measured import recent_values
 from ikns.finger import Finger
 from ikns.live.control.controller import Decision
 from ikns.live.control.settings import ControlSettings
@@ -25,6 +26,9 @@ __all__ = ["LiveDriver", "live_driver"]
 _STATUS_EVERY = 1 / 30
 #: Frames are counted this long for a frame rate, s.
 _RATE_INTERVAL = 1.0
+
+#: Words for the operator; "safe" would be read as "nothing is wrong".
+_WORDS = {"safe": "stopped"}
 
 
 class LiveDriver:
@@ -63,7 +67,8 @@ class LiveDriver:
         self._on_status = on_status
         self._samples = SampleQueue()
         self._status: LoopStatus | None = None
-        self._finger_state = ""
+        self._finger_state = self._stopped = ""
+        self._status_at = self._frame_at = self._finger_at = math.nan
         self._start = math.nan
         self._events: list[tuple[str, str, float]] = []
         self._rate, self._counted_at, self._frames = math.nan, math.nan, 0
@@ -127,28 +132,37 @@ class LiveDriver:
         return self._samples.take(now)
 
     def status(self) -> dict[str, Any]:
-        """Return the state of loop and finger."""
-        status = self._status
+        """Return the state of loop and finger.
+
+        See :func:`ikns.experiments.conduct.measured.recent_values` for their age.
+        """
+        status, now = self._status, time.monotonic()
         if status is None:
             return {"kind": "ikns"}
         session = {}
         if self._writer is not None:
             session = {"session": self._writer.fault, "lost_rows": self._writer.lost}
-        return session | {
-            "kind": "ikns",
-            "state": status.state,
-            "finger": self._finger_state,
-            "stopped": status.stopped,
+        loop = {
+            "state": _WORDS.get(status.state, status.state),
             "flexion": status.flexion,
-            "measured": status.measured,
             "rate": self._rate,
             "latency": status.latency,
             "misses": status.misses,
+        }
+        finger = {"finger": self._finger_state, "measured": status.measured}
+        pose = {
             "residual": status.residual,
             "worst_residual": status.worst_residual,
             "refused": status.rejection,
             "inside": status.inside,
         }
+        measured_at = self._status_at if self._finger is None else self._finger_at
+        known = {"kind": "ikns", "stopped": self._stopped} | session
+        return known | recent_values(
+            (loop, now - self._status_at),
+            (finger, now - measured_at),
+            (pose, now - self._frame_at),
+        )
 
     def log_event(self, name: str, text: str, now: float) -> None:
         """Write an event into the session."""
@@ -162,6 +176,7 @@ class LiveDriver:
     def _take_decision(
         self, received: float, flexion: float, decision: Decision
     ) -> None:
+        self._frame_at = received
         c = flexion if self._smooth else float(decision.solved.c[0])
         self._samples.put(Sample(received, c if decision.valid else math.nan))
 
@@ -175,10 +190,15 @@ class LiveDriver:
             self._counted_at, self._frames = now, status.frames
         if self._finger is not None:
             state = self._finger.state()
-            self._finger_state = (
-                f"{state.mode}: {state.alert}" if state.alert else state.mode
-            )
-        self._status = status
+            self._finger_at = now - state.age
+            mode = _WORDS.get(state.mode, state.mode)
+            self._finger_state = f"{mode}: {state.alert}" if state.alert else mode
+            stopped = state.mode == "safe"
+            self._stopped = (state.alert or "no reason is known") if stopped else ""
+        if status.state == "safe" and not self._stopped:
+            reason = status.rejection or "poses stopped coming"
+            self._stopped = f"the control loop stopped: {reason}"
+        self._status, self._status_at = status, now
         if self._on_status:
             self._on_status(status)
 

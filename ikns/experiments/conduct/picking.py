@@ -16,6 +16,7 @@ _PROMPTS = {
     "running": "Pick it up and put it down",
     "judge": "Done",
 }
+_STATES = {"ready": "not started", "running": "running", "judge": "stopped"}
 
 
 class PickingExperiment:
@@ -87,7 +88,7 @@ class PickingExperiment:
             self.visit.finish()
         elif name != "comment":
             raise InvalidInput(
-                f"expected a running clock for '{name}', found the trial {state}."
+                f"'{name}' needs a running clock; the trial is {_STATES[state]}."
             )
 
     def state(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -11,6 +12,7 @@ from typing import Any
 
 from ikns.errors import IknsError
 from ikns.experiments.conduct.inputs import Sample, SampleQueue
+from ikns.experiments.conduct.measured import recent_values
 from ikns.finger import Finger
 from ikns.finger.inputs import RingButton
 
@@ -39,7 +41,8 @@ class RingDriver:
         self.fault = ""
         self._presses, self._finger = presses, finger
         self._samples = SampleQueue()
-        self._status: dict[str, Any] = {"kind": "ring"}
+        self._status: dict[str, Any] = {}
+        self._measured_at = math.nan
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="ring", daemon=True)
         self._thread.start()
@@ -62,7 +65,11 @@ class RingDriver:
 
     def status(self) -> dict[str, Any]:
         """Return the state of the finger."""
-        return self._status
+        shown: dict[str, Any] = {"kind": "ring"}
+        if self._status:
+            age = time.monotonic() - self._measured_at
+            shown |= recent_values((self._status, age))
+        return shown
 
     def log_event(self, name: str, text: str, now: float) -> None:
         """Do nothing: nothing is recorded here."""
@@ -96,14 +103,14 @@ class RingDriver:
                 self._finger.command(c)
                 state = self._finger.state()
                 if state.mode == "safe":
-                    self.fault = f"finger: {state.alert}."
+                    self.fault = f"{state.alert or 'no reason is known'}."
                     return
                 self._status = {
-                    "kind": "ring",
                     "finger": state.mode,
                     "flexion": c,
                     "measured": state.flexion,
                 }
+                self._measured_at = now - state.age
             self._samples.put(Sample(now, c))
             due = max(due + 1 / _RATE, time.monotonic())
             self._stop.wait(due - time.monotonic())

@@ -7,8 +7,21 @@ from typing import Any
 
 from ikns.experiments.conduct.experiment import Experiment
 
-__all__ = ["attempt_facts", "plan_steps", "progress_facts", "prompt", "step_facts"]
+__all__ = [
+    "EMERGENCY",
+    "attempt_facts",
+    "plan_steps",
+    "progress_facts",
+    "prompt",
+    "step_facts",
+]
 
+#: The notice after an emergency stop.
+EMERGENCY = {
+    "title": "Run stopped",
+    "reason": "Emergency stop.",
+    "remedy": "End the run; the same command continues from here.",
+}
 _PROMPTS = {
     "stopped": "Stopped",
     "finished": "That was all. Thank you!",

@@ -27,9 +27,12 @@ class SignalMonitor:
     page_connected : bool
         Whether a participant's page is connected.
     source : mapping
-        Status of the source, as it reports it.
+        Status of the source, as it reports it; ``stopped`` says why it no longer moves
+        the finger, until it is connected again.
     fault : str
         Why there is no source; empty while there is one.
+    moved_finger : bool
+        Whether a finger followed the source that is gone.
 
     Examples
     --------
@@ -47,6 +50,7 @@ class SignalMonitor:
         self.page_connected = False
         self.source: Mapping[str, Any] = {}
         self.fault = ""
+        self.moved_finger = False
         self.c = self._received = math.nan
 
     def add(self, now: float, c: float) -> None:
@@ -59,6 +63,25 @@ class SignalMonitor:
         """Forget the signal."""
         self.c = self._received = math.nan
 
+    def stop_notice(self) -> dict[str, str] | None:
+        """Return what has stopped and why, in words; None while nothing has.
+
+        Returns
+        -------
+        dict or None
+            ``title``, ``reason`` and ``remedy``.
+        """
+        reason = str(self.source.get("stopped") or self.fault).strip().rstrip(".")
+        if not reason:
+            return None
+        finger = bool(self.source.get("finger")) or self.moved_finger
+        checked = "the finger and what the reason names" if finger else "its source"
+        return {
+            "title": "Finger stopped" if finger else "No control signal",
+            "reason": f"{reason[0].upper()}{reason[1:]}.",
+            "remedy": f"Check {checked}, then press Connect again.",
+        }
+
     def missing(self, condition: str, now: float) -> str | None:
         """Say what to do for a signal, to end a sentence; None if there is one."""
         from_page = condition in self.page_conditions
@@ -66,7 +89,7 @@ class SignalMonitor:
         if now - self._received <= _SIGNAL_TIMEOUT and page:
             return None
         if not from_page:
-            return ": see the message of its source"
+            return ": check its source"
         if not page:
             return ": open the participant's page"
         return (
@@ -82,5 +105,6 @@ class SignalMonitor:
             "page_condition": condition in self.page_conditions,
             "page_connected": self.page_connected,
             "source": dict(self.source),
-            "can_connect": bool(self.fault or self.source.get("state") == "safe"),
+            "stopped": self.stop_notice(),
+            "can_connect": self.stop_notice() is not None,
         }

@@ -73,11 +73,13 @@ class _CurrentSource:
         self._context: AbstractContextManager[Driver] | None = None
         self._driver: Driver | None = None
         self._fault = ""
+        self._moved_finger = False
 
     def update(self, now: float) -> None:
         """Change the source if the condition changed, and pass its samples on."""
         conductor, wanted = self._conductor, self._conductor.condition
-        if wanted != self._condition or conductor.take_reconnect():
+        reconnect = conductor.take_reconnect()
+        if wanted != self._condition or reconnect:
             self.close()
             conductor.clear_signal()
             self._condition = wanted
@@ -88,11 +90,15 @@ class _CurrentSource:
                 conductor.add_sample(at, c)
             status, fault = self._driver.status(), self._driver.fault
             if fault:
+                self._moved_finger = bool(status.get("finger"))
+                status = {}
                 self.close()
                 conductor.clear_signal()
                 conductor.abort_trial(now, fault.rstrip("."))
                 self._fault = fault
-        conductor.set_source_status(status, fault=self._fault)
+        conductor.set_source_status(
+            status, fault=self._fault, moved_finger=self._moved_finger
+        )
         conductor.update(time.monotonic())
 
     def halt(self) -> None:
@@ -109,7 +115,7 @@ class _CurrentSource:
             context.__exit__(None, None, None)
 
     def _open(self, condition: str) -> None:
-        self._fault = ""
+        self._fault, self._moved_finger = "", False
         if not condition:
             return
         context = self._drivers[condition]()

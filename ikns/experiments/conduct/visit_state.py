@@ -40,7 +40,8 @@ class VisitState:
         Whether the visit is paused, was stopped in an emergency, was ended.
     trials_begun : int
     message : str
-        Answer to the last command.
+        Answer to the last command; a refusal disappears when the visit's situation has
+        changed, because it may no longer hold.
     on_event : callable or None
         Called with name, text and time (s) of what happens.
     """
@@ -61,6 +62,7 @@ class VisitState:
         self.paused = self.stopped = self.over = False
         self.trials_begun = 0
         self.message = ""
+        self._refused_in: tuple[Any, ...] | None = None
         self.on_event: Callable[[str, str, float], None] | None = None
         self._rest, self._auto = rest, auto
         self._break_end = -math.inf
@@ -107,25 +109,64 @@ class VisitState:
             When none can begin now, or it lacks a control signal.
         """
         if self.paused:
-            raise InvalidInput("the visit is paused; end the pause to begin a trial.")
+            raise InvalidInput("the visit is paused; continue it to begin a trial.")
         if self._on_break:
             raise InvalidInput("a break is running; skip it to begin a trial.")
         step = self.experiment.visit.current
         if step is not None and step.kind != "rest" and self.experiment.needs_signal:
+            stop = self.signal.stop_notice()
+            if stop is not None:
+                raise InvalidInput(
+                    f"{stop['title'].lower()} ({stop['reason'].rstrip('.')}); connect "
+                    "again to begin a trial."
+                )
             missing = self.signal.missing(step.condition, now)
             if missing is not None:
                 raise InvalidInput(
-                    f"expected a control signal of {step.condition}, found none"
-                    f"{missing}."
+                    f"there is no control signal of {step.condition}{missing}."
                 )
         self.experiment.begin(now)
+        self.clear_message()
         self.trials_begun += 1
         self.log_event("trial begins", self.experiment.visit.current.key, now)
+
+    def reconnect(self, now: float) -> None:
+        """Abort the running trial, if any: its source is opened again.
+
+        Raises
+        ------
+        InvalidInput
+            When nothing has stopped.
+        """
+        stop = self.signal.stop_notice()
+        if stop is None:
+            raise InvalidInput("nothing has stopped, so there is nothing to connect.")
+        reason = stop["reason"].rstrip(".")
+        self.abort(now, f"{stop['title'].lower()}: {reason}")
+
+    def refuse(self, message: str, now: float) -> None:
+        """Answer a command that cannot be executed."""
+        self.message = f"{message[:1].upper()}{message[1:]}"
+        self._refused_in = self._situation(now)
+
+    def clear_message(self) -> None:
+        """Forget the answer to the last command."""
+        self.message, self._refused_in = "", None
+
+    def _situation(self, now: float) -> tuple[Any, ...]:
+        """Return everything on which a refusal may depend."""
+        return (
+            self.name,
+            len(self.remaining),
+            self.signal.stop_notice(),
+            self.signal.missing(self.condition, now),
+        )
 
     def abort(self, now: float, reason: str) -> None:
         """Abort the running trial, if any; it is repeated."""
         if self.experiment.state():
             self.experiment.abort(now, reason)
+            self._refused_in = None
             self.message = f"The trial was aborted: {reason}."
 
     def skip(self, now: float, reason: str) -> None:
@@ -155,7 +196,7 @@ class VisitState:
             raise InvalidInput("a trial is running; abort it to take a break.")
         step = self.experiment.visit.current
         if step is None or step.kind == "rest" or self._on_break:
-            raise InvalidInput("a break must be followed by a trial, found none next.")
+            raise InvalidInput("no trial comes next, so there is no break to give.")
         self._break_end = now + self._rest
         self.log_event("break", f"{self._rest:g} s", now)
 
@@ -190,6 +231,8 @@ class VisitState:
 
     def advance(self, now: float) -> None:
         """Let rests and breaks end, and begin trials where that is automatic."""
+        if self._refused_in not in (None, self._situation(now)):
+            self.clear_message()
         if self.stopped or self.experiment.state():
             self._waiting_since = math.nan
             return
@@ -208,7 +251,7 @@ class VisitState:
             try:
                 self.begin(now)
             except InvalidInput as error:
-                self.message = str(error)
+                self.refuse(str(error), now)
 
     def record(self, now: float) -> None:
         """Write attempts that are new."""

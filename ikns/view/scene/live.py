@@ -2,15 +2,17 @@
 
 MeshCat's own server listens on every network interface and lives in a process of its
 own. This one listens on the loopback interface alone, in a thread, and only sends: the
-page reads server-sent events.
+page reads server-sent events. A token keeps other users of the machine out.
 """
 
 from __future__ import annotations
 
 import threading
 import webbrowser
+from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,7 +76,6 @@ class LiveView:
             for command in scene.commands
             if command.get("path", "").endswith("_forearm/finger")
         ]
-        self._page = scene_html(_still(scene), live=_FRAMES).encode()
         self._changed = threading.Condition()
         self._frame: bytes | None = None
         self._count = 0
@@ -85,6 +86,8 @@ class LiveView:
             raise FileError(
                 f"port {port} of {_LOOPBACK} cannot be opened: {error}."
             ) from None
+        frames = f"{_FRAMES}?token={self._server.access.token}"
+        self._page = scene_html(_still(scene), live=frames).encode()
         self._thread = threading.Thread(
             target=self._server.serve_forever,
             kwargs={"poll_interval": 0.05},
@@ -95,8 +98,9 @@ class LiveView:
 
     @property
     def url(self) -> str:
-        """Address of the page, on this machine only."""
-        return f"http://{_LOOPBACK}:{self._server.server_address[1]}/"
+        """Address of the page, with its token, on this machine only."""
+        access = self._server.access
+        return f"http://{_LOOPBACK}:{access.port}/?token={access.token}"
 
     def open(self) -> None:
         """Show the page in the user's browser."""
@@ -190,29 +194,60 @@ class _Server(ThreadingHTTPServer):
     def __init__(self, address: tuple[str, int], view: LiveView) -> None:
         self.view = view
         super().__init__(address, _Handler)
-        self.access = WebAccess(address[0], self.server_address[1])
+        self.access = WebAccess.at(address[0], self.server_address[1])
 
 
 class _Handler(BaseHTTPRequestHandler):
     server: _Server
 
     def do_GET(self) -> None:
-        if not self.server.access.accepts_host(self.headers.get("Host")):
-            self.send_error(403)
-        elif self.path == "/":
+        access, path = self.server.access, urlsplit(self.path).path
+        in_address = access.accepts_token(self._token_in_address())
+        if not access.accepts_host(self.headers.get("Host")) or not (
+            in_address or access.accepts_token(self._token_in_cookie())
+        ):
+            self.send_error(403, "open the address that the command printed")
+        elif path == "/" and in_address and not self._embedded():
+            # The token leaves the address bar, and with it history and screenshots.
+            self.send_response(302)
+            self.send_header("Location", "/")
+            cookie = f"{access.cookie}={access.token}; Path=/; HttpOnly; SameSite=Lax"
+            self.send_header("Set-Cookie", cookie)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+        elif path == "/":
             page = self.server.view._page
             self._head("text/html; charset=utf-8", len(page))
             self.wfile.write(page)
-        elif self.path == _FRAMES:
+        elif path == _FRAMES:
             self._head("text/event-stream")
             self._send_frames()
         else:
             self.send_error(404)
 
+    def _embedded(self) -> bool:
+        """Whether the panel asks: its frame has no address bar, and cookies may fail.
+
+        A browser keeps no cookie in a frame when the panel is served at another name.
+        """
+        return self.headers.get("Sec-Fetch-Dest") == "iframe"
+
+    def _token_in_address(self) -> str | None:
+        return parse_qs(urlsplit(self.path).query).get("token", [None])[-1]
+
+    def _token_in_cookie(self) -> str | None:
+        try:
+            cookies = SimpleCookie(self.headers.get("Cookie", ""))
+        except CookieError:
+            return None
+        found = cookies.get(self.server.access.cookie)
+        return None if found is None else found.value
+
     def _head(self, kind: str, length: int | None = None) -> None:
         self.send_response(200)
         self.send_header("Content-Type", kind)
         self.send_header("Cache-Control", "no-store")
+        self.send_header("Referrer-Policy", "no-referrer")
         if length is not None:
             self.send_header("Content-Length", str(length))
         self.end_headers()
