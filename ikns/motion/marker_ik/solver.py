@@ -158,7 +158,9 @@ class MarkerIK:
             When `chain` is asked for and there are fewer than two frames.
         """
         marker_set = self.skeleton.marker_set
-        known = (marker_set.columns(recording.labels) >= 0) & self._tracked
+        with naming(recording.source):
+            found = marker_set.columns(recording.labels) >= 0
+        known = found & self._tracked
         if known.sum() < 3:
             raise MarkerMismatch(
                 f"{recording.source}: expected markers of {marker_set.name} "
