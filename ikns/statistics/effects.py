@@ -21,20 +21,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect size.
+    """An effect size in ``unit`` (empty for standardized ones), and its interval.
 
-    Parameters
-    ----------
-    name : str
-    value, low, high : float
-        In ``unit``; the interval has 95 %, infinite where so few subjects allow none.
-    unit : str
-        Empty for standardized ones.
-    method : str
-        Method of the interval.
-    subjects : int
-    names : (str, str)
-    quantity : str
+    The interval has 95 % by ``method``, infinite where so few subjects allow none.
     """
 
     name: str
