@@ -140,10 +140,6 @@ def analyze_tracking(
     value, level, trial, conditions, unit, unequal
         As in :func:`pair_trials` and :func:`mixed_model`. Learning curves need six
         trials a person and condition, and are left out where a trial column is None.
-
-    Raises
-    ------
-    InvalidInput, NotEnoughData
     """
     _, names = two_conditions(table, conditions)
     pairs = pair_trials(
@@ -222,10 +218,6 @@ def analyze_picking(
         Time limit of a trial, s.
     conditions, unequal
         As in :func:`pair_trials`.
-
-    Raises
-    ------
-    InvalidInput, NotEnoughData
     """
     outcome = success_pairs(table, conditions=conditions, unequal=unequal)
     asked: dict[str, Any] = {

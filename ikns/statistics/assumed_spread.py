@@ -101,21 +101,6 @@ def pilot_spread(
     NotEnoughData
         With fewer than 2 subjects who did all levels in both conditions, or without any
         spread.
-
-    Examples
-    --------
-    >>> found = pilot_spread(
-    ...     {
-    ...         "subject": ["a", "a", "b", "b", "c", "c"],
-    ...         "condition": ["ikns", "ring"] * 3,
-    ...         "object": ["A"] * 6,
-    ...         "time": [8.0, 6.0, 9.0, 5.0, 12.0, 6.0],
-    ...     },
-    ...     "time",
-    ...     level="object",
-    ... )
-    >>> round(found.spread.subject, 9), found.subjects
-    (2.0, 3)
     """
     pairs = pair_trials(
         table, value, level=level, conditions=conditions, unequal="keep"

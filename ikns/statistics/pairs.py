@@ -170,10 +170,6 @@ def pair_trials(
         What to do when a subject has not as many trials in both conditions: refuse, or
         average what is there and count pairs without a partner as dropped.
 
-    Raises
-    ------
-    InvalidInput, NotEnoughData
-
     Examples
     --------
     >>> pairs = pair_trials(
