@@ -6,6 +6,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from delayed_copy import DelayedCopy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
@@ -16,10 +17,7 @@ from ikns.simulation.operator import (
     CONDITIONS,
     Ability,
     Delay,
-    DelayedCopy,
     Operator,
-    closed_loop,
-    open_loop,
     phase_margin,
     sample_abilities,
     track,
@@ -31,6 +29,20 @@ from ikns.simulation.operator.model import discrete_step
 #: Nothing is cut off.
 FREE = (-np.inf, np.inf)
 able = typical().noiseless()
+
+
+def open_loop(ability, omega, *, latency=0.0):
+    """Transfer function of person and device, from error to pointer."""
+    s = 1j * omega
+    w, z = ability.limb_frequency, ability.limb_damping
+    limb = w**2 / (s**2 + 2 * z * w * s + w**2)
+    return ability.crossover / s * limb * np.exp(-(ability.delay + latency) * s)
+
+
+def closed_loop(ability, omega, *, latency=0.0):
+    """Transfer function from target to pointer: ``L exp(preview s) / (1 + L)``."""
+    L = open_loop(ability, omega, latency=latency)
+    return L * np.exp(1j * ability.preview * omega) / (1 + L)
 
 
 def response(ability, omega, rate, *, latency=0.0):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import small_person
+from delayed_copy import DelayedCopy
 
 from ikns.errors import InvalidInput
 from ikns.experiments.tracking import (
@@ -17,7 +18,6 @@ from ikns.experiments.tracking import (
 from ikns.live.control.settings import ControlSettings
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
 from ikns.simulation.operator import (
-    DelayedCopy,
     Operator,
     Participant,
     draw_participant,

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import small_visits as small
+from delayed_copy import DelayedCopy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -36,7 +37,7 @@ from ikns.experiments.tracking import (
 )
 from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import tracking_row
-from ikns.simulation.operator import CONDITIONS, Delay, DelayedCopy, sample_abilities
+from ikns.simulation.operator import CONDITIONS, Delay, sample_abilities
 from ikns.statistics import analyze_picking, analyze_tracking, equivalence, pair_trials
 
 BOTH = [(c, t) for c in ("ikns", "gamepad") for t in small.TRAJECTORIES]

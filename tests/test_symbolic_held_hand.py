@@ -18,7 +18,6 @@ from ikns.symbolic import (
     available_control,
     available_range,
     capsules,
-    longest_sweep,
 )
 from ikns.symbolic.volumes import Capsule, arm_pairs
 
@@ -229,13 +228,13 @@ def test_the_room_between_volumes_is_that_of_brute_force(skeleton):
 def test_a_volume_ends_a_sweep_that_a_limit_would_not(skeleton):
     # A ball in the way of the elbow.
     q = angles(skeleton, POSTURES[0])
-    free = longest_sweep(skeleton, q, "right_arm", pairs=())
+    free = HeldHand(skeleton, "right_arm", pairs=()).sweep(q)
     place = skeleton.link_in_thorax(
         q_at(skeleton, q, free.postures[-4]), "right_forearm"
     )[0]
     ball = Capsule("ball", "thorax", tuple(place), tuple(place), 0.03)
     [arm] = [c for c in capsules(skeleton.urdf) if c.link == "right_upper_arm"]
-    found = longest_sweep(skeleton, q, "right_arm", pairs=[(arm, ball)])
+    found = HeldHand(skeleton, "right_arm", pairs=[(arm, ball)]).sweep(q)
     assert found.stops[1] == ("right_upper_arm cylinder touches ball",)
     assert found.length < free.length
     np.testing.assert_allclose(found.postures[0], free.postures[0], atol=END)
@@ -253,8 +252,8 @@ def test_a_volume_ends_a_sweep_that_a_limit_would_not(skeleton):
 def test_the_trunk_stops_the_upper_arm(skeleton):
     # Hand before the throat: lowering the elbow presses the arm against the ribs.
     q = angles(skeleton, [18, 73, 7, 133, -45, -34, -16])
-    alone = longest_sweep(skeleton, q, "right_arm", pairs=())
-    found = longest_sweep(skeleton, q, "right_arm")
+    alone = HeldHand(skeleton, "right_arm", pairs=()).sweep(q)
+    found = HeldHand(skeleton, "right_arm").sweep(q)
     touches = ("right_upper_arm cylinder touches thorax cylinder",)
     assert touches in found.stops
     assert found.length < alone.length - 0.5
@@ -386,7 +385,7 @@ def test_a_robot_of_turning_and_sliding_joints_has_a_range_too():
 def test_a_robot_of_seven_joints_sweeps_to_its_limits():
     robot = Robot.load(robots_loader.PandaLoader().df_path, "panda_hand")
     q = np.array([0, 0.3, 0, -1.8, 0, 2.1, 0.5])
-    found = longest_sweep(robot, q)
+    found = HeldHand(robot).sweep(q)
     assert found.solved == (True, True)
     hold = robot.pose(q)
     for posture in found.postures:
@@ -400,7 +399,7 @@ def test_a_robot_of_seven_joints_sweeps_to_its_limits():
 
 def test_a_robot_without_limits_comes_back_to_where_it_began():
     robot = Robot(THREE_BARS, "tip")
-    found = longest_sweep(robot, np.array([0.3, 0.9, 1.6]), task="position")
+    found = HeldHand(robot, task="position").sweep(np.array([0.3, 0.9, 1.6]))
     assert found.stops == (("closed",), ("closed",))
     hold = robot.pose(found.postures[0])[0]
     for posture in found.postures:
@@ -426,7 +425,7 @@ def test_bad_postures_are_refused_with_one_sentence(skeleton, limits_alone):
     with pytest.raises(InvalidInput, match="not zero"):
         limits_alone.range(q, np.zeros(7))
     with pytest.raises(InvalidInput, match="one degree of freedom.*found 4"):
-        longest_sweep(skeleton, q, "right_arm", task="position", pairs=())
+        HeldHand(skeleton, "right_arm", task="position", pairs=()).sweep(q)
     with pytest.raises(InvalidInput, match="unknown chain 'leg'"):
         HeldHand(skeleton, "leg")
     with pytest.raises(InvalidInput, match="name the chain"):
@@ -434,7 +433,7 @@ def test_bad_postures_are_refused_with_one_sentence(skeleton, limits_alone):
     inside = Capsule("wall", "thorax", (0, 0, 0), (0, 0, 0), 3.0)
     [arm] = [c for c in capsules(skeleton.urdf) if c.link == "right_upper_arm"]
     with pytest.raises(InvalidInput, match=r"cylinder touches wall, .* mm deep\.$"):
-        longest_sweep(skeleton, q, "right_arm", pairs=[(arm, inside)])
+        HeldHand(skeleton, "right_arm", pairs=[(arm, inside)]).sweep(q)
 
 
 def test_an_arm_at_a_limit_goes_one_way_only(skeleton, limits_alone):

@@ -16,7 +16,6 @@ from ikns.simulation.grasp import (
     CarriedArm,
     Grasp,
     Habits,
-    Observation,
     Person,
     RingInput,
     Solid,
@@ -24,6 +23,7 @@ from ikns.simulation.grasp import (
     hand_route,
     pick,
 )
+from ikns.simulation.grasp.physics import Observation
 from ikns.simulation.movement import hand_drift
 from ikns.simulation.operator import Participant, sample_abilities, tracking_place
 

@@ -41,11 +41,6 @@ class ArmKinematics:
 
     A *posture* is the arm's (9,) angles in the order of the chain ``*_arm_clavicle``;
     `angles` are the (18,) joint angles of the whole body.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    side : {"right", "left"}
     """
 
     def __init__(self, skeleton: Skeleton, side: str) -> None:
@@ -85,21 +80,8 @@ class ArmKinematics:
         """Return the posture nearest to `angles` that puts the hand at a pose.
 
         Newton's method with minimum-norm steps of the seven arm joints, which do not
-        move along the self-motion and leave the clavicle as it is.
-
-        Parameters
-        ----------
-        angles : (18,) array
-            Joint angles of the body to start from.
-        position : (3,) array
-            Hand position in the thorax frame, m.
-        rotation : (3, 3) array
-            Hand orientation in the thorax frame.
-
-        Raises
-        ------
-        InvalidInput
-            When the pose is out of reach.
+        move along the self-motion and leave the clavicle as it is. The pose is in the
+        thorax frame.
         """
         angles = np.array(angles)
         for _ in range(50):
@@ -123,20 +105,11 @@ class ArmKinematics:
 
 
 def girdle(posture: Array, rest: Array, *, follow: float) -> Array:
-    """Return the clavicle angles for a direction of the upper arm, (2,) rad.
+    """Return the clavicle angles for an arm's posture (9,), (2,) rad.
 
     ``protraction = rest + follow * sin(flexion)``,
     ``elevation = rest + follow * (1 - cos(abduction) cos(flexion))``:
-    both are at rest with a hanging arm, and `follow` more with the arm forward.
-
-    Parameters
-    ----------
-    posture : (9,) array
-        Posture of the arm.
-    rest : (2,) array
-        Clavicle angles with the arm hanging, rad.
-    follow : float
-        Clavicle angle per unit of the upper arm's direction, rad.
+    both are at `rest` (2,) with a hanging arm, and `follow` more with the arm forward.
     """
     abduction, flexion = posture[2:4]
     return rest + follow * np.array(
@@ -146,15 +119,7 @@ def girdle(posture: Array, rest: Array, *, follow: float) -> Array:
 
 @dataclass(frozen=True)
 class SelfMotion:
-    """Postures of one arm with the same hand pose.
-
-    Parameters
-    ----------
-    swivel : (K,) array
-        Elbow swivel, rad, increasing.
-    postures : (K, 9) array
-        Postures of the arm.
-    """
+    """Postures of one arm (K, 9) with one hand pose, by increasing swivel (K,), rad."""
 
     swivel: Array
     postures: Array
@@ -175,22 +140,8 @@ def self_motion(
     """Follow the self-motion from a posture in both directions.
 
     Each step goes along the null direction of the pose Jacobian and is then corrected
-    to the hand pose of the start. It ends before a joint comes near its limit.
-
-    Parameters
-    ----------
-    arm : ArmKinematics
-    angles : (18,) array
-        Joint angles of the body at the start.
-    lowest, highest : float
-        Swivels at which it ends, rad.
-    girdle_follow : float
-        How far the clavicle follows the upper arm, see :func:`girdle`.
-
-    Returns
-    -------
-    SelfMotion
-        With at least the starting posture.
+    to the hand pose of the start. It ends before a joint comes near its limit, or at
+    the swivels `lowest` and `highest`, rad; `girdle_follow` as in :func:`girdle`.
     """
     position, rotation = arm.hand(angles)
     start = angles[arm.columns]

@@ -39,19 +39,9 @@ class SoftTissue:
     part shifts and turns all markers of a segment alike, one is each marker's own;
     a slow random part is added. Directions are random, drawn once per person.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        The person.
-    size : float
-        Root mean square length of the displacement over `angles`, on average over the
-        markers of a segment, m; the same for every segment.
-    reference : (18,) array
-        Joint angles without displacement.
-    angles : (T, 18) array
-        Joint angles over which `size` is the root mean square.
-    rng : numpy.random.Generator
-        Source of randomness.
+    `size` is the root mean square length of the displacement over `angles` (T, 18), on
+    average over the markers of a segment, m; the same for every segment. `reference`
+    (18,) are joint angles without displacement.
     """
 
     def __init__(
@@ -87,17 +77,7 @@ class SoftTissue:
                 self._gains[rows] += gains * (size * np.sqrt(share) / rms)
 
     def displacement(self, q: Array, *, rate: float, rng: np.random.Generator) -> Array:
-        """Displacement of the markers in the world, (T, M, 3) m.
-
-        Parameters
-        ----------
-        q : (T, nq) array
-            True configurations.
-        rate : float
-            Samples per second.
-        rng : numpy.random.Generator
-            Source of the random part.
-        """
+        """Displacement of the markers in the world, (T, M, 3) m, at q (T, nq)."""
         local = self.with_posture(q) + self.at_random(len(q), rate=rate, rng=rng)
         return self.in_world(q, local)
 
@@ -136,20 +116,8 @@ def occlusions(
     """Return which markers the cameras miss, in bursts, (n, M).
 
     Bursts of geometrically distributed length start at random, until `share` of all
-    marker frames is hidden. Some hide one or two more markers of the same segment.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of randomness.
-    n : int
-        Frames.
-    links : (M,) array of str
-        Segment of each marker.
-    share : float
-        Share of marker frames to hide, 0 to 0.5.
-    rate : float
-        Frames per second.
+    marker frames is hidden. Some hide one or two more markers of the same segment
+    (`links`, one a marker).
     """
     if not 0 <= share <= 0.5:
         raise InvalidInput(

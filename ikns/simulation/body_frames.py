@@ -27,33 +27,11 @@ class BodyFrames:
     """Body and cameras, frame by frame.
 
     What does not depend on the moving arm (sway of the trunk, the other joints, camera
-    noise, gaps) is drawn in advance for all frames. The drift of the hand is added to
-    the joints by the pseudo-inverse of the Jacobian, correct to first order.
-
-    Parameters
-    ----------
-    arm : ArmKinematics
-        The moving arm, of the true body.
-    angles : (18,) array
-        Joint angles of the rest of the body.
-    subject : Subject
-        The same person as calibrated; its markers are recorded.
-    drift : (n, 6) array
-        Deviation of the hand from its intended pose in each frame, m and rad.
-    rate : float
-        Frames per second.
-    generators : sequence of 4 numpy.random.Generator
-        For the body, camera noise, gaps and skin.
-    marker_noise : float
-        Camera noise, m, standard deviation per axis.
-    occluded : float
-        Share of marker frames that the cameras miss.
-    skin : SoftTissue or None
-
-    Attributes
-    ----------
-    columns : (M,) array
-        Markers of the true body that the calibrated one wears.
+    noise, gaps) is drawn in advance for all frames, with `generators` for the body,
+    camera noise, gaps and skin. `arm` is of the true body, `subject` the same person as
+    calibrated, whose markers are recorded: `columns` of those that the true body wears.
+    The drift of the hand (n, 6), m and rad, is added to the joints by the
+    pseudo-inverse of the Jacobian, correct to first order.
     """
 
     def __init__(
@@ -97,20 +75,7 @@ class BodyFrames:
         self._translation = np.empty((joints, 3))
 
     def posture(self, frame: int, row: Array) -> Array:
-        """Return the true configuration of the body, (25,).
-
-        Parameters
-        ----------
-        frame : int
-            From 0.
-        row : (51 + 3 M,) array
-            State of the arm, from :func:`arm_rows`.
-
-        Raises
-        ------
-        InvalidInput
-            After the last frame.
-        """
+        """Return the true configuration of the body (25,); row of :func:`arm_rows`."""
         if frame >= len(self._drift):
             raise InvalidInput(f"expected {len(self._drift)} frames, found one more.")
         q = self._q[frame].copy()
@@ -139,21 +104,9 @@ def arm_rows(
 ) -> Array:
     """Return the states of an arm along a self-motion, to interpolate between them.
 
-    Parameters
-    ----------
-    arm : ArmKinematics
-    angles : (18,) array
-        Joint angles of the rest of the body.
-    motion : SelfMotion
-    skin : SoftTissue or None
-    columns : (M,) array
-        Markers of the body that are needed.
-
-    Returns
-    -------
-    (K, 51 + 3 M) array
-        Posture (9), pseudo-inverse of the Jacobian (42), displacement of the markers by
-        the skin in the thorax frame (3 each).
+    (K, 51 + 3 M): posture (9), pseudo-inverse of the Jacobian (42), displacement of the
+    markers in `columns` by the skin in the thorax frame (3 each). `angles` (18,) are
+    those of the rest of the body.
     """
     bodies = np.array([arm.put(angles, posture) for posture in motion.postures])
     inverse = [

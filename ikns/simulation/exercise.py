@@ -30,21 +30,7 @@ def explore_freely(
     girdle_rest: NDArray[np.float64],
     rng: np.random.Generator,
 ) -> list[MovementPlan]:
-    """Plan free exploration: reaches from one random place to the next.
-
-    Parameters
-    ----------
-    arms : sequence of ArmKinematics
-        The moving arms, each with its own places.
-    angles : (18,) array
-        Joint angles of the rest of the body.
-    seconds, rate : float
-        Duration and samples per second.
-    girdle_rest : (2,) array
-        Clavicle angles with the arm hanging, rad.
-    rng : numpy.random.Generator
-        Source of randomness.
-    """
+    """Plan free exploration of each arm: reaches from one random place to the next."""
 
     def somewhere() -> list[Place]:
         return [
@@ -67,20 +53,11 @@ def explore_points(
     rate: float,
     rng: np.random.Generator,
 ) -> list[MovementPlan]:
-    """Plan to explore one place after the other, with reaches in between.
+    """Plan to explore one place of each arm after the other, with reaches in between.
 
     Two elbows move in different rhythms: one in the slow third of the frequencies, the
     other in the fast third. Moving in step they would show one degree of freedom, not
     two.
-
-    Parameters
-    ----------
-    places : sequence of sequence of Place
-        Places of each arm, in order.
-    seconds, rate : float
-        Duration at each place, and samples per second.
-    rng : numpy.random.Generator
-        Source of randomness.
     """
     parts: list[list[MovementPlan]] = []
     low, high = SWIVEL_HZ

@@ -42,18 +42,9 @@ _REACH_S, _REACH_S_PER_M = 0.6, 1.2
 
 @dataclass(frozen=True)
 class MovementPlan:
-    """Intended movement of one arm.
+    """Intended postures of one arm (T, 9), and poses of its hand in the thorax frame.
 
-    Parameters
-    ----------
-    postures : (T, 9) array
-        Postures of the arm, rad.
-    position : (T, 3) array
-        Hand in the thorax frame, m.
-    rotation : (T, 3, 3) array
-        Hand orientation in the thorax frame.
-    point : (T,) integer array
-        Index of the place that is explored, -1 during reaches.
+    `point` (T,) is the index of the place that is explored, -1 during reaches.
     """
 
     postures: Array
@@ -135,21 +126,9 @@ def explore(
 ) -> MovementPlan:
     """Plan to hold the hand and swivel the elbow through its range at a place.
 
-    The swivel is a sine with varying frequency and amplitude (70 to 100 % of the
-    range). It starts and ends at rest in the comfortable posture.
-
-    Parameters
-    ----------
-    place : Place
-        With its self-motion; without one the arm does not move.
-    seconds, rate : float
-        Duration, and samples per second.
-    rng : numpy.random.Generator
-        Source of randomness.
-    index : int
-        Index of the point.
-    swivel_hz : (float, float)
-        Range of the frequency, Hz.
+    The swivel is a sine with varying frequency (about one in `swivel_hz`, Hz) and
+    amplitude (70 to 100 % of the range). It starts and ends at rest in the comfortable
+    posture. Without a self-motion at the place the arm does not move.
     """
     n = max(2, round(seconds * rate))
     time = np.arange(n) / rate
@@ -198,27 +177,7 @@ def execute_plan(
     rate: float,
     rng: np.random.Generator,
 ) -> Array:
-    """Return the joint angles of the body while the arm executes a plan.
-
-    Parameters
-    ----------
-    arm : ArmKinematics
-        The arm that moves.
-    angles : (T, 18) array
-        Joint angles of the body; those of the arm are replaced.
-    plan : MovementPlan
-        Intended movement.
-    unsteadiness : Unsteadiness
-        Involuntary movement of the hand.
-    rate : float
-        Samples per second.
-    rng : numpy.random.Generator
-        Source of randomness.
-
-    Returns
-    -------
-    (T, 18) array
-    """
+    """Return the joint angles of the body (T, 18) while the arm executes a plan."""
     n, u = len(plan.point), unsteadiness
     shift = wander(rng, n, 3, sd=u.drift, cutoff=u.drift_hz, rate=rate)
     shift += tremor(rng, n, 3, sd=u.tremor, rate=rate)
@@ -240,17 +199,7 @@ def hand_drift(
     seed: int | np.random.Generator,
     unsteadiness: Unsteadiness,
 ) -> Array:
-    """Return the deviation of a hand from its intended pose, m and rad, (n, 6).
-
-    Parameters
-    ----------
-    n : int
-        Samples.
-    rate : float
-        Samples per second.
-    seed : int or numpy.random.Generator
-    unsteadiness : Unsteadiness
-    """
+    """Return the deviation of a hand from its intended pose, m and rad, (n, 6)."""
     rng, u = np.random.default_rng(seed), unsteadiness
     size = np.repeat([[u.drift, u.tilt], [u.tremor, u.tremor_tilt]], 3, axis=1)
     slow = wander(rng, n, 6, sd=1.0, cutoff=u.drift_hz, rate=rate)

@@ -16,20 +16,9 @@ def draw_parameters(
 ) -> dict[str, float]:
     """Draw each parameter from its distribution, clipped to its limits.
 
-    Parameters
-    ----------
-    table : mapping of str to mapping
-        For each parameter ``mean``, ``sd``, ``low`` and ``high`` of a normal
-        distribution; with ``log`` true, ``mean`` is the median of a log-normal one and
-        ``sd`` that of the logarithm.
-    rng : numpy.random.Generator
-        Source of randomness; one normal number is drawn for each parameter.
-
-    Examples
-    --------
-    >>> table = {"delay": {"mean": 0.2, "sd": 0.0, "low": 0.1, "high": 0.3}}
-    >>> draw_parameters(table, np.random.default_rng(0))
-    {'delay': 0.2}
+    A row has ``mean``, ``sd``, ``low`` and ``high`` of a normal distribution; with
+    ``log`` true, ``mean`` is the median of a log-normal one and ``sd`` that of the
+    logarithm. One normal number is drawn for each parameter.
     """
     drawn = {}
     normal = rng.normal(size=len(table))

@@ -19,14 +19,12 @@ from ikns.errors import InvalidInput
 from ikns.simulation.arm import ArmKinematics, SelfMotion, girdle, self_motion
 
 __all__ = [
-    "FOREARM_TURNS",
-    "LEAST_RANGE",
     "Place",
     "box_points",
     "comfortable_posture",
     "explored_places",
     "random_place",
-    "wider",
+    "widest_place",
 ]
 
 Array = NDArray[np.float64]
@@ -46,10 +44,10 @@ LOWEST, HIGHEST = np.radians(0.0), np.radians(80.0)
 #: Range of the largest swivel to either side of the comfortable one, rad.
 _FARTHEST = np.radians([30.0, 40.0])
 #: Smallest total range of the swivel at a place, rad.
-LEAST_RANGE = np.radians(40.0)
+_LEAST_RANGE = np.radians(40.0)
 #: Turns of the forearm that are tried for a larger range, and the gain that is worth
 #: another turn, rad.
-FOREARM_TURNS, _WORTH_TURNING = np.radians([0.0, 25.0, -25.0]), np.radians(3.0)
+_FOREARM_TURNS, _WORTH_TURNING = np.radians([0.0, 25.0, -25.0]), np.radians(3.0)
 #: Clavicle angle with the upper arm forward, rad. Sternoclavicular elevation of 6 to
 #: 10 deg and a protraction of the same order go with raising the arm to the front
 #: (recalled from Ludewig et al. 2009, J Bone Joint Surg Am 91:378; rounded).
@@ -58,20 +56,10 @@ GIRDLE_FOLLOW = np.radians(8.0)
 
 @dataclass(frozen=True)
 class Place:
-    """A hand pose with the postures that hold it.
+    """A hand pose in the thorax frame with the postures that hold it.
 
-    Parameters
-    ----------
-    posture : (9,) array
-        The comfortable posture there, rad.
-    position : (3,) array
-        Hand in the thorax frame, m.
-    rotation : (3, 3) array
-        Hand orientation in the thorax frame.
-    swivel : float
-        Elbow swivel of the comfortable posture, rad.
-    motion : SelfMotion or None
-        The postures that can be explored; None where the place is not explored.
+    `posture` (9,) is the comfortable one and `swivel` its elbow swivel, rad; `motion`
+    holds the postures that can be explored, None where the place is not explored.
     """
 
     posture: Array
@@ -98,24 +86,8 @@ def comfortable_posture(
 ) -> Array:
     """Return the posture for a hand position, an elbow swivel and a wrist posture.
 
-    Parameters
-    ----------
-    arm : ArmKinematics
-    angles : (18,) array
-        Joint angles of the rest of the body.
-    position : (3,) array
-        Hand in the thorax frame, m.
-    swivel : float
-        Elbow swivel, rad.
-    wrist : (3,) array
-        Pronation, wrist flexion and deviation, rad.
-    girdle_rest : (2,) array
-        Clavicle angles with the arm hanging, rad.
-
-    Raises
-    ------
-    InvalidInput
-        When the position is out of reach.
+    `wrist` (3,) is pronation, wrist flexion and deviation, rad; `girdle_rest` (2,) the
+    clavicle angles with the arm hanging, rad.
     """
 
     def posture(four: Array) -> Array:
@@ -194,26 +166,10 @@ def explored_places(
     girdle_rest: Array,
     girdle_follow: float,
 ) -> list[Place]:
-    """Return places to explore at hand positions, each with its self-motion.
+    """Return places to explore at hand positions (n, 3), each with its self-motion.
 
     Of a few pronations of the forearm, the one with the largest swivel range is taken.
-
-    Parameters
-    ----------
-    arm : ArmKinematics
-    angles : (18,) array
-        Joint angles of the rest of the body.
-    positions : (n, 3) array
-        Hand in the thorax frame, m.
-    rng : numpy.random.Generator
-        Source of the person's habits.
-    girdle_rest, girdle_follow
-        See :func:`ikns.simulation.arm.girdle`; `girdle_follow` while the hand is held.
-
-    Raises
-    ------
-    InvalidInput
-        When a position is out of reach, or the swivel range is too small.
+    The clavicle follows the arm by `girdle_follow` while the hand is held.
     """
     comfortable = rng.normal(np.radians(38.0), np.radians(4.0))
     places = []
@@ -221,39 +177,76 @@ def explored_places(
         swivel = comfortable + rng.normal(0.0, np.radians(3.0))
         farthest = rng.uniform(*_FARTHEST)
         habit = rng.normal(0.0, np.radians([8, 4, 3]))
-        best: Place | None = None
-        for turn in FOREARM_TURNS:
-            if best is not None and best.swivel_range > 0.9 * 2 * farthest:
-                break
-            posture = comfortable_posture(
+        places.append(
+            widest_place(
                 arm,
                 angles,
                 position,
                 swivel=swivel,
-                wrist=habit + [turn, 0.0, 0.0],
+                wrist=habit,
                 girdle_rest=girdle_rest,
-            )
-            motion = self_motion(
-                arm,
-                arm.put(angles, posture),
                 lowest=max(LOWEST, swivel - farthest),
                 highest=min(HIGHEST, swivel + farthest),
                 girdle_follow=girdle_follow,
+                enough=0.9 * 2 * farthest,
+                remedy="draw another subject",
             )
-            best = wider(best, _place(arm, angles, posture, motion))
-        if best is None or best.swivel_range < LEAST_RANGE:
-            raise InvalidInput(
-                f"the elbow has no room to swivel with the {arm.side} hand at "
-                f"{np.round(position, 3)} m in the thorax frame; draw another subject."
-            )
-        places.append(best)
+        )
     return places
 
 
-def wider(best: Place | None, other: Place) -> Place:
-    """Return the other place if its swivel range is clearly larger, else the best."""
-    if best is None or other.swivel_range > best.swivel_range + _WORTH_TURNING:
-        return other
+def widest_place(
+    arm: ArmKinematics,
+    angles: Array,
+    position: Array,
+    *,
+    swivel: float,
+    wrist: Array,
+    girdle_rest: Array,
+    lowest: float,
+    highest: float,
+    girdle_follow: float = 0.0,
+    enough: float = np.inf,
+    remedy: str,
+) -> Place:
+    """Return the place with the largest swivel range, of a few forearm turns.
+
+    No further turn is tried once the range is `enough`. Other parameters as in
+    :func:`comfortable_posture` and :func:`ikns.simulation.arm.self_motion`.
+
+    Raises
+    ------
+    InvalidInput
+        When the position is out of reach, or the swivel range is too small; `remedy`
+        says what would be right.
+    """
+    best: Place | None = None
+    for turn in _FOREARM_TURNS:
+        if best is not None and best.swivel_range > enough:
+            break
+        posture = comfortable_posture(
+            arm,
+            angles,
+            position,
+            swivel=swivel,
+            wrist=wrist + [turn, 0.0, 0.0],
+            girdle_rest=girdle_rest,
+        )
+        motion = self_motion(
+            arm,
+            arm.put(angles, posture),
+            lowest=lowest,
+            highest=highest,
+            girdle_follow=girdle_follow,
+        )
+        here = _place(arm, angles, posture, motion)
+        if best is None or here.swivel_range > best.swivel_range + _WORTH_TURNING:
+            best = here
+    if best is None or best.swivel_range < _LEAST_RANGE:
+        raise InvalidInput(
+            f"the elbow has no room to swivel with the {arm.side} hand at "
+            f"{np.round(position, 3)} m in the thorax frame; {remedy}."
+        )
     return best
 
 

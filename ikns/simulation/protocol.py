@@ -33,7 +33,6 @@ class Protocol:
 
     Parameters
     ----------
-    subject : VirtualSubject
     side : {"right", "left", "both"}
         The exploring arm.
     static, free, points : Trial
@@ -110,10 +109,6 @@ def simulate_protocol(
         Frames per second.
     quick : bool
         A shorter protocol: at most 5 s of free exploration and 3 s a point.
-
-    Returns
-    -------
-    Protocol
 
     Raises
     ------

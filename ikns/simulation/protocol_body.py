@@ -37,22 +37,9 @@ STATIC_SD = np.radians(2.0)
 class ProtocolBody:
     """Postures and places of a person, the same in all trials.
 
-    Parameters
-    ----------
-    arms : sequence of ArmKinematics
-        The exploring arms.
-    stature : float
-        m.
-    girdle_rest : (2,) array
-        Clavicle angles with the arm hanging, rad.
-    heading : float
-        Direction that the body faces, rad about the vertical.
-    sitting, standing : (18,) array
-        Joint angles at rest, rad.
-    positions : list of (P, 3) array
-        Intended positions of each hand at the points, thorax frame, m.
-    places : list of list of Place
-        The points for each arm.
+    `heading` is the direction that the body faces, rad about the vertical; `positions`
+    are the intended ones of each hand at the points (P, 3), and `places` those for each
+    arm.
     """
 
     arms: Sequence[ArmKinematics]
@@ -107,24 +94,7 @@ def draw_protocol_body(
     girdle_follow: float,
     rng: np.random.Generator,
 ) -> ProtocolBody:
-    """Draw a person's postures and places.
-
-    Parameters
-    ----------
-    subject : VirtualSubject
-    arms : sequence of ArmKinematics
-        The exploring arms.
-    n_points : int
-    girdle_follow : float
-        How far the clavicle follows the upper arm while the hand is held, rad.
-    rng : numpy.random.Generator
-        Source of randomness.
-
-    Raises
-    ------
-    InvalidInput
-        When the person cannot reach a point.
-    """
+    """Draw a person's postures and places."""
     girdle_rest = rng.normal(0.0, np.radians([3.0, 2.0]))
     heading = rng.uniform(-np.pi, np.pi)
     sitting = both_arms(subject.skeleton, RESTING)

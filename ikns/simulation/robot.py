@@ -106,7 +106,7 @@ def reach_pose(
     *,
     task: str = "pose",
 ) -> Array:
-    """Return a posture near `q` that puts the frame at a pose, by Newton's method.
+    """Return a posture (n,) near `q` that puts the frame at a pose, by Newton's method.
 
     Steps have minimum norm, so they do not move in the null space. Joint limits are
     ignored.
@@ -116,15 +116,9 @@ def reach_pose(
     robot : Robot
     q : (n,) array
         Initial posture, rad.
-    position : (3,) array
-        In the base frame, m.
-    rotation : (3, 3) array
-        Ignored for the task ``"position"``.
+    position, rotation : (3,) and (3, 3) array
+        In the base frame, m; the rotation is ignored for the task ``"position"``.
     task : {"pose", "position"}
-
-    Returns
-    -------
-    (n,) array
 
     Raises
     ------

@@ -25,18 +25,10 @@ _TECHNICAL = 0.012
 
 @dataclass(frozen=True)
 class VirtualSubject:
-    """A simulated person.
+    """A simulated person, drawn from a seed.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        The true body with the true markers, static-only ones included.
-    adult : Adult
-        Sex, stature, mass and lengths as drawn from the population.
-    marker_set : str
-        Name of the marker set.
-    seed : int
-        Seed that the person was drawn from.
+    `skeleton` is the true body with the true markers, static-only ones included;
+    `adult` has sex, stature, mass and lengths as drawn from the population.
     """
 
     skeleton: Skeleton
@@ -74,10 +66,6 @@ def virtual_subject(
         Gait & Posture 21:226).
     technical_sd : float
         Placement error of technical markers, m per axis (assumption).
-
-    Returns
-    -------
-    VirtualSubject
 
     Examples
     --------

@@ -40,7 +40,7 @@ _STILL_SD, _STILL_HZ = np.radians(0.3), 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """One simulated recording and the truth behind it.
+    """One simulated recording and the truth behind it, in the same frames.
 
     Parameters
     ----------
@@ -49,7 +49,6 @@ class Trial:
     recording : Recording
         Markers as the cameras record them.
     truth : Motion
-        True motion of the body, in the same frames.
     swivel : (T,) or (T, 2) array
         True elbow swivel of the exploring arm, or of both (right, left), rad.
     point : (T,) integer array
@@ -72,22 +71,10 @@ def place_in_room(
     rate: float,
     rng: np.random.Generator,
 ) -> Array:
-    """Place a body in a room with Z up, with a swaying trunk, (T, 25).
+    """Place joint angles (T, 18) in a room with Z up, with a swaying trunk, (T, 25).
 
-    Parameters
-    ----------
-    angles : (T, 18) array
-        Joint angles.
-    height : float
-        Of the thorax frame over the floor, m.
-    heading : float
-        Direction that the body faces, rad about Z.
-    sway : (float, float)
-        Standard deviations of the trunk's sway, m and rad per axis.
-    rate : float
-        Samples per second.
-    rng : numpy.random.Generator
-        Source of randomness.
+    `height` is that of the thorax frame over the floor, m; `heading` the direction that
+    the body faces, rad about Z; `sway` the standard deviations, m and rad per axis.
     """
     n = len(angles)
     upright = Rotation.from_euler("z", heading) * Rotation.from_euler("x", np.pi / 2)
@@ -103,19 +90,7 @@ def place_in_room(
 def still_joints(
     angles: Array, n: int, *, rate: float, rng: np.random.Generator
 ) -> Array:
-    """Return n samples of joints that are meant to be still, (n, 18) rad.
-
-    Parameters
-    ----------
-    angles : (18,) array
-        Mean joint angles.
-    n : int
-        Samples.
-    rate : float
-        Samples per second.
-    rng : numpy.random.Generator
-        Source of randomness.
-    """
+    """Return n samples of joints that are meant to be still, (n, 18) rad."""
     drift = wander(rng, n, len(angles), sd=_STILL_SD, cutoff=_STILL_HZ, rate=rate)
     return angles + drift
 
@@ -153,30 +128,11 @@ def record_trial(
     rate: float,
     rng: np.random.Generator,
 ) -> Trial:
-    """Record a body with simulated cameras.
+    """Record a body at configurations (T, 25) with simulated cameras.
 
-    Parameters
-    ----------
-    arms : sequence of ArmKinematics
-        The exploring arms, with the skeleton of the person.
-    q : (T, 25) array
-        Configurations.
-    name : str
-        Of the trial.
-    point : (T,) integer array
-        See :class:`Trial`.
-    with_static_only : bool
-        Whether static-only markers are worn in this trial.
-    noise : float
-        Camera noise, m, standard deviation per axis.
-    skin : SoftTissue or None
-        Displacement of the markers over the bones.
-    occluded : float
-        Share of marker frames that the cameras miss.
-    rate : float
-        Frames per second.
-    rng : numpy.random.Generator
-        Source of randomness.
+    The exploring arms have the skeleton of the person. Settings as those of
+    :func:`ikns.simulate_protocol`; `with_static_only` says whether static-only markers
+    are worn in this trial.
     """
     skeleton = arms[0].skeleton
     of_noise, of_skin, of_gaps = rng.spawn(3)

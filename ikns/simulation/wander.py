@@ -20,27 +20,10 @@ def wander(
     cutoff: float,
     rate: float,
 ) -> Array:
-    """Slow drift around zero: Gaussian noise through a second-order low-pass.
+    """Slow drift around zero, (n, width): noise through a second-order low-pass.
 
     Its velocity has a standard deviation of ``2 pi cutoff sd``: the second moment of
     the Butterworth spectrum of order two is the square of its cut-off.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of randomness.
-    n, width : int
-        Samples and independent channels.
-    sd : float
-        Standard deviation over many realizations, in the unit of the result.
-    cutoff : float
-        Hz.
-    rate : float
-        Samples per second.
-
-    Returns
-    -------
-    (n, width) array
     """
     sos = butter(2, cutoff, fs=rate, output="sos")
     return _filtered(rng, n, width, sd, sos, settle=int(3 * rate / cutoff))
@@ -49,23 +32,7 @@ def wander(
 def tremor(
     rng: np.random.Generator, n: int, width: int, *, sd: float, rate: float
 ) -> Array:
-    """Physiological tremor: Gaussian noise in the band of 8 to 12 Hz.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of randomness.
-    n, width : int
-        Samples and independent channels.
-    sd : float
-        Standard deviation, in the unit of the result.
-    rate : float
-        Samples per second, above 24.
-
-    Returns
-    -------
-    (n, width) array
-    """
+    """Physiological tremor: Gaussian noise in the band of 8 to 12 Hz, (n, width)."""
     sos = butter(2, (8.0, 12.0), btype="bandpass", fs=rate, output="sos")
     return _filtered(rng, n, width, sd, sos, settle=int(rate))
 

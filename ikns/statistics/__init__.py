@@ -4,7 +4,7 @@
 with a ``sentence()`` in plain words, which never takes a difference that was not found
 for equality. `pairs` prepares the data of paired tests; `paired_tests` repeats those of
 the paper; `equivalence`, `effects`, `mixed_model`, `within_subject_anova`, `success`,
-`times` and `learning` add to them; `power` and `sample_size` determine the number of
+`times` and `learning` add to them; `power` and `plan` determine the number of
 participants. Computed by scipy and statsmodels.
 """
 
@@ -22,13 +22,10 @@ from ikns.statistics.effects import (
     hodges_lehmann,
 )
 from ikns.statistics.equivalence import Equivalence, equivalence
-from ikns.statistics.learning import LearningCurve, LearningCurves, learning_curves
-from ikns.statistics.mixed_model import Coefficient, MixedModel, mixed_model
+from ikns.statistics.learning import LearningCurves, learning_curves
+from ikns.statistics.mixed_model import mixed_model
 from ikns.statistics.paired_tests import (
-    Normality,
     PairedT,
-    RankTest,
-    SignTest,
     exact_sign,
     normality,
     pooled_t,
@@ -36,33 +33,23 @@ from ikns.statistics.paired_tests import (
     subject_means_t,
 )
 from ikns.statistics.pairs import Pairs, pair_arrays, pair_trials
-from ikns.statistics.power import Design, Power, Spread, simulated_power
-from ikns.statistics.sample_size import SampleSize, sample_size
+from ikns.statistics.plan import sample_size
+from ikns.statistics.power import Design, Spread, simulated_power
 from ikns.statistics.success import SuccessTest, success_pairs, success_test
-from ikns.statistics.times import TimeTest, restricted_mean, time_test
-from ikns.statistics.within_subject_anova import VarianceTable, within_subject_anova
+from ikns.statistics.times import restricted_mean, time_test
+from ikns.statistics.within_subject_anova import within_subject_anova
 
 __all__ = [
-    "Coefficient",
     "Design",
     "Effect",
     "Equivalence",
-    "LearningCurve",
     "LearningCurves",
-    "MixedModel",
-    "Normality",
     "PairedT",
     "Pairs",
     "PickAnalysis",
-    "Power",
-    "RankTest",
-    "SampleSize",
-    "SignTest",
     "Spread",
     "SuccessTest",
-    "TimeTest",
     "TrackingAnalysis",
-    "VarianceTable",
     "analyze_picking",
     "analyze_tracking",
     "cohens_dz",

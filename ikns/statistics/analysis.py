@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -24,7 +24,7 @@ from ikns.statistics.paired_tests import (
     signed_rank,
     subject_means_t,
 )
-from ikns.statistics.pairs import Pairs, pair_trials
+from ikns.statistics.pairs import pair_trials
 from ikns.statistics.success import SuccessTest, success_pairs, success_test
 from ikns.statistics.table import Table, column, labels, two_conditions
 from ikns.statistics.times import TimeTest, restricted_pairs, time_test
@@ -46,20 +46,9 @@ _MOST_ANOVA = 200
 class TrackingAnalysis:
     """Experiment 1. ``paper`` repeats the paper's tests; the others are additional.
 
-    Parameters
-    ----------
-    paper : (PairedT, Normality)
-    subjects : PairedT
-    ranks : RankTest
-    effects : tuple of Effect
-    model : MixedModel
-    anova : VarianceTable or None
-        None when a subject lacks a trajectory, there is one only, or there are more
-        than 200 subjects.
-    equivalence : Equivalence or None
-        None without a declared margin.
-    learning : dict
-        By condition; empty without trial numbers.
+    ``anova`` is None when a subject lacks a trajectory, there is one only, or there are
+    more than 200 subjects; ``equivalence`` is None without a declared margin;
+    ``learning`` is by condition, and empty without trial numbers.
     """
 
     paper: tuple[PairedT, Normality]
@@ -101,10 +90,8 @@ class PickAnalysis:
         Pairs with a failure.
     success : SuccessTest
     time : TimeTest
-    ranks : RankTest or None
-        Over subjects' restricted times; None without spread.
-    effects : tuple of Effect
-        Of the subjects' restricted times; empty without spread.
+    ranks, effects
+        Of subjects' restricted times; None and empty without spread.
     """
 
     paper: SignTest | None
@@ -153,10 +140,6 @@ def analyze_tracking(
     value, level, trial, conditions, unit, unequal
         As in :func:`pair_trials` and :func:`mixed_model`. Learning curves need six
         trials a person and condition, and are left out where a trial column is None.
-
-    Raises
-    ------
-    InvalidInput, NotEnoughData
     """
     _, names = two_conditions(table, conditions)
     pairs = pair_trials(
@@ -221,9 +204,6 @@ def analyze_picking(
     table: Table,
     *,
     limit: float,
-    time: str = "time",
-    success: str = "success",
-    level: str = "object",
     conditions: Sequence[str] | None = None,
     unequal: Literal["refuse", "keep"] = "refuse",
 ) -> PickAnalysis:
@@ -236,23 +216,12 @@ def analyze_picking(
         trial, one per subject, condition and object.
     limit : float
         Time limit of a trial, s.
-    time, success, level, conditions
-        Columns, and the order of the difference.
-    unequal : "refuse" or "keep"
-        What to do about trials without a partner, as in :func:`pair_trials`.
-
-    Raises
-    ------
-    InvalidInput, NotEnoughData
+    conditions, unequal
+        As in :func:`pair_trials`.
     """
-    outcome = success_pairs(
-        table, success=success, level=level, conditions=conditions, unequal=unequal
-    )
+    outcome = success_pairs(table, conditions=conditions, unequal=unequal)
     asked: dict[str, Any] = {
         "limit": limit,
-        "time": time,
-        "success": success,
-        "level": level,
         "conditions": outcome.names,
         "unequal": unequal,
     }
@@ -265,24 +234,18 @@ def analyze_picking(
         effects: tuple[Effect, ...] = effect_sizes(pairs)
     except NotEnoughData:
         ranks, effects = None, ()
+    whole = replace(
+        pairs,
+        first=pairs.first[both],
+        second=pairs.second[both],
+        subjects=pairs.subjects[both],
+        levels=pairs.levels[both],
+    )
     return PickAnalysis(
-        exact_sign(_only(pairs, both)) if both.sum() >= 2 else None,
+        exact_sign(whole) if both.sum() >= 2 else None,
         int(np.sum(~both)),
         success_test(outcome),
         timed,
         ranks,
         effects,
-    )
-
-
-def _only(pairs: Pairs, rows: np.ndarray) -> Pairs:
-    return Pairs(
-        pairs.first[rows],
-        pairs.second[rows],
-        pairs.subjects[rows],
-        pairs.levels[rows],
-        pairs.names,
-        pairs.quantity,
-        pairs.unit,
-        int(np.sum(~rows)),
     )

@@ -28,19 +28,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class AssumedSpread:
-    """Standard deviations to plan with, and their source.
+    """Standard deviations to plan with.
 
-    Parameters
-    ----------
-    spread : Spread
-    source : str
-        A clause that names the source, with its assumptions.
-    deviation : float
-        Of the subjects' mean differences where it was found.
-    low, high : float
-        Its 95 % interval; NaN where it is not an estimate.
-    subjects : int
-        That it was found with.
+    ``source`` is a clause that names the source with its assumptions, ``deviation``
+    that of the subjects' mean differences where it was found, with its 95 % interval
+    ``low`` to ``high`` (NaN where it is not an estimate), ``subjects`` how many it was
+    found with.
     """
 
     spread: Spread
@@ -54,17 +47,10 @@ class AssumedSpread:
 def paper_spread(experiment: Literal["tracking", "picking"]) -> AssumedSpread:
     """Largest spread that the paper's printed figures allow, all between subjects.
 
-    The spread of the subjects' mean differences is not printed, so the largest possible
-    one is assumed: a study planned with it has too many participants, not too few, and
-    more trials per participant do not help.
+    The spread of the subjects' mean differences, of RMSE (of 100) or of times (s), is
+    not printed, so the largest possible one is assumed: a study planned with it has too
+    many participants, not too few, and more trials per participant do not help.
 
-    Parameters
-    ----------
-    experiment : "tracking" or "picking"
-        Differences of RMSE, of 100, or of times, s.
-
-    Examples
-    --------
     >>> round(paper_spread("tracking").deviation, 2)
     1.3
     """
@@ -105,14 +91,8 @@ def pilot_spread(
 
     Parameters
     ----------
-    table : mapping of columns
-        With ``subject``, ``condition``, the level and the value; a row is a trial.
-    value : str
-        Column to compare.
-    level : str
-        Column of the trajectory or object.
-    conditions : (str, str), optional
-        First and second of the difference.
+    table, value, level, conditions
+        As in :func:`ikns.statistics.pair_trials`.
     simulated : bool
         Whether the subjects are virtual, which the source then states.
 
@@ -121,21 +101,6 @@ def pilot_spread(
     NotEnoughData
         With fewer than 2 subjects who did all levels in both conditions, or without any
         spread.
-
-    Examples
-    --------
-    >>> found = pilot_spread(
-    ...     {
-    ...         "subject": ["a", "a", "b", "b", "c", "c"],
-    ...         "condition": ["ikns", "ring"] * 3,
-    ...         "object": ["A"] * 6,
-    ...         "time": [8.0, 6.0, 9.0, 5.0, 12.0, 6.0],
-    ...     },
-    ...     "time",
-    ...     level="object",
-    ... )
-    >>> round(found.spread.subject, 9), found.subjects
-    (2.0, 3)
     """
     pairs = pair_trials(
         table, value, level=level, conditions=conditions, unequal="keep"

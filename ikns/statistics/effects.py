@@ -21,20 +21,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect size.
+    """An effect size in ``unit`` (empty for standardized ones), and its interval.
 
-    Parameters
-    ----------
-    name : str
-    value, low, high : float
-        In ``unit``; the interval has 95 %, infinite where so few subjects allow none.
-    unit : str
-        Empty for standardized ones.
-    method : str
-        Method of the interval.
-    subjects : int
-    names : (str, str)
-    quantity : str
+    The interval has 95 % by ``method``, infinite where so few subjects allow none.
     """
 
     name: str
@@ -79,13 +68,9 @@ def cohens_dz(pairs: Pairs) -> Effect:
     dz = float(d.mean() / d.std(ddof=1))
     t = dz * math.sqrt(n)
     low, high = (float(nctdtrinc(n - 1, tail, t)) for tail in (0.975, 0.025))
-    return _effect(
-        "Cohen's dz",
-        (dz, low / math.sqrt(n), high / math.sqrt(n)),
-        "",
-        "noncentral t",
-        means,
-    )
+    low, high = low / math.sqrt(n), high / math.sqrt(n)
+    about = "", "noncentral t", n, means.names, means.quantity
+    return Effect("Cohen's dz", dz, low, high, *about)
 
 
 def hedges_g_av(pairs: Pairs, *, seed: int = 0, resamples: int = 4999) -> Effect:
@@ -128,9 +113,8 @@ def hedges_g_av(pairs: Pairs, *, seed: int = 0, resamples: int = 4999) -> Effect
     low, high = float(interval.low), float(interval.high)
     if not (math.isfinite(low) and math.isfinite(high)):
         low, high = -math.inf, math.inf
-    return _effect(
-        "Hedges' g_av", (value, low, high), "", "bootstrap over subjects", means
-    )
+    about = "", "bootstrap over subjects", n, means.names, means.quantity
+    return Effect("Hedges' g_av", value, low, high, *about)
 
 
 def hodges_lehmann(pairs: Pairs) -> Effect:
@@ -155,13 +139,9 @@ def hodges_lehmann(pairs: Pairs) -> Effect:
     low, high = (
         (float(walsh[cut - 1]), float(walsh[-cut])) if cut else (-math.inf, math.inf)
     )
-    return _effect(
-        "Hodges-Lehmann difference",
-        (float(np.median(walsh)), low, high),
-        pairs.unit,
-        "signed ranks",
-        means,
-    )
+    about = pairs.unit, "signed ranks", n, means.names, means.quantity
+    middle = float(np.median(walsh))
+    return Effect("Hodges-Lehmann difference", middle, low, high, *about)
 
 
 def _rejected_rank_sums(n: int, share: float) -> int:
@@ -176,15 +156,3 @@ def _rejected_rank_sums(n: int, share: float) -> int:
         longer[rank:] += chance / 2
         chance = longer
     return int(np.searchsorted(np.cumsum(chance), share, side="right"))
-
-
-def _effect(
-    name: str,
-    values: tuple[float, float, float],
-    unit: str,
-    method: str,
-    means: Pairs,
-) -> Effect:
-    return Effect(
-        name, *values, unit, method, len(means.first), means.names, means.quantity
-    )

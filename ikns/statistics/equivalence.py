@@ -31,21 +31,13 @@ class Equivalence:
     ----------
     margin : float
         Declared beforehand, in ``unit``.
-    alpha : float
     difference : float
         Mean of first minus second, in ``unit``.
     low, high : float
         Interval with confidence 1 - 2 alpha: inside the margin exactly when both
         one-sided tests reject.
-    p : float
-        The larger of the two one-sided.
-    p_difference : float
-        Of the two-sided test of a difference.
-    degrees : int
-    verdict : str
-        ``equivalent``, ``equivalent though different``, ``different``, ``undecided``.
-    names : (str, str)
-    quantity, unit : str
+    p, p_difference : float
+        The larger of the two one-sided; of the two-sided test of a difference.
     """
 
     margin: float

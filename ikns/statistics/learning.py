@@ -39,17 +39,15 @@ class LearningCurve:
 
     Parameters
     ----------
-    model, subject : str
-        The subject is ``all`` where gain and rate are shared.
-    final : float
-        a, the asymptote, in the value's unit; mean over persons.
-    gain : float
-        b, above that at the first trial, in the value's unit; 0 for the constant.
+    subject : str
+        ``all`` where gain and rate are shared.
+    final, gain : float
+        a, the asymptote, mean over persons, and b, above that at the first trial (0 for
+        the constant), in the value's unit.
     rate : float
         tau in trials, or the exponent c; NaN for the constant.
     deviation : float
         Root mean square of the residuals.
-    aicc : float
     """
 
     model: str
@@ -77,13 +75,8 @@ class LearningCurves:
     ----------
     curves : tuple of LearningCurve
         Every model, of every person if fitted one by one.
-    aicc : dict
-        By model.
-    weights : dict
-        Share of the evidence by model (Akaike weights), sum 1.
-    best : str
-    subjects, trials : int
-    quantity, unit : str
+    aicc, weights : dict
+        By model; weights are shares of the evidence (Akaike weights), sum 1.
     """
 
     curves: tuple[LearningCurve, ...]

@@ -11,13 +11,7 @@ __all__ = ["statsmodels"]
 
 
 def statsmodels(module: str) -> Any:
-    """Import a module of statsmodels by its path below the package.
-
-    Raises
-    ------
-    InvalidInput
-        When statsmodels is not installed.
-    """
+    """Import a module of statsmodels by its path below the package."""
     try:
         return importlib.import_module(f"statsmodels.{module}")
     except ImportError:

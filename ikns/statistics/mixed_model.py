@@ -60,18 +60,12 @@ class MixedModel:
         First minus second, mean over levels, in ``unit``; None when nothing converged.
     interaction_p : float
         That the difference is not the same at all levels; NaN with one level.
-    interaction_degrees : (int, int)
     trial : Coefficient or None
         Change per trial, in ``unit``.
     subject_deviation, slope_deviation, noise_deviation : float
         Standard deviations of the random parts, in ``unit``; 0 for a part left out.
-    structure : str
-        The random part that was fitted.
-    message : str
-        Why it is not the full one; empty if it is.
-    trials, subjects : int
-    names : (str, str)
-    quantity, unit, level : str
+    structure, message : str
+        The random part that was fitted, and why it is not the full one; empty if it is.
     """
 
     condition: Coefficient | None
@@ -136,18 +130,10 @@ def mixed_model(
 
     Parameters
     ----------
-    table : mapping of columns
-        With ``subject``, ``condition``, the level and the value; a row is a trial.
-    value : str
-        Column to explain.
-    level : str or None
-        Column of trajectories or objects.
+    table, value, level, conditions, unit
+        As in :func:`pair_trials`.
     trial : str or None
         Column with the number of the trial, for learning.
-    conditions : (str, str), optional
-        First and second of the difference; by default in order of appearance.
-    unit : str
-        Of the value.
 
     Raises
     ------

@@ -64,13 +64,7 @@ def comparable_trials(
 
 
 def fixed_effects(trials: ComparableTrials, x: Array) -> Array:
-    """Columns of the fixed effects: mean, condition, levels, condition x level, trial.
-
-    Raises
-    ------
-    NotEnoughData
-        When the trials do not determine all effects.
-    """
+    """Columns of the effects: mean, condition, levels, condition x level, trial."""
     places = np.unique(trials.level)
     # Each level against the mean of all, so the condition's is the mean over levels.
     contrasts = np.column_stack(

@@ -39,22 +39,14 @@ def _basis(pairs: Pairs) -> str:
 
 @dataclass(frozen=True)
 class PairedT:
-    """A paired t-test.
+    """A paired t-test, two-sided.
 
     Parameters
     ----------
-    t, p : float
-        Two-sided.
-    degrees : int
-    difference : float
-        Mean of first minus second, in ``unit``.
-    low, high : float
-        Its 95 % interval.
+    difference, low, high : float
+        Mean of first minus second with its 95 % interval, in ``unit``.
     deviation : float
         Standard deviation of the differences, in ``unit``.
-    pairs, subjects : int
-    names : (str, str)
-    quantity, unit : str
     basis : str
         What counts as independent.
     """
@@ -173,18 +165,14 @@ def normality(pairs: Pairs) -> Normality:
 
 @dataclass(frozen=True)
 class SignTest:
-    """An exact sign test.
+    """An exact sign test, two-sided, binomial.
 
     Parameters
     ----------
     positive, negative, ties : int
         Pairs in which the first is larger, smaller, equal; ties are left out.
-    p : float
-        Two-sided, binomial.
     median_difference : float
         Median of the differences, ties included, in ``unit``.
-    names : (str, str)
-    quantity, unit : str
     basis : str
         What counts as independent.
     """

@@ -28,14 +28,10 @@ class Pairs:
     ----------
     first, second : (n,) array
         In ``unit``.
-    subjects : (n,) array of str
-        Whose pair it is.
-    levels : (n,) array of str
-        Trajectory or object of the pair; empty text for means over them.
+    subjects, levels : (n,) array of str
+        Whose pair it is; its trajectory or object, empty text for means over them.
     names : (str, str)
         Of the conditions.
-    quantity, unit : str
-        What the values are.
     dropped : int
         Pairs left out because one value is missing.
     """
@@ -60,13 +56,7 @@ class Pairs:
         return len(np.unique(self.subjects))
 
     def subject_means(self) -> Pairs:
-        """Each person's mean over all pairs: one pair a person.
-
-        Raises
-        ------
-        NotEnoughData
-            With fewer than 2 persons.
-        """
+        """Each person's mean over all pairs: one pair a person."""
         people = np.unique(self.subjects)
         if len(people) < 2:
             raise NotEnoughData(f"expected at least 2 subjects, found {len(people)}.")
@@ -79,20 +69,8 @@ class Pairs:
             levels=np.full(len(people), "", dtype=np.str_),
         )
 
-    def swapped(self) -> Pairs:
-        """Exchange the conditions."""
-        return replace(
-            self, first=self.second, second=self.first, names=self.names[::-1]
-        )
-
     def need_spread(self, at_least: int = 2) -> Array:
-        """Differences, checked to be enough and not all the same.
-
-        Raises
-        ------
-        NotEnoughData
-            With fewer than ``at_least`` pairs, or equal differences.
-        """
+        """Differences, checked to be enough and not all the same."""
         d = self.differences
         if len(d) < at_least:
             raise NotEnoughData(f"expected at least {at_least} pairs, found {len(d)}.")
@@ -191,10 +169,6 @@ def pair_trials(
     unequal : "refuse" or "keep"
         What to do when a subject has not as many trials in both conditions: refuse, or
         average what is there and count pairs without a partner as dropped.
-
-    Raises
-    ------
-    InvalidInput, NotEnoughData
 
     Examples
     --------

@@ -40,8 +40,6 @@ def subject_spread_limit() -> float:
     subjects times trajectories. What the trajectories' means do not take of it belongs
     to the subjects at most.
 
-    Examples
-    --------
     >>> round(subject_spread_limit(), 4)
     1.2984
     """

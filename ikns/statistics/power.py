@@ -56,14 +56,8 @@ class Design:
 class Spread:
     """Standard deviations, in the unit of the difference.
 
-    Parameters
-    ----------
-    subject : float
-        Of the difference from subject to subject.
-    level : float
-        Of the difference from level to level within a subject.
-    trial : float
-        Of repeats of one condition.
+    ``subject`` is that of the difference from subject to subject, ``level`` that from
+    level to level within a subject, ``trial`` that of repeats of one condition.
     """
 
     subject: float
@@ -94,19 +88,11 @@ class Power:
 
     Parameters
     ----------
-    power : float
-    error : float
-        Its Monte Carlo standard error.
-    low, high : float
-        Its 95 % interval (Clopper and Pearson).
+    error, low, high : float
+        Monte Carlo standard error and 95 % interval (Clopper and Pearson) of ``power``.
     aim : "equivalence" or "difference"
-    margin : float or None
     difference : float
         True one.
-    design : Design
-    analysis : str
-    alpha : float
-    simulations, seed : int
     """
 
     power: float

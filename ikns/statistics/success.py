@@ -36,8 +36,6 @@ class SuccessTest:
     low, high : float
         95 % interval of the share of one-sided pairs that the first won (Clopper and
         Pearson); 0 and 1 when there is none.
-    pairs, subjects : int
-    names : (str, str)
     """
 
     succeeded: tuple[int, int]
@@ -66,7 +64,6 @@ class SuccessTest:
 def success_pairs(
     table: Table,
     *,
-    success: str = "success",
     level: str | None = "object",
     conditions: Sequence[str] | None = None,
     unequal: Literal["refuse", "keep"] = "refuse",
@@ -78,14 +75,14 @@ def success_pairs(
     InvalidInput
         For values that are not true or false, repeats, or trials without a partner.
     """
-    values = column(table, success)
+    values = column(table, "success")
     plain: list[Any] = values.tolist()
     if not all(item in (0, 1) for item in plain):
         odd = next(item for item in plain if item not in (0, 1))
-        raise InvalidInput(f"expected {success} to be true or false, found {odd!r}.")
-    columns = {**table, success: np.asarray(values, dtype=np.float64)}
+        raise InvalidInput(f"expected success to be true or false, found {odd!r}.")
+    columns = {**table, "success": np.asarray(values, dtype=np.float64)}
     pairs = pair_trials(
-        columns, success, level=level, conditions=conditions, unequal=unequal
+        columns, "success", level=level, conditions=conditions, unequal=unequal
     )
     rows = int(np.isin(labels(table, "condition"), pairs.names).sum())
     if rows > 2 * len(pairs.first) + pairs.dropped:
@@ -97,13 +94,7 @@ def success_pairs(
 
 
 def success_test(pairs: Pairs) -> SuccessTest:
-    """Exact McNemar test of pairs of successes, 1 or 0.
-
-    Raises
-    ------
-    InvalidInput
-        For other values.
-    """
+    """Exact McNemar test of pairs of successes, 1 or 0."""
     for values in (pairs.first, pairs.second):
         if not np.isin(values, (0, 1)).all():
             raise InvalidInput("expected successes of 0 or 1, found other values.")

@@ -78,13 +78,6 @@ def two_conditions(
     """Column ``condition`` and the two names to compare, in order of the difference.
 
     Without names: the two that the table holds, in the order in which they appear.
-
-    Raises
-    ------
-    NotEnoughData
-        When a condition has no trial.
-    InvalidInput
-        When not exactly two conditions are to be compared.
     """
     found = labels(table, "condition")
     present = list(dict.fromkeys(found.tolist()))

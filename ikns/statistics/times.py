@@ -48,10 +48,6 @@ class TimeTest:
         Means of pairs that succeeded twice, as the paper took them, s; NaN with none.
     failed_pairs : int
         Pairs that this leaves out.
-    limit : float
-        s.
-    pairs, subjects : int
-    names : (str, str)
     """
 
     restricted_means: tuple[float, float]
@@ -133,8 +129,6 @@ def restricted_pairs(
     table: Table,
     *,
     limit: float,
-    time: str = "time",
-    success: str = "success",
     level: str | None = "object",
     conditions: Sequence[str] | None = None,
     unequal: Literal["refuse", "keep"] = "refuse",
@@ -142,17 +136,17 @@ def restricted_pairs(
     """Pairs of times, failures at the limit, s. As :func:`time_test`."""
     if not (math.isfinite(limit) and limit > 0):
         raise InvalidInput(f"expected a time limit above 0 s, found {limit:g}.")
-    good = np.asarray(column(table, success), dtype=bool)
-    raw = np.where(good, numbers(column(table, time), time), limit)
-    finite_values(raw, f"{time} of successful trials")
+    good = np.asarray(column(table, "success"), dtype=bool)
+    raw = np.where(good, numbers(column(table, "time"), "time"), limit)
+    finite_values(raw, "time of successful trials")
     if np.any((raw < 0) | (raw > limit)):
         bad = raw[(raw < 0) | (raw > limit)][0]
         raise InvalidInput(
             f"expected times of successful trials of 0 to {limit:g} s, found {bad:g}."
         )
-    columns = {**table, time: raw}
+    columns = {**table, "time": raw}
     return pair_trials(
-        columns, time, level=level, conditions=conditions, unit="s", unequal=unequal
+        columns, "time", level=level, conditions=conditions, unit="s", unequal=unequal
     )
 
 
@@ -160,8 +154,6 @@ def time_test(
     table: Table,
     *,
     limit: float,
-    time: str = "time",
-    success: str = "success",
     level: str | None = "object",
     conditions: Sequence[str] | None = None,
     unequal: Literal["refuse", "keep"] = "refuse",
@@ -175,8 +167,8 @@ def time_test(
         subject, condition and level. The time of a failed trial may be missing (NaN).
     limit : float
         Time limit of a trial, s.
-    unequal : "refuse" or "keep"
-        What to do about trials without a partner, as in :func:`pair_trials`.
+    level, conditions, unequal
+        As in :func:`pair_trials`.
 
     Raises
     ------
@@ -185,17 +177,9 @@ def time_test(
     NotEnoughData
         When every trial failed.
     """
-    done = success_pairs(
-        table, success=success, level=level, conditions=conditions, unequal=unequal
-    )
+    done = success_pairs(table, level=level, conditions=conditions, unequal=unequal)
     pairs = restricted_pairs(
-        table,
-        limit=limit,
-        time=time,
-        success=success,
-        level=level,
-        conditions=done.names,
-        unequal=unequal,
+        table, limit=limit, level=level, conditions=done.names, unequal=unequal
     )
     a, b = done.first == 1, done.second == 1
     if not (a | b).any():

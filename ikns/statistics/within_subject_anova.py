@@ -22,15 +22,7 @@ __all__ = ["VarianceTable", "within_subject_anova"]
 
 @dataclass(frozen=True)
 class VarianceTable:
-    """F, degrees of freedom and p of each effect.
-
-    Parameters
-    ----------
-    effects : tuple of (name, F, (degrees, error degrees), p)
-        Condition, level, condition x level.
-    subjects : int
-    quantity : str
-    """
+    """(name, F, (degrees, error degrees), p) of condition, level, and both together."""
 
     effects: tuple[tuple[str, float, tuple[int, int], float], ...]
     subjects: int

@@ -39,11 +39,10 @@ class Chain:
         Every joint; joint 0 is a free flyer that carries the body.
     columns : (n,) integer array
         The task's joints among the body's angles.
-    names : tuple of n str
     lower, upper : (n,) array
         Limits, rad; infinite where a joint has none.
     ends : tuple
-        The frames that do the task: joint of the tree, placement on it.
+        The frames that do the task.
     pairs : tuple
         Capsules that must not overlap, each with where its link sits in the tree.
     alone : bool
@@ -84,18 +83,9 @@ class Chain:
 class Held:
     """Functions of the chain's joints x (n,) and the angles of the whole body.
 
-    Parameters
-    ----------
-    place : Function
-        (x, angles) to the hands' positions (3, h) m and rotations (3, 3 h).
-    off : Function
-        (x, angles, positions, rotations) to the hands' errors, (k,) m and rad.
-    jacobian : Function
-        (x, angles) to the hands' Jacobian, (k, n).
-    clearance : Function
-        (x, angles) to the clearance between the capsules of each pair, m.
-    names : tuple of str
-        Of the pairs.
+    `place` gives the hands' positions (3, h) m and rotations (3, 3 h); `off`, of these
+    too, the hands' errors (k,) m and rad; `jacobian` the hands' Jacobian (k, n);
+    `clearance` that between the capsules of each pair, m, named by `names`.
     """
 
     place: ca.Function
@@ -114,16 +104,9 @@ def chain_of(
 ) -> Chain:
     """Describe the chain of a skeleton, or a whole robot.
 
-    Parameters
-    ----------
-    body : Skeleton or Robot
-    chain : str, optional
-        Of a skeleton, see :data:`ikns.body.chains.CHAINS`.
-    hands_move : bool
-        Whether a skeleton's hands turn, so that they too can touch the body.
-    pairs : sequence of (Capsule, Capsule), optional
-        What must not overlap. Default: a skeleton's own
-        (:func:`ikns.symbolic.volumes.arm_pairs`), none for a robot.
+    `hands_move` says whether a skeleton's hands turn, so that they too can touch the
+    body. Pairs that must not overlap are by default a skeleton's own
+    (:func:`ikns.symbolic.volumes.arm_pairs`), none for a robot.
     """
     if isinstance(body, Robot):
         if pairs:
@@ -167,14 +150,7 @@ def chain_of(
 
 
 def held(chain: Chain, *, task: str) -> Held:
-    """Build the functions of a chain that holds its hands.
-
-    Parameters
-    ----------
-    chain : Chain
-    task : {"pose", "position"}
-        What the hands keep.
-    """
+    """Build the functions of a chain that holds its hands' pose or position."""
     if task not in ("pose", "position"):
         raise InvalidInput(f"task must be 'pose' or 'position', not '{task}'.")
     n, h = len(chain.columns), len(chain.ends)

@@ -30,7 +30,7 @@ from ikns.symbolic.posture import Start, binding, start_of
 from ikns.symbolic.programs import NODES, Climber, Sweeper
 from ikns.symbolic.results import AvailableRange, Sweep
 
-__all__ = ["HeldHand", "available_range", "longest_sweep"]
+__all__ = ["HeldHand", "available_range"]
 
 Array = NDArray[np.float64]
 #: A posture or postures, active limits, whether it is a solution, optimizer status.
@@ -114,25 +114,21 @@ class HeldHand:
         starts: int = _STARTS,
         seed: int = 0,
     ) -> AvailableRange:
-        """Find how far a direction goes while the hand is held.
+        """Find how far a direction Z over the joints goes while the hand is held.
 
         Parameters
         ----------
         q : (18,) or (25,) array
             As :meth:`sweep` takes it.
         direction : (n,) array
-            Z over the chain's joints.
-        starts : int
-            Where more than one degree of freedom is left: how many postures besides
-            `q` to search from.
-        seed : int
-            Of those.
+        starts, seed : int
+            Where more than one degree of freedom is left: how many random postures
+            besides `q` to search from.
 
         Raises
         ------
         InvalidInput
-            When `q` is not finite, beyond a limit or has volumes that overlap, or the
-            held hand leaves no joint free.
+            As :meth:`sweep`, or when the held hand leaves no joint free.
         """
         at, Z = start_of(self.chain, self.held, q), self._direction(direction)
         if at.freedom == 1:
@@ -268,20 +264,6 @@ def available_range(
     """
     hand = HeldHand(body, chain, task=task, pairs=pairs)
     return hand.range(q, direction, starts=starts, seed=seed)
-
-
-def longest_sweep(
-    body: Skeleton | Robot,
-    q: ArrayLike,
-    chain: str | None = None,
-    *,
-    direction: ArrayLike | None = None,
-    task: str = "pose",
-    pairs: Sequence[Pair] | None = None,
-) -> Sweep:
-    """Find the longest sweep through one posture; see :meth:`HeldHand.sweep`."""
-    hand = HeldHand(body, chain, task=task, pairs=pairs)
-    return hand.sweep(q, direction=direction)
 
 
 def _spread(postures: Array) -> Array:

@@ -44,17 +44,9 @@ _BLUR = 1e-15
 def joint_frames(
     tree: Tree, q: ca.SX, *, growth: Mapping[int, ca.SX] | None = None
 ) -> list[Pose]:
-    """Pose of every joint in the world.
+    """Pose of every joint in the world at a configuration (nq,).
 
-    Parameters
-    ----------
-    tree : Tree
-        From :attr:`ikns.body.skeleton.Skeleton.tree` or
-        :attr:`ikns.body.skeleton.Robot.tree`.
-    q : (nq,) expression
-        Configuration; see :func:`root_at_origin`.
-    growth : mapping, optional
-        Size factor of what a joint carries, by joint.
+    `growth` has size factors of what a joint carries, by joint.
     """
     frames: list[Pose] = []
     grown = {} if growth is None else growth
@@ -129,12 +121,8 @@ def chain_jacobian(
 ) -> ca.Function:
     """Return the function from joint angles (18,) to a chain's Jacobian (k, n).
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    chain, task : str
-        As :meth:`ikns.body.skeleton.Skeleton.chain_jacobian` takes them, whose rows and
-        columns these are.
+    Its rows and columns are those of
+    :meth:`ikns.body.skeleton.Skeleton.chain_jacobian`.
     """
     if task not in ("pose", "position"):
         raise InvalidInput(f"task must be 'pose' or 'position', not '{task}'.")

@@ -72,12 +72,8 @@ class LengthFit:
         Moving frames in use.
     offsets : dict
         How far each marker sits from its nominal place, m.
-    solved : bool
-        Whether the optimizer met its tolerance.
-    status : str
-        Status reported by the optimizer.
-    iterations : int
-        Of the last solution.
+    solved, status, iterations
+        Whether the optimizer met its tolerance, and its report of the last solution.
     """
 
     lengths: dict[str, float]
@@ -139,9 +135,8 @@ def fit_lengths(
     Examples
     --------
     >>> import ikns
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
     >>> static, points = run.static.recording, run.points.recording
     >>> skeleton, report = fit_lengths(Skeleton.load(), static, [points], n_frames=10)
     >>> report.solved, report.frames

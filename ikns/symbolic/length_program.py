@@ -39,17 +39,9 @@ _IPOPT: dict[str, Any] = {
 class FrameData:
     """Seen markers, and the posture to start from in each frame.
 
-    Parameters
-    ----------
-    q : (F, nq) array
-        Configurations.
-    markers : (F, M, 3) array
-        Seen positions in the world, m; anything where the weight is zero.
-    weights : (F, M) array
-        Inverse variance per axis, 1/m^2.
-    pulls : (F,) array
-        Inverse variance of the joint angles about zero, 1/rad^2: a weak prior for what
-        no marker shows.
+    Markers (F, M, 3) are in the world, m, anything where the weight is zero; `weights`
+    (F, M) are inverse variances per axis, 1/m^2; `pulls` (F,) inverse variances of the
+    joint angles about zero, 1/rad^2: a weak prior for what no marker shows.
     """
 
     q: Array
@@ -62,20 +54,8 @@ class FrameData:
 class Solution:
     """The minimum.
 
-    Parameters
-    ----------
-    log_sizes : (S,) array
-    covariance : (S, S) array
-        Of the log sizes: inverse curvature of half the cost.
-    offsets : (M, 3) array
-        Meters.
-    q : (F, nq) array
-    squares : (F, M) array
-        Squared distance of each marker from where it was seen, m^2.
-    solved : bool
-    status : str
-        Status reported by the optimizer.
-    iterations : int
+    `covariance` (S, S) is that of the log sizes: inverse curvature of half the cost;
+    `squares` (F, M) are squared distances of markers from where they were seen, m^2.
     """
 
     log_sizes: Array
@@ -91,12 +71,7 @@ class Solution:
 class LengthProgram:
     """The fit of sizes, offsets and postures to a number of frames.
 
-    Parameters
-    ----------
-    reference : Skeleton
-        The generic body, markers at their nominal places.
-    n_frames : int
-        How many frames.
+    `reference` is the generic body, markers at their nominal places.
     """
 
     def __init__(self, reference: Skeleton, n_frames: int) -> None:

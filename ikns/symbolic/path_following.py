@@ -31,17 +31,10 @@ _MAX_STEPS = 20
 
 @dataclass(frozen=True)
 class Walk:
-    """Postures one after another along a self-motion.
+    """Postures (K, n) one after another along a self-motion, and what ended it.
 
-    Parameters
-    ----------
-    postures : (K, n) array
-        From the start, rad.
-    why : {"blocked", "closed", "singular", "long"}
-        What ended it: a limit or volume, a closed curve, a singular posture, or its
-        length.
-    beyond : (n,) array, optional
-        The first posture that a limit or volume forbids.
+    `why` is "blocked" by a limit or volume, which forbids the posture `beyond`,
+    "closed" as the curve is, "singular" in the last posture, or "long".
     """
 
     postures: Array
@@ -69,15 +62,9 @@ def walk(
 ) -> Walk:
     """Walk from a posture until something stops it.
 
-    Parameters
-    ----------
-    off, jacobian : callable
-        From joints (n,) to how far the hands are off (k,), and its derivative (k, n).
-    free : callable
-        Whether a posture keeps all limits and volumes apart.
-    start : (n,) array
-    ahead : (n,) array
-        Which of the two ways to go.
+    `off` and `jacobian` are how far the hands are off and its derivative, `free` says
+    whether a posture keeps all limits and volumes apart, `ahead` which of two ways to
+    go.
     """
     postures, x, length = [start], start, 0.0
     while length < _LONGEST:

@@ -24,18 +24,10 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A posture and the hand pose that it defines.
+    """A posture x of the chain in a body, and the hand pose that it defines.
 
-    Parameters
-    ----------
-    x : (n,) array
-        Joints of the chain, rad.
-    angles : (m,) array
-        Angles of the whole body, rad.
-    positions, rotations : (3, h) and (3, 3 h) array
-        Where the hands are, m.
-    null : (d, n) array
-        Joint motions that leave them there, orthonormal rows.
+    `positions` (3, h) m and `rotations` (3, 3 h) are those of the hands, `null` (d, n)
+    the joint motions that leave them there, orthonormal rows.
     """
 
     x: Array
@@ -59,18 +51,7 @@ class Start:
 def start_of(chain: Chain, held: Held, q: ArrayLike) -> Start:
     """Check a posture and compute the hand pose to hold.
 
-    Parameters
-    ----------
-    chain : Chain
-    held : Held
-    q : (m,) or (m + 7,) array
-        Angles of the body, or its configuration; the chain's own (n,) for a robot.
-
-    Raises
-    ------
-    InvalidInput
-        When `q` is not finite, beyond a limit or has volumes that overlap, or nothing
-        is left free to move.
+    `q` has the angles of the body, or its configuration; the chain's own for a robot.
     """
     given = np.asarray(q, dtype=np.float64)
     if given.ndim != 1 or not np.isfinite(given).all():

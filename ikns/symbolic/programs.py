@@ -39,13 +39,7 @@ NODES = 8
 
 
 class Climber:
-    """Maximize ``Z @ x`` over the postures x that hold the hand.
-
-    Parameters
-    ----------
-    chain : Chain
-    held : Held
-    """
+    """Maximize ``Z @ x`` over the postures x that hold the hand."""
 
     def __init__(self, chain: Chain, held: Held) -> None:
         x, hold = _symbols(chain)
@@ -77,13 +71,7 @@ class Climber:
 
 
 class Sweeper:
-    """Maximize the step of an even polygon of postures that hold the hand.
-
-    Parameters
-    ----------
-    chain : Chain
-    held : Held
-    """
+    """Maximize the step of an even polygon of postures that hold the hand."""
 
     def __init__(self, chain: Chain, held: Held) -> None:
         start, hold = _symbols(chain)
@@ -118,14 +106,8 @@ class Sweeper:
     def solve(self, guess: Array, hold: Array, ahead: Array) -> tuple[Array, bool, str]:
         """Return postures from the start (K + 1, n), whether solved, IPOPT's status.
 
-        Parameters
-        ----------
-        guess : (K + 1, n) array
-            The start, then postures that hold the hand about evenly.
-        hold : array
-            See :attr:`ikns.symbolic.posture.Start.hold`.
-        ahead : (n,) array
-            Direction of the first step.
+        The guess (K + 1, n) has the start, then postures that hold the hand about
+        evenly; `ahead` is the direction of the first step.
         """
         step = float(np.linalg.norm(guess[1] - guess[0]))
         result = self._solver(

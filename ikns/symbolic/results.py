@@ -25,11 +25,9 @@ class Sweep:
     stops : (tuple, tuple) of str
         What ended it, at the first posture and at the last: names of joint limits and
         of volumes that touch, or ``closed``, ``singular posture``, ``long``.
-    solved : (bool, bool)
-        Whether the optimizer met its tolerance on either side. Where it did not, the
-        side ends at the last posture of the walk, up to 0.05 rad short.
-    status : (str, str)
-        Status reported by the optimizer.
+    solved, status
+        Whether the optimizer met its tolerance on either side, and its report. Where it
+        did not, the side ends at the last posture of the walk, up to 0.05 rad short.
     """
 
     postures: Array
@@ -52,10 +50,8 @@ class AvailableRange:
     stops : (tuple, tuple) of str
         What is active there: joint limits, volumes that touch, or ``turns back`` where
         the direction has its extreme between all limits.
-    solved : (bool, bool)
-        Whether the optimizer met its tolerance.
-    status : (str, str)
-        Status reported by the optimizer.
+    solved, status
+        Whether the optimizer met its tolerance, and its report.
     freedom : int
         Degrees of freedom left with the hand held. With one the range is that of the
         curve through the start. With more it is the best of several starts: it may be

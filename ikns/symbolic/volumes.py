@@ -34,18 +34,9 @@ _PARALLEL = 1e-9
 
 @dataclass(frozen=True)
 class Capsule:
-    """A capsule fixed to a link.
+    """A capsule fixed to a link: a segment in its frame, and a radius, m.
 
-    Parameters
-    ----------
-    name : str
-        Link and shape, for reports.
-    link : str
-        What carries it.
-    start, end : (3,) tuple
-        Ends of its segment in the link's frame, m.
-    radius : float
-        Meters.
+    The name has link and shape, for reports.
     """
 
     name: str
@@ -81,14 +72,7 @@ def arm_pairs(
 ) -> list[tuple[Capsule, Capsule]]:
     """Pairs that must not overlap: arm and trunk, neck or head; one arm and the other.
 
-    Parameters
-    ----------
-    volumes : list of Capsule
-        Those of an upper body.
-    sides : tuple of str
-        Arms that move.
-    hands : bool
-        Whether the hands move too; held ones stay where they are.
+    Arms of `sides` move, and with `hands` the hands too; held ones stay where they are.
     """
     parts = ("upper_arm", "forearm", *(("hand",) if hands else ()))
     trunk = [v for v in volumes if v.link == "thorax"]

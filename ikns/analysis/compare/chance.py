@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 #: Draws where there is no closed form.
 _DRAWS = 4000
+#: Quantiles of small angles, and of large shares.
+_SMALL, _LARGE = np.array([0.05, 0.5]), np.array([0.5, 0.95])
 
 
 def chance_angles(
@@ -22,10 +24,9 @@ def chance_angles(
     null_dim: int,
     n: int,
     *,
-    shares: ArrayLike = (0.05, 0.5),
     seed: int | np.random.Generator = 0,
 ) -> Array:
-    """Quantiles of the largest principal angle to a subspace drawn at random.
+    """Quantiles of the largest principal angle to a subspace drawn at random, rad.
 
     For a line the squared cosine is Beta(null_dim / 2, (n - null_dim) / 2) (Anderson
     2003, An introduction to multivariate statistical analysis, section 4.2); the same
@@ -33,21 +34,16 @@ def chance_angles(
 
     Parameters
     ----------
-    d : int
-        Directions learned.
-    null_dim : int
-        Dimensions of the null space.
-    n : int
-        Joints.
-    shares : array_like
-        Which quantiles, in (0, 1).
+    d, null_dim, n : int
+        Directions learned, dimensions of the null space, joints.
     seed : int or numpy.random.Generator
-        Source of randomness; without effect on the closed form.
+        Without effect on the closed form.
 
     Returns
     -------
-    array like `shares`
-        Rad. An angle below the first has one chance in twenty to be that small.
+    (2,) array
+        An angle below the first has one chance in twenty to be that small; the second
+        is the median.
 
     Examples
     --------
@@ -59,56 +55,39 @@ def chance_angles(
             f"expected 1 to {n} dimensions, found {d} directions and a null space of "
             f"{null_dim}."
         )
-    wanted = np.asarray(shares, dtype=np.float64)
     if d + null_dim > n:
         # They share at least a line; the largest angle equals that between their
         # orthogonal complements.
         d, null_dim = n - null_dim, n - d
         if d == 0 or null_dim == 0:
-            return np.zeros(wanted.shape)
+            return np.zeros(2)
     few, many = sorted((d, null_dim))
     if few == 1:
-        cosine = beta.ppf(1 - wanted, many / 2, (n - many) / 2)
+        cosine = beta.ppf(1 - _SMALL, many / 2, (n - many) / 2)
         return np.asarray(np.arccos(np.sqrt(cosine)))
     drawn = random_subspaces(few, n, _DRAWS, np.random.default_rng(seed))
     angles = principal_angles(drawn, np.eye(n)[:many])
-    return np.quantile(angles.max(axis=-1), wanted)
+    return np.quantile(angles.max(axis=-1), _SMALL)
 
 
 def chance_inside(
     covariance: ArrayLike,
     null_dim: int,
     *,
-    shares: ArrayLike = (0.5, 0.95),
     seed: int | np.random.Generator = 0,
 ) -> Array:
-    """Quantiles of the variance share inside a subspace drawn at random.
+    """Median and 95th percentile of the variance share inside a random subspace, (2,).
 
-    Its mean is ``null_dim / n`` for any covariance; its spread is larger the fewer
-    directions hold the variance.
-
-    Parameters
-    ----------
-    covariance : (n, n) array
-        Of the joint angles, rad^2.
-    null_dim : int
-        Dimensions of the null space.
-    shares : array_like
-        Which quantiles.
-    seed : int or numpy.random.Generator
-        Source of randomness.
-
-    Returns
-    -------
-    array like `shares`
+    Its mean is ``null_dim / n`` for any covariance (n, n); its spread is larger the
+    fewer directions hold the variance.
     """
     S = np.asarray(covariance, dtype=np.float64)
     variances = np.clip(np.linalg.eigvalsh(S), 0.0, None)
     if not variances.sum() > 0:
-        return np.full(np.shape(shares), np.nan)
+        return np.full(2, np.nan)
     drawn = random_subspaces(null_dim, len(S), _DRAWS, np.random.default_rng(seed))
     inside = np.sum(drawn**2, axis=1) @ variances / variances.sum()
-    return np.quantile(inside, np.asarray(shares, dtype=np.float64))
+    return np.quantile(inside, _LARGE)
 
 
 def random_subspaces(d: int, n: int, draws: int, rng: np.random.Generator) -> Array:

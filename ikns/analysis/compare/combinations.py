@@ -16,15 +16,7 @@ __all__ = ["Combinations", "compare_combinations"]
 
 
 class Combinations(NamedTuple):
-    """Comparisons by (chain, task, coordinates), and chains that have none.
-
-    Parameters
-    ----------
-    found : dict
-        In the order of chains, then tasks, then coordinates.
-    left_out : dict
-        Why a chain could not be compared, by its name.
-    """
+    """Comparisons by (chain, task, coordinates), and why chains have none, by name."""
 
     found: dict[tuple[str, str, str], NullSpaceComparison]
     left_out: dict[str, str]
@@ -45,20 +37,13 @@ def compare_combinations(
 
     Parameters
     ----------
-    learned, skeleton, motion
+    learned, skeleton, motion, chain
         As :func:`compare_motion` takes them.
-    chain : str
-        Joints of the map.
     chains : sequence of str
         Chains to analyze, of the same hands. Default: that of the map.
     tasks, coordinates : sequence of str
-        See :func:`compare_motion`.
     **options
         Of :func:`compare_motion`.
-
-    Returns
-    -------
-    Combinations
 
     Raises
     ------
@@ -66,19 +51,6 @@ def compare_combinations(
         As :func:`compare_motion`.
     NotEnoughData
         When the map's own chain cannot be compared; others are left out instead.
-
-    Examples
-    --------
-    >>> import ikns
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
-    >>> body = run.subject.skeleton
-    >>> motion = run.points.truth
-    >>> learned = ikns.NullSpaceMap(10).fit(*ikns.null_space_samples(motion))
-    >>> compared = compare_combinations(learned, body, motion, resamples=0)
-    >>> [(task, found.null_dim) for (_, task, _), found in compared.found.items()]
-    [('pose', 1), ('position', 4)]
     """
     found: dict[tuple[str, str, str], NullSpaceComparison] = {}
     left_out: dict[str, str] = {}

@@ -35,16 +35,9 @@ COORDINATES = ("internal", "isb", "rotation_vector")
 class Coordinates:
     """Three numbers for the rotation of a shoulder.
 
-    Parameters
-    ----------
-    name : str
-    from_internal : callable
-        From internal angles (..., 3), rad, to these coordinates.
-    to_internal : callable
-        The inverse.
-    rates : callable
-        From internal angles (..., 3) to B (..., 3, 3): internal rates are B times the
-        rates of these coordinates.
+    Internal angles (..., 3), rad, convert to and from these coordinates; `rates` goes
+    from them to B (..., 3, 3): internal rates are B times the rates of these
+    coordinates.
     """
 
     name: str

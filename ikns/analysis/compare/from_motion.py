@@ -8,10 +8,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.analysis.compare.change_coordinates import change_coordinates
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.map_samples import (
     MapSamples,
+    change_coordinates,
     compare_map_samples,
     learn_again,
     visited_points,
@@ -41,7 +41,6 @@ def compare_motion(
     task: Literal["pose", "position"] = "pose",
     coordinates: str = "internal",
     max_hand_speed: float = 0.05,
-    min_duration: float = 0.0,
     **options: Any,
 ) -> NullSpaceComparison:
     """Compare a learned map with the null spaces of a person's arm.
@@ -66,8 +65,8 @@ def compare_motion(
         Of the shoulder, see :mod:`ikns.analysis.compare.coordinates`. In others than
         ``"internal"`` directions are learned again too; rotation vectors start from the
         mean posture of all samples.
-    max_hand_speed, min_duration : float
-        See :func:`ikns.nullspace.map.still_mask`, m/s and s.
+    max_hand_speed : float
+        See :func:`ikns.nullspace.map.still_mask`, m/s.
     **options
         Of :func:`ikns.analysis.compare.compare_samples`.
 
@@ -88,9 +87,8 @@ def compare_motion(
     Examples
     --------
     >>> import ikns
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
     >>> motion, body = run.points.truth, run.subject.skeleton
     >>> learned = NullSpaceMap(10).fit(*ikns.null_space_samples(motion))
     >>> found = compare_motion(learned, body, motion, resamples=0)
@@ -100,9 +98,7 @@ def compare_motion(
     whole = chain if analyzed is None else analyzed
     _check_chains(learned, chain, whole)
     names = chain_joints(whole)
-    gate = still_mask(
-        motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration
-    )
+    gate = still_mask(motion, chain, max_hand_speed=max_hand_speed)
     gate &= np.isfinite(motion.chain_angles(whole)).all(axis=1)
     still = np.flatnonzero(gate)
     labels, points = visited_points(
@@ -147,19 +143,11 @@ def motion_crosstalk(
     max_hand_speed: float = 0.05,
     **options: Any,
 ) -> Crosstalk:
-    """Measure how a person's reaches change the (first) control signal.
+    """Measure how a person's natural reaches change the (first) control signal.
 
-    Parameters
-    ----------
-    learned : NullSpaceMap
-    motion : Motion
-        With natural reaches.
-    chain : str
-        Joints of the map.
-    max_hand_speed : float
-        Gate between reach and rest, m/s.
-    **options
-        Of :func:`ikns.analysis.compare.crosstalk`.
+    `learned` is a map of the joints of `chain`; `max_hand_speed`, m/s, is the gate
+    between reach and rest, and `options` are those of
+    :func:`ikns.analysis.compare.crosstalk`.
     """
     c = learned.control_signal(motion.chain_angles(chain), motion.task_position(chain))
     return crosstalk(

@@ -33,26 +33,17 @@ def compare_robot(
 ) -> NullSpaceComparison:
     """Compare a map learned from a robot's joint angles with its null spaces.
 
+    As :func:`compare_motion`, for a map of all the robot's joints.
+
     Parameters
     ----------
-    learned : NullSpaceMap
-        Of all the robot's joints.
-    robot : Robot
+    learned, robot, task, options
     time : (T,) array
         s, increasing.
     q : (T, n) array
         Joint angles, rad.
-    task : {"pose", "position"}
-        What is held.
     max_hand_speed : float
         Gate on the frame's speed, m/s.
-    **options
-        Of :func:`ikns.analysis.compare.compare_samples`.
-
-    Raises
-    ------
-    InvalidInput, NotEnoughData
-        As :func:`compare_motion`.
     """
     t, angles = (np.asarray(given, dtype=np.float64) for given in (time, q))
     n = len(robot.joint_names)

@@ -1,4 +1,4 @@
-"""Kinematics of a body at any posture: where its hand is and how joints move it."""
+"""Kinematics of a body at any posture, and how much its self-motions are curved."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-__all__ = ["Kinematics", "hand_rates"]
+from ikns.numerics.subspace import mean_null_direction, principal_angles
+
+__all__ = ["Kinematics", "hand_rates", "null_turn", "straight_departure"]
 
 Array = NDArray[np.float64]
 
 #: Half a step along Z for the derivative of the hand's pose, rad: its error is of the
 #: order of the step squared (1e-10 m/rad), that of rounding 1e-16 m over the step.
 _STEP = 1e-5
+#: Share of the samples that represents one end of the range.
+_END = 0.05
 
 
 @dataclass(frozen=True)
@@ -40,17 +44,8 @@ def hand_rates(
 ) -> Array:
     """Hand velocity, m/rad, and turn rate, rad/rad, along each direction, (d, 2, 3).
 
-    Parameters
-    ----------
-    kinematics : Kinematics, optional
-        Differentiated at the mean posture where there is one.
-    mean : (n,) array
-        Mean posture, rad.
-    Z : (d, n) array
-        Directions.
-    jacobian : (k, n) array
-        Used without kinematics; unless it has 3 or 6 rows the rates are NaN, and with 3
-        the turn rate is.
+    Differentiated at the mean posture where there are kinematics. Else from the
+    Jacobian: unless it has 3 or 6 rows the rates are NaN, and with 3 the turn rate is.
     """
     rates = np.full((len(Z), 2, 3), np.nan)
     if kinematics is not None:
@@ -62,3 +57,39 @@ def hand_rates(
         known = (jacobian @ Z.T).T.reshape(len(Z), -1, 3)
         rates[:, : known.shape[1]] = known
     return rates
+
+
+def null_turn(c: Array, jacobians: Array, null_dim: int) -> float:
+    """Angle between the null spaces at both ends of the range of c, rad.
+
+    The largest principal angle between the null spaces averaged over the 5 % of the
+    samples with the smallest c and over the 5 % with the largest; c (N,), Jacobians (N,
+    k, n).
+    """
+    if not np.ptp(c) > 0:
+        return float("nan")
+    low, high = np.quantile(c, [_END, 1 - _END])
+    ends = [
+        mean_null_direction(jacobians[rows], null_dim)[0]
+        for rows in (c <= low, c >= high)
+    ]
+    return float(principal_angles(*ends).max())
+
+
+def straight_departure(
+    kinematics: Kinematics | None, mean: Array, Z: Array, lower: Array, upper: Array
+) -> tuple[float, float]:
+    """Deviation of the hand when the joints move straight along Z to its ends.
+
+    At the worst end, m and rad, from the mean posture; NaN without kinematics.
+    """
+    if kinematics is None:
+        return float("nan"), float("nan")
+    now = Z @ mean
+    steps = np.concatenate([lower - now, upper - now])
+    ends = mean + steps[:, None] * np.concatenate([Z, Z])
+    place, rotation = kinematics.pose(mean)
+    places, rotations = kinematics.pose(ends)
+    away = np.linalg.norm(places - place, axis=1)
+    turned = Rotation.from_matrix(rotations) * Rotation.from_matrix(rotation).inv()
+    return float(away.max()), float(turned.magnitude().max())

@@ -19,16 +19,9 @@ Array = NDArray[np.float64]
 class HandSlope(NamedTuple):
     """How the hand moves per unit of each control signal.
 
-    Parameters
-    ----------
-    slope : (d, 3) array
-        m or rad; NaN where a signal has no range.
-    replicates : (B, d, 3) array
-        The same from resamples; empty without an interval.
-    interval : (d, 2) array
-        Of the slopes' lengths; NaN without.
-    blocks : float
-        Blocks that fit into the samples; 0 without an interval.
+    `slope` (d, 3) is in m or rad, NaN where a signal has no range; `replicates` (B, d,
+    3) are the same from resamples, `interval` (d, 2) of the slopes' lengths, empty and
+    NaN without; `blocks` how many fit into the samples, 0 without an interval.
     """
 
     slope: Array
@@ -54,31 +47,20 @@ def hand_slope(
     if not resamples or np.isnan(slope).any():
         none = np.empty((0, *slope.shape))
         return HandSlope(slope, none, np.full((d, 2), np.nan), 0.0)
-    drawn = draw(slope_scores(c, hand), resamples, rng)
-    replicates = slopes(c, hand, drawn.counts)
+    counts, blocks = draw(slope_scores(c, hand), resamples, rng)
+    replicates = slopes(c, hand, counts)
     interval = [
-        length_interval(slope[i], replicates[:, i], drawn.blocks, level=level, rng=rng)
+        length_interval(slope[i], replicates[:, i], blocks, level=level, rng=rng)
         for i in range(d)
     ]
-    return HandSlope(slope, replicates, np.array(interval), drawn.blocks)
+    return HandSlope(slope, replicates, np.array(interval), blocks)
 
 
 def slopes(c: Array, hand: Array, counts: Array | None = None) -> Array:
-    """Regression slopes of the hand on the control signals.
+    """Regression slopes of the hand (N, m) on the control signals (N, d).
 
-    Parameters
-    ----------
-    c : (N, d) array
-        Control signals.
-    hand : (N, m) array
-        Hand positions, m, or turns, rad.
-    counts : (B, N) array, optional
-        How often each sample counts in each resample.
-
-    Returns
-    -------
-    (d, m) or (B, d, m) array
-        Of each signal with the others constant; NaN where signals are collinear.
+    (d, m), or (B, d, m) for `counts` (B, N), how often each sample counts in each
+    resample: of each signal with the others constant; NaN where signals are collinear.
     """
     once = counts is None
     weight = np.ones((1, len(c))) if counts is None else counts

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.analysis.compare.coordinates import Coordinates, shoulder_coordinates
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.samples import NullSpaceComparison, compare_samples
 from ikns.analysis.compare.subspaces import learned_directions
@@ -15,7 +16,13 @@ from ikns.errors import NotEnoughData
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap
 
-__all__ = ["MapSamples", "compare_map_samples", "learn_again", "visited_points"]
+__all__ = [
+    "MapSamples",
+    "change_coordinates",
+    "compare_map_samples",
+    "learn_again",
+    "visited_points",
+]
 
 Array = NDArray[np.float64]
 
@@ -38,29 +45,11 @@ class MapSamples(NamedTuple):
 def visited_points(
     learned: NullSpaceMap, x: Array, n: int, *, max_hand_speed: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Label samples by the points of a map that have enough of them.
+    """Label samples by the P points of a map that have enough of them.
 
-    Parameters
-    ----------
-    learned : NullSpaceMap
-    x : (N, 3) array
-        Hand positions of the still samples, m.
-    n : int
-        Joints; a point needs 2 n samples.
-    max_hand_speed : float
-        Of the still samples, m/s, for the error.
-
-    Returns
-    -------
-    labels : (N,) integer array
-        Which of the P visited points, from 0; -1 for none.
-    points : (P,) integer array
-        Their numbers in the map, from 0.
-
-    Raises
-    ------
-    NotEnoughData
-        When there is no sample, or no point has enough.
+    `x` (N, 3) are the hand positions of the still samples; a point needs 2 n, for n
+    joints. Returns which of the visited points each belongs to, from 0, -1 for none;
+    and the numbers (P,) of these points in the map, from 0.
     """
     if not len(x):
         raise NotEnoughData(
@@ -109,3 +98,61 @@ def compare_map_samples(
     """Compare at the samples' points, whose numbers in the map are `points`."""
     found = compare_samples(**samples._asdict(), variance=variance, **options)
     return dataclasses.replace(found, points=points)
+
+
+def change_coordinates(
+    samples: MapSamples, name: str, columns: list[int]
+) -> MapSamples:
+    """Write one shoulder, of 3 columns, in other coordinates than internal angles.
+
+    `name` is one of :data:`ikns.analysis.compare.COORDINATES`; a rotation vector starts
+    from the mean posture of all samples. In the result `q` is without jumps of a full
+    turn among the samples of a point; `jacobians` are by the chain rule; `directions`
+    by the rates at each point's mean posture, of unit length but not orthogonal. Ranges
+    are those of the internal angles.
+    """
+    q, labels = samples.q, samples.labels
+    there = shoulder_coordinates(name, q[:, columns].mean(axis=0))
+    Z = np.array(samples.directions)
+    for k in range(len(Z)):
+        B = there.rates(q[labels == k][:, columns].mean(axis=0))
+        Z[k][:, columns] = np.linalg.solve(B, Z[k][:, columns].T).T
+    Z /= np.linalg.norm(Z, axis=2, keepdims=True)
+    J, y = np.array(samples.jacobians), np.array(q)
+    J[:, :, columns] = J[:, :, columns] @ there.rates(q[:, columns])
+    y[:, columns] = _unwrapped(there.from_internal(q[:, columns]), labels)
+    return samples._replace(
+        q=y,
+        jacobians=J,
+        directions=Z,
+        kinematics=[_in_coordinates(there, columns, own) for own in samples.kinematics],
+    )
+
+
+def _in_coordinates(
+    there: Coordinates, columns: list[int], own: Kinematics
+) -> Kinematics:
+    """Kinematics that takes joint vectors in other coordinates."""
+
+    def internal(y: Array) -> Array:
+        q = np.array(y)
+        q[..., columns] = there.to_internal(q[..., columns])
+        return q
+
+    def jacobian(y: Array) -> Array:
+        q = internal(y)
+        J = np.array(own.jacobian(q))
+        J[..., columns] = J[..., columns] @ there.rates(q[..., columns])
+        return J
+
+    return Kinematics(lambda y: own.pose(internal(y)), jacobian)
+
+
+def _unwrapped(y: Array, labels: NDArray[np.int64]) -> Array:
+    """Angles without jumps of a full turn among the samples of a point."""
+    smooth = np.array(y)
+    for k in np.unique(labels):
+        rows = y[labels == k]
+        middle = np.angle(np.exp(1j * rows).mean(axis=0))
+        smooth[labels == k] = middle + np.angle(np.exp(1j * (rows - middle)))
+    return smooth

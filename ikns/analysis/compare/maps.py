@@ -95,10 +95,6 @@ def compare(
     seed : int or numpy.random.Generator
         Source of their randomness.
 
-    Returns
-    -------
-    MapComparison
-
     Raises
     ------
     InvalidInput
@@ -109,9 +105,8 @@ def compare(
     Examples
     --------
     >>> import ikns
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
     >>> motion, body = run.points.truth, run.subject.skeleton
     >>> learned = NullSpaceMap(10).fit(*null_space_samples(motion))
     >>> analytic = ikns.analytic_map(body, motion, learned.centers_)
@@ -187,6 +182,6 @@ def _leak_interval(
     if len(c) < _LEAST or not resamples or not np.isfinite(_slope_norm(x, c)):
         return np.nan, np.nan
     signal = c[:, None]
-    drawn = draw(slope_scores(signal, x), resamples, rng)
-    replicates = slopes(signal, x, drawn.counts)[:, 0]
-    return length_interval(slopes(signal, x)[0], replicates, drawn.blocks, rng=rng)
+    counts, blocks = draw(slope_scores(signal, x), resamples, rng)
+    replicates = slopes(signal, x, counts)[:, 0]
+    return length_interval(slopes(signal, x)[0], replicates, blocks, rng=rng)

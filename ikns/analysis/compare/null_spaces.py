@@ -36,14 +36,9 @@ Array = NDArray[np.float64]
 class NullSpaces(NamedTuple):
     """Null spaces of a point: as recorded, then in B resamples.
 
-    Parameters
-    ----------
-    averaged, at_mean : (1 + B, r, n) array
-        Orthonormal rows: averaged over the samples' postures, and at the mean posture.
-    concentration : float
-        Eigenvalue of the weakest averaged direction, 0 to 1.
-    jacobian : (k, n) array
-        At the mean posture.
+    Orthonormal rows (1 + B, r, n), averaged over the samples' postures and at the mean
+    posture; `concentration` is the eigenvalue of the weakest averaged direction, 0 to
+    1, `jacobian` that at the mean posture.
     """
 
     averaged: Array
@@ -53,14 +48,9 @@ class NullSpaces(NamedTuple):
 
 
 class InsideVariance(NamedTuple):
-    """Joint variance inside null spaces: as recorded, then in B resamples.
+    """Joint variance, rad^2, in total and inside null spaces.
 
-    Parameters
-    ----------
-    total, averaged : (1 + B,) array
-        Of all joints, and inside the averaged null space, rad^2.
-    at_mean : float
-        Inside the null space at the mean posture, as recorded, rad^2.
+    `total` and `averaged` (1 + B,) as recorded, then in B resamples.
     """
 
     total: Array
@@ -127,19 +117,7 @@ def agreement(
 ) -> tuple[float, tuple[float, float]]:
     """Correlation of c along a direction and along its projection on a null space.
 
-    Parameters
-    ----------
-    z : (n,) array
-    null : (r, n) array
-        Orthonormal rows.
-    moments : Moments
-    level : float
-        Confidence of the interval, which is Student's on Fisher's transform.
-
-    Returns
-    -------
-    correlation : float
-    interval : (float, float)
+    Its interval is Student's on Fisher's transform.
     """
     pair = np.stack([z, z @ null.T @ null])
     covariance = pair @ moments.scatter @ pair.T

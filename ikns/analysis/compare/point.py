@@ -1,16 +1,21 @@
-"""The comparison at one PCA point."""
+"""The comparison at one PCA point, and values pooled over all points."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ikns.analysis.compare.chance import chance_inside
 from ikns.analysis.compare.checks import CheckedSamples
-from ikns.analysis.compare.curvature import null_turn, straight_departure
-from ikns.analysis.compare.kinematics import hand_rates
+from ikns.analysis.compare.kinematics import (
+    Kinematics,
+    hand_rates,
+    null_turn,
+    straight_departure,
+)
 from ikns.analysis.compare.leak import HandSlope, hand_slope, hand_turns
 from ikns.analysis.compare.null_spaces import (
     InsideVariance,
@@ -21,57 +26,11 @@ from ikns.analysis.compare.null_spaces import (
 )
 from ikns.analysis.compare.resampling import resampled_moments
 from ikns.analysis.compare.subspaces import Subspaces, angle_interval, share_interval
+from ikns.numerics.bootstrap import length_interval
 
-if TYPE_CHECKING:
-    from ikns.analysis.compare.kinematics import Kinematics
-
-__all__ = ["PointFindings", "PoolParts", "compare_point"]
+__all__ = ["compare_point", "pool"]
 
 Array = NDArray[np.float64]
-
-
-class PoolParts(NamedTuple):
-    """What the values pooled over points are computed from.
-
-    Vectors whose lengths are the findings, with their replicates (B, ...); and the
-    scatter inside the null spaces and in total, as recorded and by resample.
-    """
-
-    angle: tuple[Array, Array]
-    mean_posture_angle: tuple[Array, Array]
-    leak: tuple[Array, Array]
-    turn: tuple[Array, Array]
-    inside: tuple[float, float, float]
-    inside_replicates: tuple[Array, Array]
-    blocks: float
-
-
-class PointFindings(NamedTuple):
-    """One point's entries of :class:`ikns.analysis.compare.NullSpaceComparison`."""
-
-    counts: int
-    null_directions: Array
-    concentration: float
-    angles: Array
-    angle_interval: tuple[float, float]
-    mean_posture_angles: Array
-    mean_posture_interval: tuple[float, float]
-    inside: float
-    inside_interval: tuple[float, float]
-    inside_mean_posture: float
-    inside_chance: Array
-    leak: Array
-    leak_interval: Array
-    turn: Array
-    turn_interval: Array
-    kinematic_leak: Array
-    kinematic_turn: Array
-    curvature: float
-    straight_leak: float
-    straight_turn: float
-    agreement: float
-    agreement_interval: tuple[float, float]
-    parts: PoolParts
 
 
 def compare_point(
@@ -83,8 +42,12 @@ def compare_point(
     level: float,
     variance: float,
     rng: np.random.Generator,
-) -> PointFindings:
-    """Compare at one point, see :func:`ikns.analysis.compare.compare_samples`."""
+) -> dict[str, Any]:
+    """Compare at one point.
+
+    The entries of :class:`ikns.analysis.compare.NullSpaceComparison`, and `parts` that
+    :func:`pool` takes.
+    """
     rows, Z = data.rows[point], data.directions[point]
     lower, upper = data.lower[point], data.upper[point]
     q, J = data.q[rows], data.jacobians[rows]
@@ -107,7 +70,7 @@ def compare_point(
     blocks, null_dim = moments.blocks, data.null_dim
     share = float(inside.averaged[0] / inside.total[0])
     shares = inside.averaged[1:] / inside.total[1:]
-    return PointFindings(
+    return dict(
         counts=len(q),
         null_directions=nulls.averaged[0],
         concentration=nulls.concentration,
@@ -142,20 +105,66 @@ def _pool_parts(
     inside: InsideVariance,
     leak: HandSlope,
     turn: HandSlope,
-) -> PoolParts:
+) -> dict[str, Any]:
+    """Vectors whose lengths are the findings, with their replicates (B, ...).
+
+    And the scatter inside the null spaces and in total, as recorded and by resample.
+    """
     total, within = count * inside.total, count * inside.averaged
-    return PoolParts(
-        angle=(averaged.residual, averaged.replicates),
-        mean_posture_angle=(at_mean.residual, at_mean.replicates),
-        leak=_flat(leak),
-        turn=_flat(turn),
-        inside=(float(within[0]), count * inside.at_mean, float(total[0])),
-        inside_replicates=(within[1:], total[1:]),
-        blocks=min(blocks, turn.blocks or leak.blocks),
-    )
+    return {
+        "angle": (averaged.residual, averaged.replicates),
+        "mean_posture_angle": (at_mean.residual, at_mean.replicates),
+        "leak": _flat(leak),
+        "turn": _flat(turn),
+        "inside": (float(within[0]), count * inside.at_mean, float(total[0])),
+        "inside_replicates": (within[1:], total[1:]),
+        "blocks": min(blocks, turn.blocks or leak.blocks),
+    }
 
 
 def _flat(found: HandSlope) -> tuple[Array, Array]:
     """Slopes of all signals as one vector, (3 d,), with replicates (B, 3 d)."""
     slope = found.slope
     return slope.ravel(), found.replicates.reshape(len(found.replicates), slope.size)
+
+
+def pool(
+    points: Sequence[dict[str, Any]], *, level: float, rng: np.random.Generator
+) -> dict[str, tuple[float, float, float]]:
+    """Root mean squares over points (and signals), and shares of all variance.
+
+    (value, low, high) by name. Points are resampled independently of each other; the
+    length of all their vectors, one after the other, over the root of their number is
+    the root mean square. NaN ends where there is no interval.
+    """
+    parts = [point["parts"] for point in points]
+    blocks = float(np.mean([part["blocks"] for part in parts]))
+    found: dict[str, tuple[float, float, float]] = {}
+    dof = len(points[0]["leak"])
+    for name in ("angle", "mean_posture_angle", "leak", "turn"):
+        root = np.sqrt(len(parts) * (dof if name in ("leak", "turn") else 1))
+        vector = np.concatenate([part[name][0] for part in parts]) / root
+        rows = np.hstack([part[name][1] for part in parts]) / root
+        ends = length_interval(vector, rows, blocks, level=level, rng=rng)
+        values = np.array([np.linalg.norm(vector), *ends])
+        if name.endswith("angle"):
+            values = np.arcsin(np.minimum(values, 1.0))
+        found[name] = (float(values[0]), float(values[1]), float(values[2]))
+    inside, here, total = np.sum([part["inside"] for part in parts], axis=0)
+    within, whole = (
+        np.sum([part["inside_replicates"][i] for part in parts], axis=0) for i in (0, 1)
+    )
+    share = float(inside / total)
+    low, high = share_interval(share, within / whole, blocks, level=level)
+    found["inside"] = (share, low, high)
+    found["inside_mean_posture"] = (float(here / total), np.nan, np.nan)
+    for name in (
+        "kinematic_leak",
+        "kinematic_turn",
+        "curvature",
+        "straight_leak",
+        "straight_turn",
+    ):
+        values = np.array([point[name] for point in points])
+        found[name] = (float(np.sqrt(np.mean(values**2))), np.nan, np.nan)
+    return found

@@ -9,39 +9,17 @@ from numpy.typing import NDArray
 
 from ikns.numerics.bootstrap import block_counts, block_length
 
-__all__ = ["Moments", "Resampled", "draw", "resampled_moments"]
+__all__ = ["Moments", "draw", "resampled_moments"]
 
 Array = NDArray[np.float64]
-
-
-class Resampled(NamedTuple):
-    """Blocks drawn from the samples of a point.
-
-    Parameters
-    ----------
-    counts : (B, N) array
-        How often each sample was drawn.
-    blocks : float
-        Blocks that fit into the samples.
-    """
-
-    counts: Array
-    blocks: float
 
 
 class Moments(NamedTuple):
     """Mean and scatter of joint vectors: as recorded, then in B resamples.
 
-    Parameters
-    ----------
-    counts : (1 + B, N) array
-        How often each sample counts; ones in the first row.
-    mean : (1 + B, n) array
-        rad.
-    scatter : (1 + B, n, n) array
-        Covariance with divisor N, rad^2.
-    blocks : float
-        Blocks that fit into the samples; NaN without resamples.
+    `counts` (1 + B, N) is how often each sample counts, ones in the first row;
+    `scatter` the covariance with divisor N, rad^2; `blocks` how many fit into the
+    samples, NaN without resamples.
     """
 
     counts: Array
@@ -60,16 +38,20 @@ def resampled_moments(
     """
     counts, blocks = np.ones((1, len(q))), np.nan
     if resamples:
-        drawn = draw(_direction_scores(q, directions), resamples, rng)
-        counts, blocks = np.vstack([counts, drawn.counts]), drawn.blocks
+        drawn, blocks = draw(_direction_scores(q, directions), resamples, rng)
+        counts = np.vstack([counts, drawn])
     return Moments(counts, *_covariances(q, counts), blocks)
 
 
-def draw(scores: Array, resamples: int, rng: np.random.Generator) -> Resampled:
-    """Draw blocks as long as these scores (N, m) ask for."""
+def draw(
+    scores: Array, resamples: int, rng: np.random.Generator
+) -> tuple[Array, float]:
+    """Draw blocks as long as these scores (N, m) ask for.
+
+    How often each sample was drawn, (B, N), and how many blocks fit into the samples.
+    """
     n, length = len(scores), block_length(scores)
-    counts = block_counts(n, length, resamples, rng)
-    return Resampled(counts, n / length)
+    return block_counts(n, length, resamples, rng), n / length
 
 
 def _covariances(q: Array, counts: Array) -> tuple[Array, Array]:

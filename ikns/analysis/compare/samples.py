@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.analysis.compare.chance import chance_angles
 from ikns.analysis.compare.checks import checked_samples
 from ikns.analysis.compare.kinematics import Kinematics
-from ikns.analysis.compare.point import PointFindings, compare_point
-from ikns.analysis.compare.pooling import pool
+from ikns.analysis.compare.point import compare_point, pool
 
 __all__ = ["NullSpaceComparison", "compare_samples"]
 
@@ -171,10 +170,6 @@ def compare_samples(
     seed : int or numpy.random.Generator
         Source of randomness.
 
-    Returns
-    -------
-    NullSpaceComparison
-
     Raises
     ------
     InvalidInput
@@ -222,10 +217,11 @@ def compare_samples(
         for k, own in enumerate(every)
     ]
 
-    def column(name: str) -> Any:
-        return np.array([getattr(point, name) for point in points])
-
-    names = [name for name in PointFindings._fields if name != "parts"]
+    entries: dict[str, Any] = {
+        name: np.array([point[name] for point in points])
+        for name in points[0]
+        if name != "parts"
+    }
     return NullSpaceComparison(
         points=np.arange(P),
         null_dim=data.null_dim,
@@ -234,5 +230,5 @@ def compare_samples(
         upper=data.upper,
         chance_angles=chance_angles(d, data.null_dim, n, seed=rng),
         pooled=pool(points, level=level, rng=rng),
-        **{name: column(name) for name in names},
+        **entries,
     )

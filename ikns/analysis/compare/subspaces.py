@@ -25,15 +25,9 @@ Array = NDArray[np.float64]
 class Subspaces(NamedTuple):
     """One null space against the directions.
 
-    Parameters
-    ----------
-    angles : (k,) array
-        Principal angles, rad, increasing.
-    residual : (n,) array
-        Part of the farthest direction outside the null space; its length is the sine
-        of the largest angle.
-    replicates : (B, n) array
-        The same from resamples.
+    `angles` (k,) are principal, rad, increasing. `residual` (n,) is the part of the
+    farthest direction outside the null space, whose length is the sine of the largest
+    angle; `replicates` (B, n) are the same from resamples.
     """
 
     angles: Array
@@ -93,18 +87,9 @@ def span_covariance(S: Array, reference: Array, variance: float = 0.8) -> Array:
 def compare_subspaces(
     directions: Array, null: Array, moved: Array, nulls: Array
 ) -> Subspaces:
-    """Compare directions with a null space, once and for every resample.
+    """Compare directions (d, n) with a null space (r, n), once and for every resample.
 
-    Parameters
-    ----------
-    directions : (d, n) array
-        Orthonormal rows.
-    null : (r, n) array
-        Orthonormal rows.
-    moved : (B, d, n) array
-        Directions of the resamples.
-    nulls : (B, r, n) or (r, n) array
-        Null spaces of the resamples.
+    In those the directions are `moved` (B, d, n), and the null spaces (B, r, n).
     """
     angles = principal_angles(directions, null)
     nulls = np.broadcast_to(nulls, (len(moved), *nulls.shape[-2:]))

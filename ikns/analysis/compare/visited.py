@@ -26,10 +26,8 @@ class VisitedComparison(NamedTuple):
         Still samples near each point of the map.
     points : (V,) integer array
         Points with at least one, from 0.
-    learned, analytic : NullSpaceMap
-        Both maps at these V points.
-    comparison : MapComparison
-        Of the two, one entry for each of the V points.
+    learned, analytic, comparison
+        Both maps at these V points, and :func:`compare` of the two.
     """
 
     counts: NDArray[np.int64]
@@ -53,13 +51,8 @@ def compare_visited(
     ----------
     learned : NullSpaceMap
         Of `chain`, with a radius: fitted, or from a subject's folder.
-    skeleton : Skeleton
-        Owner of the Jacobian.
-    motion : Motion
-    chain : str
-        See :data:`ikns.body.chains.CHAINS`.
-    task : {"pose", "position"}
-        What is held: hand position and orientation, or position alone.
+    skeleton, motion, chain, task
+        As :func:`compare_motion` takes them.
 
     Raises
     ------
@@ -74,11 +67,9 @@ def compare_visited(
     Examples
     --------
     >>> import ikns
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
-    >>> body = run.subject.skeleton
-    >>> motion = run.points.truth
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
+    >>> motion, body = run.points.truth, run.subject.skeleton
     >>> learned = ikns.NullSpaceMap(10).fit(*ikns.null_space_samples(motion))
     >>> found = compare_visited(learned, body, motion)
     >>> found.points.tolist(), bool(found.comparison.angles.max() < np.radians(20))

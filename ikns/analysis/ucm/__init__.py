@@ -7,25 +7,19 @@ Brain Res 126:289). `split` works on plain arrays, `designs` on motions of a ske
 """
 
 from ikns.analysis.ucm.designs import across_trials, within_trial
-from ikns.analysis.ucm.intervals import Interval, confidence_interval, mean_interval
+from ikns.analysis.ucm.intervals import confidence_interval, mean_interval
 from ikns.analysis.ucm.split import VarianceSplit, delta_vz, variance_split
 from ikns.analysis.ucm.split_analysis import (
-    PointsAnalysis,
     SplitAnalysis,
-    TrialsAnalysis,
     analyze_points,
     analyze_trials,
 )
-from ikns.analysis.ucm.surrogates import SurrogateTest, surrogate_test
+from ikns.analysis.ucm.surrogates import surrogate_test
 from ikns.analysis.ucm.tasks import chain_task, numerical_task
 from ikns.analysis.ucm.trials import aligned_angles, movement, normalize_time
 
 __all__ = [
-    "Interval",
-    "PointsAnalysis",
     "SplitAnalysis",
-    "SurrogateTest",
-    "TrialsAnalysis",
     "VarianceSplit",
     "across_trials",
     "aligned_angles",

@@ -61,9 +61,8 @@ def across_trials(
 
     >>> import ikns
     >>> from dataclasses import replace
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
     >>> motion, rng = run.points.truth, np.random.default_rng(0)
     >>> offsets = np.hstack([np.zeros((8, 7)), 0.02 * rng.normal(size=(8, 18))])
     >>> trials = [replace(motion, q=motion.q + offset) for offset in offsets]
@@ -87,7 +86,6 @@ def within_trial(
     *,
     chain: str = "right_arm",
     task: str = "position",
-    min_samples: int | None = None,
 ) -> VarianceSplit:
     """Split the variance over samples of one recording, such as those of a held hand.
 
@@ -102,8 +100,6 @@ def within_trial(
         Which samples, as from :func:`ikns.nullspace.map.still_mask`.
     chain, task
         See :func:`across_trials`.
-    min_samples : int, optional
-        See `min_trials` of :func:`ikns.analysis.ucm.variance_split`.
 
     Returns
     -------
@@ -122,9 +118,8 @@ def within_trial(
     The elbow swivels while the hand's pose is held at the first point:
 
     >>> import ikns
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
     >>> motion, first = run.points.truth, run.points.point == 0
     >>> split = within_trial(run.subject.skeleton, motion, first, task="pose")
     >>> bool(split.v_ucm > 10 * split.v_ort)
@@ -135,7 +130,7 @@ def within_trial(
         raise InvalidInput(
             f"expected which of {len(motion.time)} samples, found {chosen.shape}."
         )
-    return _split(skeleton, motion.angles[chosen], chain, task, min_samples)
+    return _split(skeleton, motion.angles[chosen], chain, task, None)
 
 
 def _split(

@@ -19,15 +19,7 @@ _CONSTANT = 1e-12
 
 
 def check_trials(angles: Array) -> NDArray[np.bool_]:
-    """Which trials (N, ...) have every joint known.
-
-    Raises
-    ------
-    InvalidInput
-        When the array is not (N, ..., n), has fewer than two joints, or is infinite.
-    NotEnoughData
-        When it is empty.
-    """
+    """Which trials (N, ...) have every joint known."""
     if angles.ndim < 2 or angles.shape[-1] < 2:
         raise InvalidInput(
             f"expected joint angles (trials, ..., n) of at least 2 joints, found an "

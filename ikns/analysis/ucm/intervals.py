@@ -20,12 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Interval:
-    """An estimate with its confidence interval.
-
-    Parameters
-    ----------
-    estimate, low, high : (...) array
-    """
+    """An estimate with its confidence interval, (...) array each."""
 
     estimate: Array
     low: Array
@@ -67,10 +62,6 @@ def confidence_interval(
         Of the interval.
     n_resamples, seed : int
         Of the bootstrap.
-
-    Returns
-    -------
-    Interval
 
     Raises
     ------

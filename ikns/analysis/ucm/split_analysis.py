@@ -40,16 +40,9 @@ class SplitAnalysis:
 
 @dataclass(frozen=True, eq=False)
 class TrialsAnalysis:
-    """What :func:`analyze_trials` found.
+    """Movement's duration of each trial, s, and the split over normalized time.
 
-    Parameters
-    ----------
-    durations : (N,) array
-        Of each trial's movement, s.
-    over_time : SplitAnalysis
-        Fields (samples,), at normalized times from 0 to 100 %.
-    overall : Interval
-        Of the mean dVz over the movement.
+    `overall` is the interval of the mean dVz over the movement.
     """
 
     durations: NDArray[np.float64]
@@ -59,14 +52,9 @@ class TrialsAnalysis:
 
 @dataclass(frozen=True, eq=False)
 class PointsAnalysis:
-    """What :func:`analyze_points` found.
+    """Still samples near each PCA point (P,), and the split by number, from 0.
 
-    Parameters
-    ----------
-    counts : (P,) integer array
-        Still samples near each PCA point.
-    points : dict
-        By number of the point, from 0; points with too few samples are left out.
+    Points with too few samples are left out.
     """
 
     counts: NDArray[np.int64]
@@ -89,7 +77,8 @@ def analyze_trials(
     Parameters
     ----------
     skeleton, motions, chain, task, threshold
-        See :func:`ikns.analysis.ucm.across_trials`; threshold in m/s.
+        See :func:`ikns.analysis.ucm.across_trials`, also for an example; threshold in
+        m/s.
     n_surrogates, seed : int
         See :func:`ikns.analysis.ucm.surrogate_test`, which shuffles trials.
     names : sequence of str, optional
@@ -101,22 +90,6 @@ def analyze_trials(
         When there are not as many names as motions.
     NotEnoughData
         When a motion never moves, motions are too few, or a joint is constant.
-
-    Examples
-    --------
-    Eight reaches that are the same but for a constant offset of each joint:
-
-    >>> from dataclasses import replace
-    >>> import ikns
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
-    >>> motion, rng = run.points.truth, np.random.default_rng(0)
-    >>> offsets = np.hstack([np.zeros((8, 7)), 0.02 * rng.normal(size=(8, 18))])
-    >>> trials = [replace(motion, q=motion.q + offset) for offset in offsets]
-    >>> found = analyze_trials(run.subject.skeleton, trials, n_surrogates=9)
-    >>> found.over_time.split.v_ucm.shape
-    (101,)
     """
     called = [f"trial {i + 1}" for i in range(len(motions))] if names is None else names
     if len(called) != len(motions):
@@ -182,9 +155,8 @@ def analyze_points(
     Examples
     --------
     >>> import ikns
-    >>> run = ikns.simulate_protocol(
-    ...     ikns.virtual_subject(1), seed=1, rate=25, quick=True
-    ... )
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
     >>> motion = run.points.truth
     >>> learned = ikns.NullSpaceMap(10).fit(*ikns.null_space_samples(motion))
     >>> found = analyze_points(run.subject.skeleton, motion, learned, n_surrogates=9)

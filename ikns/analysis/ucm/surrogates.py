@@ -46,11 +46,6 @@ class SurrogateTest:
         """Mean dVz of the surrogates, (...)."""
         return np.asarray(self.surrogates.mean(axis=0))
 
-    @property
-    def excess(self) -> Array:
-        """How much the joints' covariation adds to dVz, (...)."""
-        return np.asarray(self.observed - self.mean)
-
     def band(self, level: float = 0.95) -> Array:
         """Central range of the surrogates, (2, ...)."""
         edge = (1 - level) / 2

@@ -148,7 +148,6 @@ def aligned_angles(
     *,
     samples: int = 101,
     threshold: float = 0.05,
-    kind: Literal["linear", "cubic"] = "linear",
 ) -> Array:
     """Joint angles of the body over the normalized time of each motion's movement.
 
@@ -158,7 +157,7 @@ def aligned_angles(
         One a trial.
     chain : str
         Whose hand moves.
-    samples, kind
+    samples : int
         See :func:`normalize_time`.
     threshold : float
         See :func:`movement`, m/s.
@@ -174,7 +173,7 @@ def aligned_angles(
         angles = np.array(motion.angles[cut])
         angles[np.isnan(motion.task_position(chain)[cut, 0])] = np.nan
         time = motion.time[cut]
-        trials.append(normalize_time(angles, time, samples=samples, kind=kind))
+        trials.append(normalize_time(angles, time, samples=samples))
     if not trials:
         raise NotEnoughData("expected at least one motion, found none.")
     return np.stack(trials)

@@ -11,13 +11,13 @@ from ikns.experiments.tracking.profiles import Profile
 from ikns.experiments.tracking.schedule import TrackingStep
 from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrackingTrial
 from ikns.simulation.operator import CONDITIONS, Delay, Operator, Participant, track
-from ikns.simulation.operator.loop import ControlledElement, TrackingOperator
+from ikns.simulation.operator.loop import ControlledElement
 
 __all__ = ["virtual_step", "virtual_trial"]
 
 
 def virtual_trial(
-    operator: TrackingOperator,
+    operator: Operator,
     element: ControlledElement,
     profile: Profile,
     *,
@@ -27,7 +27,7 @@ def virtual_trial(
 
     Parameters
     ----------
-    operator : Operator or DelayedCopy
+    operator : Operator
         New; it sets the rate.
     element : ControlledElement
         What the operator controls, new as well.

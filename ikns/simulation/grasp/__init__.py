@@ -3,7 +3,7 @@
 from ikns.simulation.grasp.carried_arm import CarriedArm
 from ikns.simulation.grasp.parts import Solid, constant, finger_parts
 from ikns.simulation.grasp.person import Habits, Person, draw_habits
-from ikns.simulation.grasp.physics import Grasp, Observation
+from ikns.simulation.grasp.physics import Grasp
 from ikns.simulation.grasp.pick import (
     ElbowInput,
     PickResult,
@@ -23,7 +23,6 @@ __all__ = [
     "PickResult",
     "RingInput",
     "Route",
-    "Observation",
     "Solid",
     "arch_length",
     "constant",

@@ -28,29 +28,9 @@ class CarriedArm:
     """An arm, cameras and a calibrated map, while the hand moves along a route.
 
     :class:`ikns.simulation.operator.ArmLoop` is the same for a hand that is held.
-
-    Parameters
-    ----------
-    participant : Participant
-    route : Route
-        Of the same participant.
-    drift : (n, 6) array
-        Deviation of the hand from the route in each frame, m and rad; it limits the
-        number of frames.
-    rate : float
-        Frames per second.
-    seed : int or numpy.random.Generator
-    latency : float
-        From a posture to the command to the finger, s.
-    settings : ControlSettings, optional
-        Of the controller.
-
-    Attributes
-    ----------
-    frame : int
-        Frames done.
-    c : float
-        Of the last frame, before latency and smoothing; NaN where the map had none.
+    `drift` (n, 6) is the deviation of the hand from the route in each frame, m and rad;
+    `latency` the time from a posture to the command to the finger, s. `c` is that of
+    the last frame, before latency and smoothing; NaN where the map had none.
     """
 
     def __init__(

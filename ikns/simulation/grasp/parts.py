@@ -31,8 +31,6 @@ class Solid:
     mass : float
         kg.
 
-    Examples
-    --------
     >>> Solid("box", (0.05, 0.097, 0.082), 0.37).extent
     (0.097, 0.05, 0.082)
     """
@@ -71,27 +69,9 @@ class Solid:
 class Module:
     """A link of the finger in its own frame, with the joint to the link before.
 
-    Parameters
-    ----------
-    name : str
-    mass : float
-        kg.
-    center : (float, float, float)
-        Center of mass, m.
-    inertia : (float, float, float)
-        About the center of mass, kg m^2.
-    box : (float, float, float)
-        Edges of the collision box, m.
-    box_at : (float, float, float)
-        Middle of the collision box, m.
-    joint : str
-        Empty for the base.
-    origin, axis : (float, float, float)
-        Of the joint, in the frame of the link before.
-    upper : float
-        Largest angle, rad; the smallest is 0.
-    effort : float
-        Largest torque, N m.
+    The joint is in the frame of the link before and turns from 0 to `upper`, rad; its
+    name is empty for the base. The inertia is about the center of mass; `box` and
+    `box_at` are edges and middle of the collision box.
     """
 
     name: str
@@ -111,8 +91,6 @@ class Module:
 def finger_parts() -> tuple[Module, ...]:
     """Read ``urdf/finger.urdf``: the base, then the modules to the tip.
 
-    Examples
-    --------
     >>> parts = finger_parts()
     >>> len(parts), round(sum(part.mass for part in parts), 3)
     (7, 0.186)

@@ -81,21 +81,10 @@ class Person:
 
     opening: wait until the finger looks open, the hand above the object. reaching: the
     hand moves down. closing: until pressing is felt. carrying: the hand moves to the
-    goal. placing: check. releasing: the finger opens.
-
-    Parameters
-    ----------
-    habits : Habits
-    down, across : float
-        Duration of the reaches, s, for a pace of 1.
-
-    Attributes
-    ----------
-    phase : str
-    place : float
-        Position of the hand on its route: -1 above the object, 0 at it, 1 at the goal.
-    command : float
-        Intended command to the finger, 0 to 1.
+    goal. placing: check. releasing: the finger opens. For a pace of 1 the reaches take
+    `down` and `across`, s. `place` is the position of the hand on its route (-1 above
+    the object, 0 at it, 1 at the goal), `command` the intended one to the finger, 0 to
+    1.
     """
 
     def __init__(self, habits: Habits, *, down: float, across: float) -> None:

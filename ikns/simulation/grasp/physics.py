@@ -24,20 +24,10 @@ Array = NDArray[np.float64]
 class Observation(NamedTuple):
     """What can be seen and felt after a frame.
 
-    Parameters
-    ----------
-    flexion : float
-        Flexion of the finger, mean over its joints, 0 to 1.
-    load : float
-        Pull of the tendon, as a share of its full effort.
-    place : (3,) array
-        Middle of the object in the world, m.
-    in_hand : (3,) array
-        The same in the gripper's frame, m.
-    speed : float
-        Speed of the object's middle, m/s.
-    finger, hand, table : float
-        Total normal force of each on the object, N.
+    `flexion` is the mean over the finger's joints, `load` the pull of the tendon as a
+    share of its full effort, `place` the middle of the object in the world and
+    `in_hand` in the gripper's frame, m, `speed` its speed, m/s; `finger`, `hand` and
+    `table` are the total normal force of each on the object, N.
     """
 
     flexion: float
@@ -56,19 +46,8 @@ class Grasp:
     Commands to the finger pass the same guard as for every finger (limits of range,
     rate and acceleration; less force after a long push). Its motor is that of
     :class:`ikns.finger.SimulatedFinger`, and its tendon pulls on all joints equally.
+    `model` is passed to :func:`ikns.simulation.grasp.world.world_model`.
 
-    Parameters
-    ----------
-    solid : Solid
-    rate : float
-        Control frames per second.
-    safety : Safety, optional
-        Limits of the finger.
-    **model
-        Passed to :func:`ikns.simulation.grasp.world.world_model`.
-
-    Examples
-    --------
     >>> grasp = Grasp(Solid("cylinder", (0.075, 0.068), 0.021))
     >>> for _ in range(150):
     ...     seen = grasp.frame(1.0)
@@ -81,7 +60,6 @@ class Grasp:
         solid: Solid,
         *,
         rate: float = 100.0,
-        safety: Safety | None = None,
         **model: Any,
     ) -> None:
         import mujoco
@@ -101,7 +79,7 @@ class Grasp:
         self._product, self._rotate = mujoco.mju_mulQuat, mujoco.mju_rotVecQuat
         self._motor = self._spin = 0.0
         self._dt = constant("timestep")
-        self.guard = Guard(Safety() if safety is None else safety)
+        self.guard = Guard(Safety())
         self.guard.start(0.0, 0.0)
         self._home = self.data.mocap_pos[0].copy()
         self._middle = np.array([0.0, 0.0, self._home[2]])
@@ -126,22 +104,11 @@ class Grasp:
     def frame(
         self, flexion: float, shift: ArrayLike = (0, 0, 0), turn: ArrayLike = (0, 0, 0)
     ) -> Observation:
-        """Advance by one frame.
+        """Advance by one frame with a command to the finger, 0 to 1; NaN: none.
 
-        Parameters
-        ----------
-        flexion : float
-            Command to the finger, 0 to 1; NaN: none.
-        shift : (3,) array
-            Position of the hand at the end of the frame, relative to where it grips the
-            object at the start, m in the world.
-        turn : (3,) array
-            Rotation vector of the hand about the object's middle, rad in the world.
-
-        Raises
-        ------
-        InvalidInput
-            When the physics becomes unstable.
+        At its end the hand is shifted from where it grips the object at the start, m in
+        the world, and turned about the object's middle by a rotation vector, rad in the
+        world.
         """
         data = self.data
         now = self.time

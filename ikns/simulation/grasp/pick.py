@@ -41,17 +41,9 @@ _LOST = 0.06
 class ElbowInput:
     """The finger driven by self-motion: operator, body, cameras, map, controller.
 
-    Parameters
-    ----------
-    operator : Operator
-        New.
-    arm : CarriedArm
-    feedback : {"finger", "signal"}
-        What the operator sees: the finger, which does not show how far c is beyond the
-        contact, so the elbow is then held as well as possible; or the signal on a
-        screen.
-    crosstalk : float
-        Added crosstalk: how far c falls on the way from object to goal.
+    The operator sees the "finger", which does not show how far c is beyond the contact,
+    so the elbow is then held as well as possible; or the "signal" on a screen.
+    `crosstalk` is added: how far c falls on the way from object to goal.
     """
 
     def __init__(
@@ -114,7 +106,6 @@ class PickResult:
 
     Parameters
     ----------
-    outcome : {"success", "dropped", "timeout"}
     why : str
         Reason in words; empty for a success.
     time : float
@@ -152,23 +143,10 @@ def pick(
 ) -> PickResult:
     """Simulate a person who picks and places an object.
 
-    Parameters
-    ----------
-    grasp : Grasp
-        New; it sets the rate.
-    person : Person
-        New.
-    drive : callable
-        From intended command (0 to 1), position of the hand on its route and
-        observation to the command to the finger: an :class:`ElbowInput` or a
-        :class:`RingInput`.
-    way : callable
-        From position on the route to the shift of the hand from where it grips, m in
-        the world, and its turn about the vertical, rad.
-    drift : (n, 6) array
-        Deviation of the hand from the route, m and rad in the world.
-    limit : float
-        Time limit, s.
+    `drive` is an :class:`ElbowInput` or a :class:`RingInput`; `way` goes from position
+    on the route to the shift of the hand from where it grips, m in the world, and its
+    turn about the vertical, rad. `drift` (n, 6) is the deviation of the hand from the
+    route, m and rad in the world; `limit` the time limit, s.
     """
     frames = round(limit * grasp.rate)
     if frames < 1 or len(drift) < frames:

@@ -45,27 +45,14 @@ _ON_COLUMN, _ON_ARCH, _EVEN = 4, 9, np.linspace(0.0, 1.0, 25)
 
 @dataclass(frozen=True)
 class Route:
-    """Postures along a route.
+    """Postures along a route in the thorax frame.
 
     The position `s` on the route is -1 above the object, 0 at it, 1 at the goal.
-
-    Parameters
-    ----------
-    arm : ArmKinematics
-    angles : (18,) array
-        Joint angles of the rest of the body.
-    start, goal : (3,) array
-        Position of the hand at the object and at the goal, thorax frame, m.
-    rotation : (3, 3) array
-        Orientation of the hand at the object.
-    shoulder : (3,) array
-        Joint center, m.
-    swivel : (float, float)
-        Elbow swivels at positions 0 and 1 of the limb, rad.
-    pieces : tuple of (knots, ranges, rows)
-        On the way down and on the arch: (K,) positions with a computed self-motion;
-        (K, 2) swivel ranges there, rad; and (K, U, C) states of the arm at even steps
-        in between, from :func:`ikns.simulation.body_frames.arm_rows`.
+    `rotation` is the orientation of the hand at the object, `shoulder` the joint
+    center, `swivel` the elbow swivels at positions 0 and 1 of the limb, rad. `pieces`
+    are, on the way down and on the arch, (K,) positions with a computed self-motion;
+    (K, 2) swivel ranges there, rad; and (K, U, C) states of the arm at even steps in
+    between, from :func:`ikns.simulation.body_frames.arm_rows`.
     """
 
     arm: ArmKinematics
@@ -105,16 +92,7 @@ class Route:
 def hand_route(participant: Participant, *, height: float = 0.0) -> Route:
     """Find the route of a participant's hand.
 
-    Parameters
-    ----------
-    participant : Participant
-    height : float
-        Of object and goal above the usual, m.
-
-    Raises
-    ------
-    InvalidInput
-        When the hand cannot get there, or the elbow has no room, at all levels.
+    Object and goal are `height` above the usual, m.
     """
     reason: InvalidInput | None = None
     for level in LEVELS:

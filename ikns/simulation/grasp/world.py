@@ -29,6 +29,8 @@ CLEAR = WIDEST - finger_parts()[1].box[1] / 2
 _BACK = 0.06
 #: Impedance of contacts and limits: nearly rigid beyond a depth of 1 mm.
 _SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
+#: Contacts of hand and finger, not with each other: torsional friction, no rolling.
+_GRIP = {"priority": 1, "condim": 4, "contype": 2, "conaffinity": 1}
 
 
 def grip_height(solid: Solid) -> float:
@@ -58,22 +60,10 @@ def world_model(
 ) -> Any:
     """Build the model, with the hand around the object and the finger straight.
 
-    Parameters
-    ----------
-    solid : Solid
-    side : {"right", "left"}
-    friction : float, optional
-        Of hand and finger, instead of the values in ``contact.toml``.
-    effort : float
-        Largest pull of the tendon, as a share of the URDF's torque.
-    gravity : float
-        m/s^2.
-
-    Returns
-    -------
-    mujoco.MjModel
-        Bodies "guide" (its pose is the command), "hand", the links of the finger,
-        "object"; geom "table"; actuator "tendon", with the motor's flexion as control.
+    `friction` replaces that of hand and finger in ``contact.toml``; `effort` is the
+    largest pull of the tendon, as a share of the URDF's torque. The mujoco.MjModel has
+    bodies "guide" (its pose is the command), "hand", the links of the finger, "object";
+    geom "table"; actuator "tendon", with the motor's flexion as control.
     """
     import mujoco
 
@@ -153,10 +143,7 @@ def _finger(spec: Any, hand: Any, *, friction: float, effort: float) -> None:
             size=[edge / 2 for edge in part.box],
             pos=part.box_at,
             friction=_friction(friction),
-            priority=1,
-            condim=4,
-            contype=2,
-            conaffinity=1,
+            **_GRIP,
         )
         if part is base:
             continue
@@ -212,10 +199,7 @@ def _plates(hand: Any, friction: list[float]) -> None:
             pos=at,
             size=half,
             friction=friction,
-            priority=1,
-            condim=4,
-            contype=2,
-            conaffinity=1,
+            **_GRIP,
         )
 
 

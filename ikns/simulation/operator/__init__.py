@@ -13,22 +13,17 @@ from ikns.simulation.operator.cohort import (
     draw_participant,
     tracking_place,
 )
-from ikns.simulation.operator.delayed_copy import DelayedCopy
-from ikns.simulation.operator.loop import Delay, TrackingTrace, track
-from ikns.simulation.operator.model import Operator, closed_loop, open_loop
+from ikns.simulation.operator.loop import Delay, track
+from ikns.simulation.operator.model import Operator
 
 __all__ = [
     "CONDITIONS",
     "Ability",
     "ArmLoop",
     "Delay",
-    "DelayedCopy",
     "Operator",
     "Participant",
-    "TrackingTrace",
-    "closed_loop",
     "draw_participant",
-    "open_loop",
     "phase_margin",
     "sample_abilities",
     "track",

@@ -110,8 +110,6 @@ def parameters(condition: str = "ikns") -> dict[str, dict[str, Any]]:
 def typical(condition: str = "ikns") -> Ability:
     """Return the ability in the middle of the population.
 
-    Examples
-    --------
     >>> typical().delay, typical("gamepad").delay
     (0.2, 0.15)
     """
@@ -124,17 +122,9 @@ def sample_abilities(
     """Draw virtual operators, independently of one another.
 
     A person has the same rank in the population with every device: with one seed, who
-    is slow with the elbow is slow with the stick.
-
-    Parameters
-    ----------
-    n : int
-    seed : int
-        The first k of n are those of k with the same seed.
-    condition : {"ikns", "gamepad"}
-    latency : float
-        Of the system, s: it lowers the phase margin, which is never below
-        :data:`LEAST_MARGIN`.
+    is slow with the elbow is slow with the stick. The first k of n are those of k with
+    the same seed. The latency of the system, s, lowers the phase margin, which is never
+    below :data:`LEAST_MARGIN`.
     """
     table = parameters(condition)
     return [_drawn(table, np.random.default_rng([seed, k]), latency) for k in range(n)]

@@ -33,26 +33,16 @@ class ArmLoop:
 
     Parameters
     ----------
-    arm : ArmKinematics
-        Of the true body.
-    angles : (18,) array
-        Joint angles of the rest of the body.
+    arm, angles
+        Of the true body, and the (18,) joint angles of its rest.
     place : Place
         Where the hand is held, with its self-motion.
     subject : Subject
         The same person as calibrated.
     frames : int
         Largest number of frames.
-    rate : float
-        Frames per second.
-    seed : int or numpy.random.Generator
-    marker_noise : float
-        Camera noise, m, standard deviation per axis.
-    occluded : float
-        Share of marker frames that the cameras miss.
-    skin : SoftTissue, optional
-    unsteadiness : Unsteadiness, optional
-        How steadily the hand is held.
+    marker_noise, occluded, skin, unsteadiness
+        As in :func:`ikns.simulate_protocol`.
     latency : float
         From a posture to its c on the screen, s, rounded to whole frames.
     settings : ControlSettings, optional
@@ -61,15 +51,8 @@ class ArmLoop:
 
     Attributes
     ----------
-    frame : int
-        Frames done.
     solved : ControlFrame or None
         The last one, before latency and smoothing.
-
-    Raises
-    ------
-    InvalidInput
-        When the elbow has no room to swivel at the place.
     """
 
     def __init__(
@@ -143,15 +126,7 @@ class ArmLoop:
         return self._screen.step(c)
 
     def markers(self, limb: float) -> Array:
-        """Return the markers that the cameras record in the next frame, (M, 3) m.
-
-        The markers are those that the calibrated body wears.
-
-        Raises
-        ------
-        InvalidInput
-            After the last frame.
-        """
+        """Return the markers that the cameras record in the next frame, (M, 3) m."""
         return self._frames.markers(self.frame, self._arm_row(limb))
 
     def posture(self, limb: float) -> Array:

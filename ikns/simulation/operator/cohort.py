@@ -12,17 +12,10 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
-from ikns.simulation.arm import ArmKinematics, girdle, self_motion
+from ikns.simulation.arm import ArmKinematics, girdle
 from ikns.simulation.operator.ability import CONDITIONS, Ability, sample_abilities
 from ikns.simulation.operator.arm_loop import ArmLoop
-from ikns.simulation.places import (
-    FOREARM_TURNS,
-    GIRDLE_FOLLOW,
-    LEAST_RANGE,
-    Place,
-    comfortable_posture,
-    wider,
-)
+from ikns.simulation.places import GIRDLE_FOLLOW, Place, widest_place
 from ikns.simulation.protocol import Protocol, simulate_protocol
 from ikns.simulation.subject import virtual_subject
 
@@ -40,10 +33,8 @@ class Participant:
 
     Parameters
     ----------
-    number : int
-        In the cohort, from 0.
-    seed : int
-        Of the cohort.
+    number, seed : int
+        In the cohort, from 0; of the cohort.
     abilities : dict of str to Ability
         By condition; before practice.
     protocol : Protocol
@@ -102,14 +93,11 @@ def draw_participant(
     """Draw a person, simulate the protocol, and calibrate.
 
     Anthropometry is sampled from ANSUR II, ability from ``parameters.toml``. A person
-    who cannot reach the points of the protocol is replaced by another one.
+    who cannot reach the points of the protocol is replaced by another one; the same
+    number and seed of the cohort give the same person.
 
     Parameters
     ----------
-    number : int
-        In the cohort; the same number and seed give the same person.
-    seed : int
-        Of the cohort.
     soft_tissue : float
         Displacement of markers over bones, m, root mean square.
     latency : float
@@ -168,23 +156,9 @@ def tracking_place(
 ) -> tuple[Array, Place]:
     """Find a hand pose to hold, with the habits that the person had in calibration.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        With one exploring arm.
-    position : (3,) array, optional
-        In the thorax frame, m. Default: the middle of the points.
-
-    Returns
-    -------
-    angles : (18,) array
-        Joint angles of the rest of the body.
-    place : Place
-
-    Raises
-    ------
-    InvalidInput
-        When it is out of reach, or the swivel range is too small.
+    At a position in the thorax frame, by default the middle of the points, of a
+    protocol with one exploring arm: joint angles of the rest of the body (18,), and the
+    place.
     """
     arm = ArmKinematics(protocol.subject.skeleton, protocol.side)
     truth, point = protocol.points.truth, protocol.points.point
@@ -198,23 +172,15 @@ def tracking_place(
     ).mean(axis=0)
     swivel = float(protocol.points.swivel[first].mean())
     half = float(np.mean([np.ptp(protocol.points.swivel[row]) for row in rows])) / 2
-    best: Place | None = None
-    for turn in FOREARM_TURNS:
-        posture = comfortable_posture(
-            arm,
-            angles,
-            where,
-            swivel=swivel,
-            wrist=postures[:, 6:].mean(axis=0) + [turn, 0.0, 0.0],
-            girdle_rest=rest,
-        )
-        body = arm.put(angles, posture)
-        motion = self_motion(arm, body, lowest=swivel - half, highest=swivel + half)
-        here = Place(posture, *arm.hand(body), arm.swivel(body), motion)
-        best = wider(best, here)
-    if best is None or best.swivel_range < LEAST_RANGE:
-        raise InvalidInput(
-            f"the elbow has no room to swivel with the {arm.side} hand at "
-            f"{np.round(where, 3)} m in the thorax frame; choose another place."
-        )
-    return angles, best
+    place = widest_place(
+        arm,
+        angles,
+        where,
+        swivel=swivel,
+        wrist=postures[:, 6:].mean(axis=0),
+        girdle_rest=rest,
+        lowest=swivel - half,
+        highest=swivel + half,
+        remedy="choose another place",
+    )
+    return angles, place

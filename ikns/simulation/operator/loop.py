@@ -11,33 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
+from ikns.simulation.operator.model import Operator
 
-__all__ = ["ControlledElement", "Delay", "TrackingOperator", "TrackingTrace", "track"]
+__all__ = ["ControlledElement", "Delay", "TrackingTrace", "track"]
 
 Array = NDArray[np.float64]
-
-
-class TrackingOperator(Protocol):
-    """An operator: it sees the curve ahead and the pointer, and moves a limb."""
-
-    @property
-    def rate(self) -> float:
-        """Samples per second."""
-        ...
-
-    @property
-    def preview(self) -> float:
-        """How far ahead it sees the curve, s."""
-        ...
-
-    @property
-    def limb(self) -> float:
-        """Position of the limb, 0 to 1."""
-        ...
-
-    def step(self, ahead: float, seen: float) -> float:
-        """Take what is seen now; return the limb's position at the next sample."""
-        ...
 
 
 class ControlledElement(Protocol):
@@ -49,15 +27,7 @@ class ControlledElement(Protocol):
 
 
 class Delay:
-    """A device that returns the limb's position after a delay: a simulated stick.
-
-    Parameters
-    ----------
-    seconds : float
-        Rounded to whole samples.
-    rate : float
-        Samples per second.
-    """
+    """A device that returns the limb's position after a delay: a simulated stick."""
 
     def __init__(self, seconds: float, *, rate: float) -> None:
         if not 0 <= seconds < math.inf:
@@ -71,15 +41,7 @@ class Delay:
 
 
 class TrackingTrace(NamedTuple):
-    """Signals of simulated tracking.
-
-    Parameters
-    ----------
-    time : (T,) array
-        s.
-    target, limb, c : (T,) array
-        0 to 1; c as seen, not clipped.
-    """
+    """Signals of simulated tracking (T,): s, and 0 to 1; c as seen, not clipped."""
 
     time: Array
     target: Array
@@ -88,7 +50,7 @@ class TrackingTrace(NamedTuple):
 
 
 def track(
-    operator: TrackingOperator,
+    operator: Operator,
     target: Callable[[ArrayLike], Array],
     element: ControlledElement,
     *,
@@ -97,21 +59,10 @@ def track(
 ) -> TrackingTrace:
     """Simulate an operator that follows a curve in a closed loop.
 
-    Parameters
-    ----------
-    operator : Operator or DelayedCopy
-        New; it sets the rate.
-    target : callable
-        Curve of 0 to 1 as a function of times (s), also ahead of the current time.
-    element : ControlledElement
-        A :class:`Delay`, or an :class:`ikns.simulation.operator.ArmLoop` for the whole
-        chain of body, cameras and map.
-    start, end : float
-        s.
-
-    Returns
-    -------
-    TrackingTrace
+    The new operator sets the rate. `target` is a curve of 0 to 1 as a function of times
+    (s), also ahead of the current time; `element` a :class:`Delay`, or an
+    :class:`ikns.simulation.operator.ArmLoop` for the whole chain of body, cameras and
+    map.
     """
     n = round((end - start) * operator.rate) + 1
     if n < 2:

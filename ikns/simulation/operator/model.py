@@ -18,13 +18,13 @@ import math
 from collections import deque
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from ikns.errors import InvalidInput
 from ikns.simulation.operator.ability import Ability
 
-__all__ = ["Operator", "closed_loop", "discrete_step", "open_loop"]
+__all__ = ["Operator", "discrete_step"]
 
 Array = NDArray[np.float64]
 
@@ -40,21 +40,9 @@ _BLOCK = 256
 class Operator:
     """A virtual operator in a trial.
 
-    Parameters
-    ----------
-    ability : Ability
-        After :meth:`Ability.practised`, if that is wanted.
-    rate : float
-        Samples per second.
-    seed : int or numpy.random.Generator
-        Of the noise.
-    start : float
-        Initial position of the limb.
-    limits : (float, float)
-        Lowest and highest position of the limb.
+    The ability is that after :meth:`Ability.practised`, if that is wanted; `limits` are
+    the lowest and highest position of the limb.
 
-    Examples
-    --------
     >>> from ikns.simulation.operator.ability import typical
     >>> operator = Operator(typical().noiseless(), rate=100, seed=0, start=0.2)
     >>> limb = 0.2
@@ -107,19 +95,10 @@ class Operator:
         return float(min(max(self._x[1], self._limits[0]), self._limits[1]))
 
     def step(self, ahead: float, seen: float) -> float:
-        """Advance by one sample.
+        """Advance by one sample; return the limb's position at the next one.
 
-        Parameters
-        ----------
-        ahead : float
-            The target ``preview`` s from now, 0 to 1.
-        seen : float
-            Position of the pointer now; NaN: it has not moved.
-
-        Returns
-        -------
-        float
-            Position of the limb at the next sample, within the limits.
+        `ahead` is the target ``preview`` s from now, 0 to 1, `seen` the position of the
+        pointer now; NaN: it has not moved.
         """
         if math.isfinite(seen):
             self._pointer = seen
@@ -144,11 +123,7 @@ class Operator:
 def discrete_step(ability: Ability, rate: float) -> tuple[Array, Array, Array]:
     """Exact step of command, limb and its speed for a first-order hold of the error.
 
-    Returns
-    -------
-    A : (3, 3) array
-    B0, B1 : (3,) array
-        Of the error at the beginning and at the end of the sample.
+    A (3, 3), and B (3,) of the error at the beginning and at the end of the sample.
     """
     w, z = ability.limb_frequency, ability.limb_damping
     M = np.zeros((5, 5))
@@ -158,44 +133,3 @@ def discrete_step(ability: Ability, rate: float) -> tuple[Array, Array, Array]:
     M[3, 4] = rate  # slope of the error over one sample, for a unit change
     E = expm(M / rate)
     return E[:3, :3], E[:3, 3] - E[:3, 4], E[:3, 4]
-
-
-def open_loop(
-    ability: Ability, omega: ArrayLike, *, latency: float = 0.0
-) -> NDArray[np.complex128]:
-    """Transfer function of person and device, from error to pointer.
-
-    Parameters
-    ----------
-    ability : Ability
-    omega : array
-        rad/s, above 0.
-    latency : float
-        Of the device, s.
-    """
-    s = 1j * np.asarray(omega, dtype=np.float64)
-    w, z = ability.limb_frequency, ability.limb_damping
-    limb = w**2 / (s**2 + 2 * z * w * s + w**2)
-    return np.asarray(
-        ability.crossover / s * limb * np.exp(-(ability.delay + latency) * s)
-    )
-
-
-def closed_loop(
-    ability: Ability, omega: ArrayLike, *, latency: float = 0.0
-) -> NDArray[np.complex128]:
-    """Transfer function from target to pointer, without noise.
-
-    ``L exp(preview s) / (1 + L)`` with the open loop ``L``.
-
-    Parameters
-    ----------
-    ability : Ability
-    omega : array
-        rad/s, above 0.
-    latency : float
-        Of the device, s.
-    """
-    L = open_loop(ability, omega, latency=latency)
-    look = np.exp(1j * ability.preview * np.asarray(omega))
-    return np.asarray(L * look / (1 + L))

@@ -1,13 +1,9 @@
 """A reference without a human model: it copies the target after a known delay."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 
 from ikns.errors import InvalidInput
-
-__all__ = ["DelayedCopy"]
 
 
 class DelayedCopy:
@@ -27,8 +23,6 @@ class DelayedCopy:
     start : float
         Position of the limb until the delay has passed.
 
-    Examples
-    --------
     >>> copy = DelayedCopy(0.02, rate=100)
     >>> [copy.step(x, 0.0) for x in (0.1, 0.2, 0.3, 0.4)]
     [0.5, 0.5, 0.1, 0.2]
