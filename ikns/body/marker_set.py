@@ -27,33 +27,17 @@ _FORMAT = 1
 class Marker:
     """One marker.
 
-    Parameters
-    ----------
-    label : str
-        Its name.
-    link : str
-        The URDF link that carries it.
-    position : (3,) tuple
-        Nominal position in the link's frame, meters.
-    placement_sd : (3,) tuple
-        Standard deviation of its placement along each axis, meters: small on a bony
-        landmark, large for a technical marker. One number in the file is used for all
-        three.
-    static_only : bool
-        Used in the static trial only.
-    aliases : tuple of str
-        Other labels of the same marker.
-    weight : float
-        Weight in inverse kinematics relative to the others: less where soft tissue
-        moves under it.
+    The deviation of its placement along each axis is small on a bony landmark, large
+    for a technical marker; one number in the file is used for all three. Its weight in
+    inverse kinematics relative to the others is less where soft tissue moves under it.
     """
 
     label: str
-    link: str
-    position: tuple[float, float, float]
-    placement_sd: tuple[float, float, float]
-    static_only: bool = False
-    aliases: tuple[str, ...] = ()
+    link: str  # the URDF link that carries it
+    position: tuple[float, float, float]  # nominal, in the link's frame, m
+    placement_sd: tuple[float, float, float]  # standard deviation, m
+    static_only: bool = False  # used in the static trial only
+    aliases: tuple[str, ...] = ()  # other labels of the same marker
     weight: float = 1.0
 
 

@@ -110,13 +110,9 @@ def relative_sizes(urdf: str, reference: str) -> dict[str, float]:
 def link_inertials(urdf: str, parts: Mapping[str, Segment]) -> dict[str, Inertial]:
     """Inertial properties of each segment's link, by link name.
 
-    Parameters
-    ----------
-    urdf : str
-        Gives the direction of each segment in its link.
-    parts : mapping
-        As from :func:`ikns.body.anthropometry.segments`: principal moments about the
-        front-back axis, the long axis, and the axis across both, palms forward.
+    The URDF gives the direction of each segment in its link. Parts are as from
+    :func:`ikns.body.anthropometry.segments`: principal moments about the front-back
+    axis, the long axis, and the axis across both, palms forward.
     """
     trunk = parts["trunk_head"]
     inertials = {
@@ -148,23 +144,11 @@ def resize_urdf(
     *,
     inertials: Mapping[str, Inertial] | None = None,
 ) -> str:
-    """Return the URDF with segments resized.
+    """Return the URDF with segments resized by factors, by link name.
 
-    Parameters
-    ----------
-    urdf : str
-        URDF text.
-    factors : mapping
-        Size factor per segment (a link name); a segment without one keeps its size.
-        Lengths scale with the factor, mass with its cube and inertia with its fifth
-        power (same shape, same density), unless `inertials` says otherwise.
-    inertials : mapping, optional
-        New inertial properties by link name.
-
-    Raises
-    ------
-    InvalidInput
-        When a factor is not positive or a segment does not exist.
+    A segment without a factor keeps its size. Lengths scale with the factor, mass with
+    its cube and inertia with its fifth power (same shape, same density), unless
+    `inertials` gives new ones by link name.
     """
     robot = ET.fromstring(
         urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))

@@ -22,16 +22,9 @@ def elbow_reference(
 ) -> Array | None:
     """Gradient of the height of the elbow in the thorax frame, which c increases with.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    q : (25,) or (18,) array
-        Posture, rad.
-    chain : str
-        For two arms the heights of both elbows are summed.
-    n_dof : int
-        With several degrees of freedom each elbow has its own row, followed by forearm
-        pronation, wrist flexion and wrist deviation of each side.
+    At a posture `q` (25,) or (18,), rad. For two arms the heights of both elbows are
+    summed; with several degrees of freedom each elbow has its own row, followed by
+    forearm pronation, wrist flexion and wrist deviation of each side.
 
     Returns
     -------

@@ -17,14 +17,8 @@ def is_simulated(
     """Whether the subject or one of the recordings is known to be simulated.
 
     The calibration's report may say so, the ``summary.json`` of ``ikns demo`` next to
-    the subject's folder, or the ``truth.json`` next to a simulated recording.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        Folder that the subject was read from.
-    recordings : sequence of Path
+    the folder that the subject was read from, or the ``truth.json`` next to a simulated
+    recording.
     """
     places = [folder.absolute().parent / "summary.json"]
     places += [path.absolute().parent / "truth.json" for path in recordings]

@@ -70,39 +70,20 @@ _MAX_STEPS = 100
 
 
 class SizeFit(NamedTuple):
-    """The fitted body.
+    """The fitted body."""
 
-    Parameters
-    ----------
-    log_sizes : (S,) array
-        Log of each segment's size factor, in the order of
-        :data:`ikns.body.model_file.SEGMENTS`.
-    positions : (M, 3) array
-        Markers in their link's frame, m.
-    q : (25,) array
-        Pose in the static trial.
-    covariance : (S, S) array
-        Of the log sizes.
-    converged : bool
-        Whether the fit met its tolerance.
-    """
-
-    log_sizes: Array
-    positions: Array
-    q: Array
-    covariance: Array
-    converged: bool
+    log_sizes: Array  # (S,) of each segment's factor, in the order of `SEGMENTS`
+    positions: Array  # (M, 3) markers in their link's frame, m
+    q: Array  # (25,) pose in the static trial
+    covariance: Array  # (S, S) of the log sizes
+    converged: bool  # whether the fit met its tolerance
 
 
 def fit_sizes(generic: Skeleton, target: Array) -> SizeFit:
     """Gauss-Newton with step halving over sizes, marker places and pose.
 
-    Parameters
-    ----------
-    generic : Skeleton
-        The generic body with the markers at their nominal places.
-    target : (M, 3) array
-        Mean marker positions in the world, m; NaN where never seen.
+    The generic body has the markers at their nominal places; the target is their mean
+    positions in the world (M, 3), m; NaN where never seen.
     """
     worn = generic.marker_set
     seen = seen_markers(target)

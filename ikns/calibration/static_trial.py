@@ -33,17 +33,9 @@ def static_posture(
 ) -> tuple[Skeleton, Array, float]:
     """Average a static trial, and put the marker set on the generic body.
 
-    Arguments as :func:`ikns.scale` takes them.
-
-    Returns
-    -------
-    reference : Skeleton
-        The generic body with the set at its nominal places; joints of an arm without
-        any marker are held.
-    target : (M, 3) array
-        Mean marker positions, m; NaN where never seen.
-    duration : float
-        Of the trial, s.
+    Arguments as :func:`ikns.scale` takes them. Returns the generic body with the set at
+    its nominal places, where joints of an arm without any marker are held; mean marker
+    positions (M, 3) m, NaN where never seen; and the duration of the trial, s.
     """
     worn = (
         marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)

@@ -15,43 +15,20 @@ __all__ = ["SwivelSamples", "swivel_samples"]
 
 
 class SwivelSamples(NamedTuple):
-    """The still samples that a map was learned from, with the true swivel.
+    """The still samples that a map was learned from, with the true swivel."""
 
-    Parameters
-    ----------
-    hand : (N, 3) array
-        m in the thorax frame.
-    labels : (N,) integer array
-        PCA point, -1 for none.
-    c : (N,) array
-        Control signal, not clipped.
-    swivel : (N,) array
-        True elbow swivel, rad.
-    correlations : list of P float
-        Correlation of c and swivel at each point.
-    """
-
-    hand: NDArray[np.float64]
-    labels: NDArray[np.int64]
-    c: NDArray[np.float64]
-    swivel: NDArray[np.float64]
-    correlations: list[float]
+    hand: NDArray[np.float64]  # (N, 3) m in the thorax frame
+    labels: NDArray[np.int64]  # (N,) PCA point, -1 for none
+    c: NDArray[np.float64]  # (N,) control signal, not clipped
+    swivel: NDArray[np.float64]  # (N,) true elbow swivel, rad
+    correlations: list[float]  # of c and swivel at each of P points
 
 
 def swivel_samples(subject: Subject, swivel: ArrayLike) -> SwivelSamples:
     """Compare c with the true swivel on the still samples of a calibration.
 
-    Parameters
-    ----------
-    subject : Subject
-        Just calibrated from one exploration, with one degree of freedom.
-    swivel : (T,) array
-        True swivel in every frame of that exploration, rad; NaN where it has none.
-
-    Raises
-    ------
-    InvalidInput
-        When the subject has not one exploration of T frames.
+    The subject was just calibrated from one exploration of T frames, with one degree of
+    freedom; the true swivel (T,) of each is in rad, NaN where it has none.
     """
     true = np.asarray(swivel, dtype=np.float64)
     if len(subject.motions) != 1 or true.shape != subject.motions[0].time.shape:

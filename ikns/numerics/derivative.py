@@ -25,21 +25,9 @@ def slope(
 ) -> NDArray[np.float64]:
     """Time derivative by a moving parabola (Savitzky and Golay 1964).
 
-    Parameters
-    ----------
-    values : (T, ...) array
-        Any quantity.
-    time : (T,) array
-        Seconds, evenly spaced.
-    known : (T, ...) boolean array, optional
-        Which values count, of the shape of `values`. Default: all.
-
-    Returns
-    -------
-    (T, ...) array
-        Slope of the parabola fitted over ``WINDOW`` around each sample, to the known
-        values there. NaN where the value is unknown, where too few others are known,
-        and for a single sample.
+    Of values (T, ...) at evenly spaced times (T,), s. The parabola is fitted over
+    ``WINDOW`` around each sample, to the known values there; by default all are. NaN
+    where the value is unknown, where too few others are known, and for a single sample.
 
     Examples
     --------

@@ -6,6 +6,9 @@ rows are scaled (``J n = 0`` row by row), but singular values do, and with them 
 decision which of them are zero. The default ``rtol`` of 1e-9 is far below the ratios
 due to a change of unit or an almost straight arm (1e-3 each) and far above rounding
 (1e-16), so the decision is the same in meters and in millimeters.
+
+Arrays of the wrong shape, and rows that are not finite where no NaN is promised, raise
+InvalidInput.
 """
 
 from __future__ import annotations
@@ -49,11 +52,6 @@ def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64
     (n - rank, n) array
         Orthonormal rows with ``jacobian @ row == 0``.
 
-    Raises
-    ------
-    InvalidInput
-        When the Jacobian is not a matrix of finite numbers.
-
     Examples
     --------
     >>> null_space([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]).round(6) ** 2
@@ -91,11 +89,6 @@ def null_spaces(
     rank : (...) integer array
         Rank of each Jacobian; -1 where it is not finite.
 
-    Raises
-    ------
-    InvalidInput
-        When the array has fewer than two axes.
-
     Examples
     --------
     >>> elbow_bent, straight = [[1.0, 0, 0], [0, 2.0, 0]], [[1.0, 0, 0], [2.0, 0, 0]]
@@ -120,25 +113,10 @@ def null_spaces(
 
 
 def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
-    """Orthogonal projectors onto null spaces, of any rank.
+    """Orthogonal projectors (..., n, n) onto null spaces, of any rank.
 
-    Parameters
-    ----------
-    jacobian : (..., k, n) array
-        Task rates per joint rate, one Jacobian a posture.
-    rtol : float
-        Singular values up to ``rtol * largest`` (of the same posture) count as zero.
-
-    Returns
-    -------
-    (..., n, n) array
-        ``P`` with ``P @ P == P``, ``jacobian @ P == 0`` and trace ``n - rank``; NaN for
-        postures whose Jacobian is not finite.
-
-    Raises
-    ------
-    InvalidInput
-        When the array has fewer than two axes.
+    ``P`` with ``P @ P == P``, ``jacobian @ P == 0`` and trace ``n - rank``; NaN for
+    postures whose Jacobian is not finite. Arguments as in :func:`null_spaces`.
     """
     basis, rank = null_spaces(jacobian, rtol=rtol)
     projector = np.swapaxes(basis, -2, -1) @ basis
@@ -149,26 +127,9 @@ def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.flo
 def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
     """Principal angles between two subspaces, accurate from tiny to right angles.
 
-    Cosines are the singular values of ``Qa' Qb``, sines those of ``Qb - Qa Qa' Qb``
-    (Bjorck and Golub 1973). Each is exact to rounding in absolute terms, and so is
-    ``atan2(sine, cosine)`` from 0 to pi/2.
-
-    Parameters
-    ----------
-    A : (..., p, n) array
-        Rows spanning the first subspace; need not be orthonormal.
-    B : (..., r, n) array
-        Rows spanning the second.
-
-    Returns
-    -------
-    (..., min(p, r)) array
-        Radians in [0, pi/2], increasing.
-
-    Raises
-    ------
-    InvalidInput
-        When the spaces have different dimension, or rows are not finite or dependent.
+    The method is that of :mod:`ikns._kernels.principal_angles`. Rows of A (..., p, n)
+    and B (..., r, n) span the subspaces; they need not be orthonormal. The min(p, r)
+    angles increase, radians in [0, pi/2].
 
     Examples
     --------
@@ -192,20 +153,11 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
 def mean_null_direction(
     jacobians: ArrayLike, d: int = 1, *, rtol: float = 1e-9
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Null space averaged over visited postures.
+    """Null space averaged over visited postures with finite Jacobians (N, k, n).
 
     The mean of the null-space projectors has eigenvalues between 0 and 1: an
     eigenvector with eigenvalue 1 lies in the null space of every posture. (For lines
     this is the Bingham mean direction, blind to the sign of each.)
-
-    Parameters
-    ----------
-    jacobians : (N, k, n) array
-        One Jacobian per visited posture; those that are not finite are ignored.
-    d : int
-        How many directions.
-    rtol : float
-        Singular values up to ``rtol * largest`` count as zero.
 
     Returns
     -------
@@ -214,13 +166,6 @@ def mean_null_direction(
     concentration : (n,) array
         All eigenvalues, decreasing; the first `d` belong to the directions. Where
         entry ``d`` is close to entry ``d - 1`` the directions are not unique.
-
-    Raises
-    ------
-    InvalidInput
-        When the array is not (N, k, n) or `d` is not between 1 and n.
-    NotEnoughData
-        When no Jacobian is finite.
     """
     J = np.asarray(jacobians, dtype=np.float64)
     if J.ndim != 3:
@@ -241,14 +186,7 @@ def mean_null_direction(
 def principal_components(
     rows: NDArray[np.float64], *, centered: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Principal components of vectors.
-
-    Parameters
-    ----------
-    rows : (N, n) array
-        Vectors.
-    centered : bool
-        About their mean, or about zero.
+    """Principal components of vectors (N, n), about their mean or about zero.
 
     Returns
     -------

@@ -50,18 +50,7 @@ def arm_points(skeleton: Skeleton, q: ArrayLike) -> Array:
 
 
 def body_surfaces(arms: ArrayLike) -> list[Array]:
-    """Surfaces of trunk, neck, head and arms.
-
-    Parameters
-    ----------
-    arms : (2, 4, 3) array
-        As :func:`arm_points` gives them.
-
-    Returns
-    -------
-    list of (u, v, 3) array
-        Grids of points to be drawn as surfaces.
-    """
+    """Surfaces of trunk, neck, head and :func:`arm_points`, as (u, v, 3) grids."""
     points = np.asarray(arms, dtype=np.float64)
     if points.shape != (2, 4, 3):
         raise InvalidInput(f"expected arms (2, 4, 3), found {points.shape}.")

@@ -27,19 +27,8 @@ def comparison_figure(
 ) -> Figure:
     """Draw angles, variance, leak and crosstalk, with intervals and chance levels.
 
-    Parameters
-    ----------
-    found : mapping of name to NullSpaceComparison
-        Of one map, at most four, such as one for each task of the hand.
-    simulated : bool
-        Whether the data come from a virtual subject; the title says so.
-    crosstalk : Crosstalk, optional
-        On natural reaches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Four panels; points of the map are numbered from 1.
+    At most four comparisons by name, of one map, such as one for each task of the hand;
+    the crosstalk is that of natural reaches. Points of the map are numbered from 1.
     """
     if not 1 <= len(found) <= len(MARKS):
         raise InvalidInput(

@@ -65,12 +65,7 @@ _NEXT_STEPS = (
 def write_demo_report(path: Path, demo: Demo, summary: Mapping[str, Any]) -> None:
     """Write ``report.html``, and next to it ``workspace.png`` for slides.
 
-    Parameters
-    ----------
-    path : Path
-    demo : Demo
-    summary : mapping
-        From :func:`ikns.experiments.demo.demo_summary`.
+    The summary is from :func:`ikns.experiments.demo.demo_summary`.
     """
     figures = _figures(demo, summary)
     with figure_style():

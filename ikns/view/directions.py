@@ -45,14 +45,8 @@ def directions_figure(
     joint_names : sequence of n str
         In chain order; drawn from top to bottom.
     simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     analytic : array like `directions`, optional
         The Jacobian's directions, drawn as wide pale bars behind.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One panel per point and direction.
     """
     learned = _stacked(directions, len(joint_names))
     behind = None if analytic is None else _stacked(analytic, len(joint_names))
@@ -119,13 +113,8 @@ def principal_angle_figure(
         Principal angle per point, radians, for each analytic null space compared with;
         NaN where a point has no direction.
     simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     goal : float, optional
         Angle that should not be exceeded, radians; drawn as a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     series = {name: np.asarray(given, dtype=float) for name, given in angles.items()}
     sizes = {values.shape for values in series.values()}

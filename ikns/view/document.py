@@ -11,14 +11,8 @@ __all__ = ["html_document"]
 def html_document(title: str, style: str, body: Iterable[str]) -> str:
     """Return a document; the browser itself refuses whatever it would load.
 
-    Parameters
-    ----------
-    title : str
-        Plain text.
-    style : str
-        CSS.
-    body : iterable of str
-        HTML, one element or more each; empty ones are left out.
+    Title is plain text, style CSS; body are HTML elements, of which empty ones are left
+    out.
     """
     parts = [
         "<!DOCTYPE html>",

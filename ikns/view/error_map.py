@@ -19,21 +19,11 @@ _MARGIN = 0.03  # m around the PCA points
 
 
 class Slices(NamedTuple):
-    """Grids of places in horizontal slices through PCA points; m, thorax frame.
+    """Grids of places in horizontal slices through PCA points; m, thorax frame."""
 
-    Parameters
-    ----------
-    height : (S,) array
-        Y of each slice.
-    forward : (A,) array
-        X of the rows.
-    right : (B,) array
-        Z of the columns.
-    """
-
-    height: Array
-    forward: Array
-    right: Array
+    height: Array  # (S,) Y of each slice
+    forward: Array  # (A,) X of the rows
+    right: Array  # (B,) Z of the columns
 
     @property
     def places(self) -> Array:
@@ -45,21 +35,9 @@ class Slices(NamedTuple):
 def workspace_slices(
     centers: ArrayLike, *, n: int = 3, spacing: float = 0.01
 ) -> Slices:
-    """Return slices that cover PCA points, evenly spaced from lowest to highest.
+    """Return `n` slices that cover PCA points (P, 3) m, evenly spaced in height.
 
-    Parameters
-    ----------
-    centers : (P, 3) array
-        PCA points, m in the thorax frame.
-    n : int
-        How many slices.
-    spacing : float
-        Of the grid within a slice, m.
-
-    Raises
-    ------
-    InvalidInput
-        When the points are not (P, 3) and finite, or a number is not positive.
+    The grid within a slice has the given spacing, m.
 
     Examples
     --------
@@ -105,19 +83,9 @@ def error_map_figure(
     label : str
         Of the color bar: the error, with its unit in parentheses.
     simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     title : str
     highest : float, optional
         End of the color scale, also for larger errors. Default: the largest.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    InvalidInput
-        When shapes disagree.
     """
     wrong, points = np.asarray(errors, dtype=np.float64), _points(centers)
     expected = tuple(len(axis) for axis in slices)

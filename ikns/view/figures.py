@@ -1,7 +1,8 @@
 """Every figure of the package: plain SI arrays in, a matplotlib Figure out.
 
-No figure uses pyplot or needs a screen. Each takes ``simulated`` and says in its title
-when the data come from a virtual subject.
+No figure uses pyplot or needs a screen. Each takes ``simulated``, whether the data come
+from a virtual subject, and says so in its title. Arrays of the wrong shape raise
+InvalidInput.
 """
 
 from ikns.view.body import arm_points

@@ -36,15 +36,10 @@ def residual_figure(
     residual : (T,) array
         Root mean square over the markers of a frame, m; NaN breaks the line.
     simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     marker_rms : (M,) array, optional
         Root mean square over time of each marker, m; NaN where never seen.
     marker_labels, segments : sequences of M str
         Each marker's name and the segment that carries it.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     t, distance = series(time, "time"), series(residual, "residual")
     same_length(time=t, residual=distance)

@@ -41,11 +41,6 @@ def swivel_figure(
     correlations : (P,) array
         Correlation r of the two at each point, for the titles.
     simulated : bool
-        Whether the data come from a virtual subject; the title says so.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     angle, signal = series(swivel, "swivel"), series(control_signal, "control_signal")
     point = np.asarray(labels)
@@ -108,13 +103,8 @@ def control_figure(
     inside : (T,) boolean array
         Whether the hand was inside the interpolation volume.
     simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     gate : float, optional
         Hand speed below which samples were learned from, m/s; drawn as a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     t, speed = series(time, "time"), series(hand_speed, "hand_speed")
     signal = np.asarray(control_signal, dtype=np.float64)

@@ -91,17 +91,7 @@ def figure_style() -> Iterator[None]:
 def new_figure(
     title: str, *, simulated: bool, height: float, width: float = PAGE_WIDTH
 ) -> Figure:
-    """Return an empty figure that says in its title whether the data are simulated.
-
-    Parameters
-    ----------
-    title : str
-        What the figure shows.
-    simulated : bool
-        Whether any of the data come from a virtual subject.
-    height, width : float
-        Inches.
-    """
+    """Return an empty figure (inches); its title says whether data are simulated."""
     # Inches around each panel.
     layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06)
     figure = Figure(figsize=(width, height), layout=layout)
@@ -126,8 +116,6 @@ def joint_labels(joint_names: Sequence[str]) -> list[str]:
 
     >>> joint_labels(["right_elbow_flexion", "right_wrist_flexion"])
     ['elbow flexion', 'wrist flexion']
-    >>> joint_labels(["right_elbow_flexion", "left_elbow_flexion"])
-    ['right elbow flexion', 'left elbow flexion']
     """
     words = [name.replace("_", " ") for name in joint_names]
     for side in ("right ", "left "):

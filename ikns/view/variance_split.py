@@ -42,19 +42,12 @@ def variance_split_figure(
     delta_vz : (T,) array
         Log-transformed index.
     simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     over : {"time", "points"}
         What `at` counts: time is drawn as lines, points as marks.
-    interval : (2, T) array, optional
-        Confidence interval of dVz, low and high.
-    surrogates : (2, T) array, optional
-        Range of dVz of surrogates, low and high, drawn as a band.
+    interval, surrogates : (2, T) array, optional
+        Low and high of dVz: its confidence interval, and the range of surrogates.
     no_structure : float, optional
         dVz of equal V_UCM and V_ORT, ln(d/k)/2; drawn as a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     if over not in _AXIS:
         raise InvalidInput(f"over must be 'time' or 'points', not {over!r}.")

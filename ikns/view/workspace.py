@@ -51,21 +51,16 @@ def workspace_figure(
     hand : (T, 3) array
         Where the hand was, m in the thorax frame; NaN breaks the line.
     samples : (N, 3) array
-        Still samples, m in the thorax frame.
+        Still samples, likewise.
     labels : (N,) integer array
         PCA point of each sample, -1 where it was discarded.
     centers : (P, 3) array
         PCA points, m; numbered from 1 in the figure.
     simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     facets : (F, 3) integer array, optional
         Triangles of the interpolation volume, as rows of `centers`.
     arms : (2, 4, 3) array, optional
         Both arms (see :func:`ikns.view.body.arm_points`); draws a body behind.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     path, still = _points(hand, "hand"), _points(samples, "samples")
     point = _points(centers, "centers")

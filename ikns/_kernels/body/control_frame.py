@@ -26,43 +26,20 @@ __all__ = ["ControlMap", "control_frame"]
 
 
 class ControlMap(NamedTuple):
-    """P points for d signals of n joints, seen by M markers on L links.
+    """P points for d signals of n joints, seen by M markers on L links."""
 
-    Parameters
-    ----------
-    points : (P, 3) array
-        m; without natural neighbors the nearest of these has all the weight.
-    numbers, indices : arrays
-        A packed interpolator; `indices` is empty where there is none.
-    directions : (P, d, n) array
-    lower, upper : (P, d) array
-        rad.
-    columns : (n,) integer array
-        The chain's joints among the angles.
-    hands : (1,) or (2,) integer array
-        The chain's hands, of right and left.
-    link : (M,) integer array
-        Link that a marker belongs to, or -1.
-    need : (L,) integer array
-        How many markers of a link must be seen.
-    pair : (N, 2) integer array
-        Pairs of markers of the same link.
-    apart : (N,) array
-        Their distance on the link, m.
-    """
-
-    points: Floats
-    numbers: Floats
-    indices: Indices
-    directions: Floats
-    lower: Floats
-    upper: Floats
-    columns: Indices
-    hands: Indices
-    link: Indices
-    need: Indices
-    pair: Indices
-    apart: Floats
+    points: Floats  # (P, 3) m; without natural neighbors the nearest has all the weight
+    numbers: Floats  # a packed interpolator, as floats
+    indices: Indices  # the same as integers; empty where there is none
+    directions: Floats  # (P, d, n)
+    lower: Floats  # (P, d) rad
+    upper: Floats  # (P, d) rad
+    columns: Indices  # (n,) the chain's joints among the angles
+    hands: Indices  # (1,) or (2,) the chain's hands, of right and left
+    link: Indices  # (M,) link that a marker belongs to, or -1
+    need: Indices  # (L,) how many markers of a link must be seen
+    pair: Indices  # (N, 2) pairs of markers of the same link
+    apart: Floats  # (N,) their distance on the link, m
 
 
 @compiled
@@ -82,35 +59,20 @@ def control_frame(
     place: Floats,
     c: Floats,
 ) -> tuple[float, float, float, int, bool, bool, int]:
-    """Solve one frame.
+    """Solve one frame of markers (M, 3) in the world, m; NaN where not seen.
 
-    Parameters
-    ----------
-    whole, real : arrays
-        As in :func:`ikns._kernels.body.marker_ik.solve_frames`.
-    paths : Paths
-        To both hands.
-    control_map : ControlMap
-    markers : (M, 3) array
-        In the world, m; NaN where not seen.
-    from_scratch : bool
-        Whether there is no pose to start from in `q`.
-    q : (nq,) array
-        The previous pose; overwritten by the solution.
-    work, cavity_work, rotation (1, 2, 3, 3), weights (P,) : arrays
-        Scratch.
-    position : (1, 2, 3) array
-        Right and left hand in the thorax frame, m, written.
-    place : (3,) array
-        Position of the task, written, m.
-    c : (d,) array
-        The signals, written, not clipped; NaN while the chain is not in sight, and
-        where the weights are NaN or the range is zero.
+    `whole`, `real` and `q`, the previous pose, are as in
+    :func:`ikns._kernels.body.marker_ik.solve_frames`, `paths` lead to both hands;
+    `work`, `cavity_work`, `rotation` (1, 2, 3, 3) and `weights` (P,) are scratch.
+    Written are the pose `q` (nq,), the right and left hand `position` (1, 2, 3) and the
+    task's `place` (3,) in the thorax frame, m, and the signals `c` (d,), not clipped:
+    NaN while the chain is not in sight, and where the weights are NaN or the range is
+    zero.
 
     Returns
     -------
     residual : float
-        As from marker inverse kinematics.
+        As from marker inverse kinematics, like `iterations` and `converged`.
     worst : float
         Largest residual of a marker on the chain's links, m; NaN without any.
     intermarker : float
@@ -118,7 +80,6 @@ def control_frame(
         seen.
     iterations : int
     converged : bool
-        As from marker inverse kinematics.
     known : bool
         Whether the chain is in sight.
     status : int

@@ -4,10 +4,10 @@ Minimizes over the configuration q
 
     sum_m weight_m |x_m(q) - seen_m|^2 + (pull |q - before|)^2 + (limit |beyond|)^2
 
-by Levenberg-Marquardt (More 1978) as :mod:`ikns.motion.marker_ik.reference` does, but
-with the true Hessian where that is positive definite: the curvature term is cheap here
-(see :mod:`ikns._kernels.body.normal_equations`), and where markers deviate from the
-body by centimeters Gauss-Newton needs many times as many steps.
+by Levenberg-Marquardt (More 1978), with the true Hessian where that is positive
+definite: the curvature term is cheap here (see
+:mod:`ikns._kernels.body.normal_equations`), and where markers deviate from the body by
+centimeters Gauss-Newton needs many times as many steps.
 """
 
 from __future__ import annotations
@@ -46,26 +46,17 @@ def solve_frames(
 ) -> None:
     """Solve frames from `first` to before `last`, `way` (1 or -1) one after the other.
 
-    Parameters
-    ----------
-    whole, real : arrays
-        A packed :class:`ikns._kernels.body.marker_problem.MarkerProblem`.
-    markers : (T, M, 3) array
-        Markers in the world, m; NaN where not seen.
-    first, last, way : int
-    before : (nq,) array
-        The pose before the first frame; later frames start from the previous one.
-    from_scratch : bool
-        Whether there is no such pose.
-    work : array
-        Scratch of :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
-    q : (T, nq) array
-        The solutions; the previous pose where no marker is seen.
-    residual : (T,) array
-        Root mean square distance of the seen markers, m; NaN without any, infinite
-        where the previous pose is not finite.
-    iterations, converged : (T,) arrays
-        Iterations are `INFINITE` where a marker is infinite, not seen and not NaN.
+    `whole` and `real` are a packed
+    :class:`ikns._kernels.body.marker_problem.MarkerProblem`, `markers` (T, M, 3) in the
+    world, m, NaN where not seen; `before` (nq,) is the pose before the first frame,
+    unless it is solved `from_scratch`, and later frames start from the previous one.
+    `work` is scratch of :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
+
+    Written are the solutions `q` (T, nq), the previous pose where no marker is seen,
+    and by frame (T,) the `residual`, the root mean square distance of the seen markers
+    (m; NaN without any, infinite where the previous pose is not finite), whether it
+    `converged`, and `iterations`: `INFINITE` where a marker is infinite, not seen and
+    not NaN.
     """
     problem = unpack(whole, real)
     s = cut(problem, work)

@@ -20,60 +20,31 @@ __all__ = ["MarkerProblem", "Scratch", "cut", "pack", "scratch_size", "unpack"]
 class MarkerProblem(NamedTuple):
     """What does not change between frames: n rates, M markers, S starts.
 
-    Parameters
-    ----------
-    tree : Tree
-    marker_joint : (M,) integer array
-        Joint of the tree that carries the marker.
-    marker_position : (M, 3) array
-        Position in that joint's frame, m.
-    marker_weight : (M,) array
-        Zero for markers that are not used.
-    path : (n, D) integer array
-    depth : (n,) integer array
-        The degrees of freedom from the root to each one, and how many precede it; see
-        :mod:`ikns._kernels.body.tree_cholesky`.
-    free : (n,) array
-        1 for degrees of freedom to solve for, 0 for those that are held.
-    angle : (n,) integer array
-        Entry of q that `lower` and `upper` limit, or -1.
-    lower, upper : (n,) array
-        Joint limits, rad or m.
-    starts : (S, nq) array
-        Configurations to start from without a previous pose.
-    marker_branch, q_branch : (M,), (nq,) integer arrays
-        Limb of each marker and of each entry of q, from 0 to ``n_branches - 1``, or -1;
-        the best start is chosen by limb.
-    n_branches : int
-    max_iterations : int
-    pull, pull_from_scratch, limit : float
-        Weights of the terms of the cost, m/rad.
-    tolerance : float
-        A frame has converged when the next step moves every joint less, rad and m.
-    lost : float
-        Residual above which a frame is also tried from scratch, m.
+    `path` and `depth` are the degrees of freedom from the root to each one, and how
+    many precede it; see :mod:`ikns._kernels.body.tree_cholesky`. The best start is
+    chosen by limb, from 0 to ``n_branches - 1``.
     """
 
     tree: Tree
-    marker_joint: Indices
-    marker_position: Floats
-    marker_weight: Floats
-    path: Indices
-    depth: Indices
-    free: Floats
-    angle: Indices
-    lower: Floats
-    upper: Floats
-    starts: Floats
-    marker_branch: Indices
-    q_branch: Indices
+    marker_joint: Indices  # (M,) joint of the tree that carries the marker
+    marker_position: Floats  # (M, 3) in that joint's frame, m
+    marker_weight: Floats  # (M,) zero for markers that are not used
+    path: Indices  # (n, D)
+    depth: Indices  # (n,)
+    free: Floats  # (n,) 1 for degrees of freedom to solve for, 0 for held ones
+    angle: Indices  # (n,) entry of q that `lower` and `upper` limit, or -1
+    lower: Floats  # (n,) joint limit, rad or m
+    upper: Floats  # (n,)
+    starts: Floats  # (S, nq) configurations to start from without a previous pose
+    marker_branch: Indices  # (M,) limb of each marker, or -1
+    q_branch: Indices  # (nq,) limb of each entry of q, or -1
     n_branches: int
     max_iterations: int
-    pull: float
+    pull: float  # weights of the terms of the cost, m/rad
     pull_from_scratch: float
     limit: float
-    tolerance: float
-    lost: float
+    tolerance: float  # converged when the next step moves every joint less, rad and m
+    lost: float  # residual above which a frame is also tried from scratch, m
 
 
 class Scratch(NamedTuple):

@@ -26,23 +26,15 @@ Indices = NDArray[np.int64]
 class Paths(NamedTuple):
     """Paths from one base to E frames, concatenated; K joints in total.
 
-    Parameters
-    ----------
-    ends : (E,) integer array
-        End of each path among the K joints.
-    joint : (K, 3) integer array
-        Kind (:data:`ikns._kernels.body.tree.REVOLUTE` or ``PRISMATIC``), column of the
-        angles, column of the Jacobian (-1 for none).
-    rotation : (K + E, 3, 3) array
-    translation : (K + E, 3) array
-        Placement of each joint on the one before it, m, then that of each frame on the
-        last joint of its path.
+    A joint is its kind (:data:`ikns._kernels.body.tree.REVOLUTE` or ``PRISMATIC``), its
+    column of the angles and its column of the Jacobian (-1 for none). Placements are of
+    each joint on the one before it, then of each frame on the last joint of its path.
     """
 
-    ends: Indices
-    joint: Indices
-    rotation: Floats
-    translation: Floats
+    ends: Indices  # (E,) end of each path among the K joints
+    joint: Indices  # (K, 3)
+    rotation: Floats  # (K + E, 3, 3)
+    translation: Floats  # (K + E, 3) m
 
 
 @compiled

@@ -34,30 +34,15 @@ _Z = np.int64(2)
 
 
 class Tree(NamedTuple):
-    """J joints with n degrees of freedom, parents before children.
+    """J joints with n degrees of freedom, parents before children."""
 
-    Parameters
-    ----------
-    kind : (J,) integer array
-        REVOLUTE, PRISMATIC or FREE_FLYER.
-    parent : (J,) integer array
-        Joint that carries this one; -1 is the world.
-    first_q, first_v : (J,) integer arrays
-        First entry of the joint in q and in v.
-    rotation : (J, 3, 3) array
-    translation : (J, 3) array
-        The joint's placement in its parent's frame, m.
-    dof_parent : (n,) integer array
-        The next degree of freedom towards the root, or -1.
-    """
-
-    kind: Indices
-    parent: Indices
-    first_q: Indices
-    first_v: Indices
-    rotation: Floats
-    translation: Floats
-    dof_parent: Indices
+    kind: Indices  # (J,) REVOLUTE, PRISMATIC or FREE_FLYER
+    parent: Indices  # (J,) joint that carries this one; -1 is the world
+    first_q: Indices  # (J,) first entry of the joint in q
+    first_v: Indices  # (J,) and in v
+    rotation: Floats  # (J, 3, 3) the joint's placement in its parent's frame
+    translation: Floats  # (J, 3) m
+    dof_parent: Indices  # (n,) next degree of freedom towards the root, or -1
 
 
 @compiled

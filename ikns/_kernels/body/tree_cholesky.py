@@ -22,15 +22,7 @@ __all__ = ["factor", "solve"]
 
 @compiled
 def factor(H: Floats, path: Indices, depth: Indices) -> bool:
-    """Turn H into L in place; False when H is not positive definite.
-
-    Parameters
-    ----------
-    H : (n, D) array
-        Rows as described above.
-    path : (n, D) integer array
-    depth : (n,) integer array
-    """
+    """Turn H (n, D), rows as above, into L in place; False if not positive definite."""
     for k in range(len(depth) - 1, -1, -1):
         last = depth[k]
         # A NaN is not greater than zero either.

@@ -111,10 +111,7 @@ def check_all_spheres(
 ) -> tuple[int, int]:
     """Write the powers of all tetrahedra and the kept lengths of all facets.
 
-    Returns
-    -------
-    tetrahedra, sites : int
-        How many are listed: the cavity, and all sites.
+    Returns how many are listed: tetrahedra of the cavity, and all sites.
     """
     centers, powers = indices[CIRCUMCENTER], indices[POWER]
     unsure = False
@@ -191,10 +188,7 @@ def find_cavity(
 ) -> tuple[int, int]:
     """Write the powers in and around the cavity, and the kept lengths of its facets.
 
-    Returns
-    -------
-    tetrahedra, sites : int
-        How many are listed; no tetrahedra when the walk failed.
+    Returns how many tetrahedra and sites are listed; none when the walk failed.
     """
     t, height = _walk(numbers, indices, x, rest, start)
     if t < 0:

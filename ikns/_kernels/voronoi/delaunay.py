@@ -35,13 +35,7 @@ _SEEN, _CAVITY, _FREE_ROWS = 0, 1, 2
 
 
 def triangulate(sites: Sites, order: Integers) -> tuple[Integers, Integers]:
-    """Triangulate sites that are all different.
-
-    Parameters
-    ----------
-    sites : Sites
-    order : (N,) integer array
-        In which to insert them, the first three not on one line.
+    """Triangulate different sites, the first three in order not on one line.
 
     Returns
     -------

@@ -71,13 +71,7 @@ OUTSIDE_HULL, INSIDE_HULL, NOT_FINITE, UNSURE = 0, 1, -1, -2
 
 
 def new_work(indices: Indices) -> Floats:
-    """Scratch memory for queries, one for each thread.
-
-    Parameters
-    ----------
-    indices : integer array
-        The packed diagram.
-    """
+    """Scratch memory for queries of a packed diagram, one for each thread."""
     work = np.zeros(indices[TETRAHEDRON])  # the first block after all scratch
     work[indices[POWER] : indices[KEPT]] = UNKNOWN
     return work

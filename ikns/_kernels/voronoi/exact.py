@@ -104,27 +104,14 @@ _TERM = np.array([term for stage in _STAGES for _, terms in stage for term in te
 
 
 class Sites(NamedTuple):
-    """N sites, as the predicates want them.
+    """N sites, as the predicates want them."""
 
-    Parameters
-    ----------
-    x : (N, 3) array
-    grain : (N,) array
-        Powers of two: all three coordinates of a site are multiples of its grain.
-    """
-
-    x: Floats
-    grain: Floats
+    x: Floats  # (N, 3)
+    grain: Floats  # (N,) powers of two that a site's coordinates are multiples of
 
 
 def on_lattice(points: Floats) -> Sites:
-    """Sites cut off to steps of 2**-100.
-
-    Parameters
-    ----------
-    points : (N, 3) array
-        At most 2**10 wide.
-    """
+    """Sites (N, 3), at most 2**10 wide, cut off to steps of 2**-100."""
     x = np.trunc(points / _FINEST) * _FINEST
     fraction, exponent = np.frexp(x)
     digits = (fraction * 2.0**53).astype(np.int64)
@@ -139,14 +126,9 @@ def determinants(
 ) -> tuple[float, int]:
     """Compute the rows of all stages up to the last one, for five sites.
 
-    Sites that the stages do not use should repeat some of the others.
-
-    Returns
-    -------
-    step : float
-        What the lowest digits of vectors count.
-    n : int
-        Their number of digits: two if two hold them, four hold all.
+    Sites that the stages do not use should repeat some of the others. Returns what the
+    lowest digits of vectors count, and their number of digits: two if two hold them,
+    four hold all.
     """
     x, others = sites.x, (b, c, d, e)
     step, far = sites.grain[a], 0.0
@@ -219,20 +201,10 @@ def sign_of(R: Integers, row: int, n: int) -> int:
 def values(
     sites: Sites, fives: Integers, last: int, row: int, value: Floats, rest: Floats
 ) -> None:
-    """Write some rows of K sets of five sites: floats, and what they round off.
+    """Write M rows, from `row` on, of K sets of five sites, by the stages up to `last`.
 
-    Together they are off by less than 2**-100 of the value.
-
-    Parameters
-    ----------
-    sites : Sites
-    fives : (K, 5) integer array
-    last : int
-        The last stage to compute.
-    row : int
-        The first row to write.
-    value, rest : (K, M) array
-        Of M rows.
+    `value` and `rest` (K, M) are floats, and what they round off; together they are off
+    by less than 2**-100 of the value.
     """
     R = np.empty(SCRATCH, dtype=np.int64)
     for i in range(len(fives)):

@@ -38,13 +38,8 @@ def solid_angles(
 ) -> Floats:
     """Solid angles of faces from the first sites of their edges, (E,) steradian.
 
-    Parameters
-    ----------
-    points : (N, 3) array
-    place : (T, 3) array
-        Of the circumcenters.
-    normal, edges, axis, side_facet, side_edge, entering, leaving
-        As in a Voronoi diagram.
+    Of sites (N, 3) with circumcenters at `place` (T, 3); the rest as in a Voronoi
+    diagram.
     """
     angle = np.zeros(len(edges))
     first = (0.0, 0.0, 0.0)

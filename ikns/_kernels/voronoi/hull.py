@@ -72,15 +72,9 @@ def hull_depths(
 ) -> tuple[float, float]:
     """Write how far a point lies behind each facet of the hull.
 
-    Its planes end with one over the depth of the middle.
-
-    Returns
-    -------
-    depth : float
-        The least; positive inside.
-    part : float
-        The least part of the way from a facet to the middle of the sites, where that
-        may be less than CANCELED.
+    Its planes end with one over the depth of the middle. Returns the least depth,
+    positive inside, and the least part of the way from a facet to the middle of the
+    sites, where that may be less than CANCELED.
     """
     depths, facets = indices[DEPTH], indices[HULL]
     planes = indices[PLANE] + 10 * (indices[FACETS] - facets)

@@ -202,23 +202,11 @@ def answer_many(
 def natural_weights(
     numbers: Floats, indices: Indices, x: Floats, work: Floats, weights: Floats
 ) -> int:
-    """Weights of the sites at one query.
+    """Write the weights (N,) of the sites at a query (3,), m; NaN where there are none.
 
-    Parameters
-    ----------
-    numbers, indices : arrays
-        The packed diagram, as floats and as integers.
-    x : (3,) array
-        Query, m.
-    work : array
-        Scratch memory of this thread, from `new_work`.
-    weights : (N,) array
-        Where the weights go; NaN where there are none.
-
-    Returns
-    -------
-    int
-        INSIDE_HULL, OUTSIDE_HULL, NOT_FINITE or UNSURE.
+    The packed diagram is read as floats and as integers; `work` is this thread's
+    scratch memory, from `new_work`. Returns INSIDE_HULL, OUTSIDE_HULL, NOT_FINITE or
+    UNSURE.
     """
     at = (x[0], x[1], x[2])
     status, count = _weights(numbers, indices, at, indices[MIDDLE], work)

@@ -21,12 +21,8 @@ def list_facets(
 ) -> tuple[Integers, Integers, Integers]:
     """Every facet once, turned away from the tetrahedron behind it.
 
-    Returns
-    -------
-    facets : (F, 3) integer array
-        Their sites, counterclockwise from ahead.
-    behind, ahead : (F,) integer array
-        Tetrahedra on the two sides; T outside the hull.
+    Returns their sites (F, 3), counterclockwise from ahead, and the tetrahedra behind
+    and ahead, (F,); T outside the hull.
     """
     outside = len(simplices)
     ahead = np.where(neighbors < 0, outside, neighbors)
@@ -44,12 +40,8 @@ def list_sides(
     Counterclockwise about an edge in the direction of the facet's turn, its Voronoi
     edge leads ahead; about the opposite edge it leads back.
 
-    Returns
-    -------
-    edges : (E, 2) integer array
-    begin : (E + 1,) integer array
-        Where the sides of an edge begin.
-    side_facet, side_edge, entering, leaving : (S,) integer array
+    Returns edges (E, 2), where the sides of each begin (E + 1,), and of the S sides the
+    facet, the edge, and the tetrahedra entering and leaving, (S,).
     """
     a, b = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
     low, high = np.minimum(a, b), np.maximum(a, b)

@@ -43,20 +43,10 @@ def sines(
 ) -> None:
     """Write the pairs of sides of each face, edge by edge, and their sines.
 
-    A height below the part `canceled` of |y|_1 is left out: the sine is NaN.
-
-    Parameters
-    ----------
-    x : (N, 3) array
-        Sites.
-    facets : (F, 3) integer array
-        Seen from where their normals point, their sites turn left.
-    area : (F,) array
-        Twice the facets' areas.
-    begin : (E + 1,) integer array
-        Where the sides of an edge begin.
-    behind, normal, normal_rest, edges, side_facet, entering, first, second, sine
-        As in a Voronoi diagram.
+    A height below the part `canceled` of |y|_1 is left out: the sine is NaN. Of facets
+    (F, 3), seen from where their normals point, the sites turn left; `area` (F,) is
+    twice theirs, and the sides of edge e begin at ``begin[e]``. The rest is as in a
+    Voronoi diagram.
     """
     p = 0
     for e in range(len(edges)):

@@ -109,20 +109,12 @@ def length_uncertainty(sex: str) -> dict[str, float]:
 def person_length(
     name: str, stature: ArrayLike, surface: ArrayLike, sex: str
 ) -> NDArray[np.float64]:
-    """Length of a segment of a person whose surface measure is known, meters.
+    """Length of a limb segment of a person whose surface measure is known, meters.
 
     ``expected length(stature) * surface / expected surface(stature)``: the ratio to the
-    mean of people of the same stature is that of the surface measure. The clavicle
-    follows from the biacromial breadth directly.
-
-    Parameters
-    ----------
-    name : str
-        One of :data:`LIMB_SEGMENTS`.
-    stature, surface : float or (N,) array
-        Meters; `surface` is the measure that :data:`SURFACE_MEASURES` names.
-    sex : str
-        "female" or "male".
+    mean of people of the same stature is that of the measure which
+    :data:`SURFACE_MEASURES` names. The clavicle follows from the biacromial breadth
+    directly. Arguments are numbers or (N,) arrays.
     """
     if name == "clavicle":
         return clavicle_length(stature, sex, biacromial=surface)

@@ -29,37 +29,19 @@ BIACROMIAL_LIMITS = (0.2, 0.6)
 
 
 def check_stature(stature: ArrayLike) -> NDArray[np.float64]:
-    """Return stature as an array, meters, or refuse it.
-
-    Raises
-    ------
-    InvalidInput
-        When it is not a number or outside :data:`STATURE_LIMITS`.
-    """
+    """Return stature as an array, m, or refuse it outside :data:`STATURE_LIMITS`."""
     return _within(
         stature, STATURE_LIMITS, "stature", "m", "did you give centimeters or feet?"
     )
 
 
 def check_mass(mass: ArrayLike) -> NDArray[np.float64]:
-    """Return mass as an array, kilograms, or refuse it.
-
-    Raises
-    ------
-    InvalidInput
-        When it is not a number or outside :data:`MASS_LIMITS`.
-    """
+    """Return mass as an array, kg, or refuse it outside :data:`MASS_LIMITS`."""
     return _within(mass, MASS_LIMITS, "mass", "kg", "did you give grams or pounds?")
 
 
 def check_biacromial(breadth: ArrayLike) -> NDArray[np.float64]:
-    """Return biacromial breadth as an array, meters, or refuse it.
-
-    Raises
-    ------
-    InvalidInput
-        When it is not a number or outside :data:`BIACROMIAL_LIMITS`.
-    """
+    """Return biacromial breadth as an array, m, or refuse it likewise."""
     return _within(
         breadth,
         BIACROMIAL_LIMITS,
@@ -72,16 +54,8 @@ def check_biacromial(breadth: ArrayLike) -> NDArray[np.float64]:
 def expected_measure(name: str, stature: ArrayLike, sex: str) -> NDArray[np.float64]:
     """Mean of an ANSUR II measure among people of a stature, meters.
 
-    The regression line ``mean + r * sd / sd_stature * (stature - mean_stature)``.
-
-    Parameters
-    ----------
-    name : str
-        A row of ``ansur2`` that has a correlation with stature.
-    stature : float or (N,) array
-        Meters.
-    sex : str
-        "female" or "male".
+    The regression line ``mean + r * sd / sd_stature * (stature - mean_stature)`` of a
+    row of ``ansur2`` that has a correlation with stature.
     """
     measure = row("ansur2", name, sex=sex)
     height = row("ansur2", "stature", sex=sex)

@@ -20,13 +20,7 @@ Array = NDArray[np.float64]
 
 
 class LinkFrames:
-    """The links of a model whose joint 0 carries the thorax.
-
-    Parameters
-    ----------
-    model : pin.Model
-        As :func:`ikns.body.skeleton.tree.joint_tree` takes it.
-    """
+    """The links of a model, as in :func:`joint_tree`; joint 0 carries the thorax."""
 
     def __init__(self, model: pin.Model) -> None:
         self._model = model

@@ -18,19 +18,7 @@ Array = NDArray[np.float64]
 
 
 class Markers:
-    """M markers fixed to the joints of a model.
-
-    Parameters
-    ----------
-    model : pin.Model
-    marker_set : MarkerSet
-        Markers in link frames.
-
-    Raises
-    ------
-    MarkerMismatch
-        When a marker sits on a link that the model does not have.
-    """
+    """M markers, given in link frames, fixed to the joints of a model."""
 
     def __init__(self, model: pin.Model, marker_set: MarkerSet) -> None:
         links = {f.name: f for f in model.frames if f.type == pin.FrameType.BODY}

@@ -18,13 +18,7 @@ NQ_ROOT, NV_ROOT = 7, 6
 
 
 def read_urdf(path: Path) -> str:
-    """Read the text of a URDF file.
-
-    Raises
-    ------
-    FileError
-        When the file cannot be read.
-    """
+    """Read the text of a URDF file."""
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -32,13 +26,7 @@ def read_urdf(path: Path) -> str:
 
 
 def build_model(urdf: str) -> pin.Model:
-    """Build the model of a URDF whose root link gets a free flyer.
-
-    Raises
-    ------
-    FileError
-        When the text is not a URDF.
-    """
+    """Build the model of a URDF whose root link gets a free flyer."""
     try:
         # Pinocchio's own parser prints to the terminal before it raises.
         ET.fromstring(urdf)
@@ -48,14 +36,7 @@ def build_model(urdf: str) -> pin.Model:
 
 
 def upper_body_model(urdf: str) -> pin.Model:
-    """Build the model of an upper body.
-
-    Raises
-    ------
-    FileError
-        When the text is not a URDF, lacks a link or joint of the upper body, or has
-        joints other than revolute ones.
-    """
+    """Build the model of an upper body; other links and joints are a FileError."""
     model = build_model(urdf)
     joints = set(tuple(model.names)[2:])
     bodies = {f.name for f in model.frames if f.type == pin.FrameType.BODY}

@@ -16,12 +16,8 @@ Array = NDArray[np.float64]
 def joint_tree(model: pin.Model) -> tuple[Tree, Array]:
     """Export a model whose joints are revolute, prismatic or free flyers.
 
-    Returns
-    -------
-    tree : Tree
-        Joint i of the tree is joint i + 1 of the model.
-    turned : (J, 3, 3) array
-        Rotation from a tree joint's frame, whose axis is z, to the model joint's frame.
+    Joint i of the tree is joint i + 1 of the model. Also returns the rotation from a
+    tree joint's frame, whose axis is z, to the model joint's frame, (J, 3, 3).
     """
     joints = list(model.joints)[1:]
     kinds, turned = [], np.empty((len(joints), 3, 3))

@@ -19,7 +19,6 @@ from ikns.motion.marker_ik.pose import (
     PRIOR,
     PRIOR_FROM_SCRATCH,
     STEP_TOLERANCE,
-    Pose,
     SolvedFrames,
     starting_poses,
 )
@@ -97,37 +96,23 @@ class KernelSolver:
         work: Array = self._of_thread.work
         return work
 
-    def solve(self, markers: Array, q: Array | None) -> Pose:
-        """Solve one frame of markers (M, 3); NaN where not seen.
-
-        Iterations of -1 stand for an infinite marker, an infinite residual for a pose
-        before that is not finite.
-        """
-        frames = SolvedFrames.empty(1, len(self._neutral))
-        self._solve(markers[None], 0, 1, 1, q, frames)
-        return frames.pose(0)
-
-    def solve_many(
-        self, markers: Array, first: int, last: int, way: int, frames: SolvedFrames
-    ) -> None:
-        """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
-
-        Markers are (T, M, 3); each frame starts from the one next to it.
-        """
-        self._solve(markers, first, last, way, frames.q[first - way], frames)
-
-    def _solve(
+    def solve(
         self,
         markers: Array,
-        first: int,
-        last: int,
-        way: int,
+        span: tuple[int, int, int],
         before: Array | None,
         frames: SolvedFrames,
     ) -> None:
-        start = self._neutral if before is None else before
-        span = (first, last, way)
-        scratch = before is None
+        """Solve the first frame of a span to before its last, in steps of 1 or -1.
+
+        Markers are (T, M, 3), NaN where not seen. The first frame starts from the pose
+        before, or from scratch; others from the one next to them. Iterations of -1
+        stand for an infinite marker, an infinite residual for a pose before that is not
+        finite.
+        """
+        start, scratch = (
+            (before, False) if before is not None else (self._neutral, True)
+        )
         solve_frames(*self.packed, markers, *span, start, scratch, self.work, *frames)
 
 

@@ -1,4 +1,4 @@
-"""A solved frame, and what solvers agree on: weights of the cost, where to start."""
+"""A solved frame, the weights of the cost, and where to start."""
 
 from __future__ import annotations
 

@@ -27,7 +27,6 @@ from ikns.motion.marker_ik.pose import (
     Pose,
     SolvedFrames,
 )
-from ikns.motion.marker_ik.reference import ReferenceSolver
 from ikns.motion.marker_ik.visibility import (
     Visibility,
     require_sight,
@@ -42,7 +41,7 @@ __all__ = ["MarkerIK"]
 
 Array = NDArray[np.float64]
 
-#: Frames between two reports of progress: milliseconds when compiled.
+#: Frames between two reports of progress: milliseconds.
 _CHUNK = 500
 
 
@@ -57,9 +56,6 @@ class MarkerIK:
         Steps per frame.
     tolerance : float
         A frame has converged when no joint moves more than this in a step, rad and m.
-    compiled : bool
-        The plain solver finds the same minimum a hundred times as slowly; it is what
-        the compiled one is checked against.
     """
 
     def __init__(
@@ -68,7 +64,6 @@ class MarkerIK:
         *,
         max_iterations: int = MAX_ITERATIONS,
         tolerance: float = STEP_TOLERANCE,
-        compiled: bool = True,
     ) -> None:
         if max_iterations < 1 or not tolerance > 0:
             raise InvalidInput(
@@ -83,7 +78,7 @@ class MarkerIK:
         self._tracked = np.array([not marker.static_only for marker in worn])
         self._markers_shape = (len(worn), 3)
         self._pose_shape = (7 + len(skeleton.joint_names),)
-        self.solver = (KernelSolver if compiled else ReferenceSolver)(
+        self.solver = KernelSolver(
             skeleton, max_iterations=max_iterations, tolerance=tolerance
         )
 
@@ -114,7 +109,9 @@ class MarkerIK:
                 raise InvalidInput(
                     f"expected a pose {self._pose_shape}, found {q.shape}."
                 )
-        pose = self.solver.solve(seen, q)
+        frames = SolvedFrames.empty(1, *self._pose_shape)
+        self.solver.solve(seen[None], (0, 1, 1), q, frames)
+        pose = frames.pose(0)
         if pose.iterations < 0:
             raise InvalidInput(
                 "marker positions must be finite or NaN, found infinity."
@@ -183,7 +180,8 @@ class MarkerIK:
         for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
             for at in range(begin, end, way * _CHUNK):
                 stop = min(at + _CHUNK, n) if way == 1 else max(at - _CHUNK, -1)
-                self.solver.solve_many(markers, at, stop, way, frames)
+                before = frames.q[at - way]
+                self.solver.solve(markers, (at, stop, way), before, frames)
                 done += abs(stop - at)
                 if progress is not None:
                     progress(done, n)

@@ -47,12 +47,9 @@ _CANCELED = 2.0**-40
 
 
 def diagram(points: Floats) -> Voronoi:
-    """Build the diagram of sites that span space and are all different.
+    """Build the diagram of sites (N, 3) that span space and are all different.
 
-    Parameters
-    ----------
-    points : (N, 3) array
-        Sites, scaled so that the set is about 1 wide.
+    They are scaled so that the set is about 1 wide.
     """
     sites = on_lattice(points)
     simplices, neighbors = triangulate(sites, insertion_order(points))

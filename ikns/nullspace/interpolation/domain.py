@@ -20,30 +20,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Domain:
-    """Where natural neighbors interpolate.
+    """Where natural neighbors interpolate."""
 
-    Parameters
-    ----------
-    scale : float
-        A power of two: what points in m are multiplied with.
-    sites : (N, 3) array
-        Scaled.
-    diagram : Voronoi
-        Of the scaled sites.
-    center : (3,) array
-        The middle of the scaled sites.
-    center_depth : (H,) array
-        How far it lies behind each facet of the hull.
-    rounding : float
-        Scaled points that lie outside by less are on the hull.
-    """
-
-    scale: float
-    sites: Floats
-    diagram: Voronoi
-    center: Floats
-    center_depth: Floats
-    rounding: float
+    scale: float  # a power of two: what points in m are multiplied with
+    sites: Floats  # (N, 3) scaled
+    diagram: Voronoi  # of the scaled sites
+    center: Floats  # (3,) the middle of the scaled sites
+    center_depth: Floats  # (H,) how far it lies behind each facet of the hull
+    rounding: float  # scaled points that lie outside by less are on the hull
 
 
 def domain(points: Floats) -> Domain:

@@ -18,19 +18,8 @@ def scaled_gradients(
 ) -> Floats:
     """Gradients at the sites: those that are given, or estimated from the values.
 
-    Parameters
-    ----------
-    space : Domain
-    angle : (E,) array
-        Solid angles of the edges' faces.
-    values : (N, ...) array
-    gradients : (N, ..., 3) array, optional
-        Per m.
-
-    Returns
-    -------
-    (N, M, 3) array
-        Per scaled unit of length.
+    The solid angles of the edges' faces are (E,), values (N, ...), gradients (N, ...,
+    3) per m; the result (N, M, 3) is per scaled unit of length.
     """
     if values is None:
         raise InvalidInput("method 'sibson_c1' needs values.")

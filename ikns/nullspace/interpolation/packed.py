@@ -30,20 +30,10 @@ _RULES = {"nearest": at.NEAREST, "project": at.PROJECT, "nan": at.NOWHERE}
 def packed(
     space: Domain, values: Floats, gradients: Floats, method: str, outside: str
 ) -> Floats:
-    """Pack what queries need.
+    """Pack what queries need: values (N, M), and gradients (N, M, 3) for "sibson_c1".
 
-    Parameters
-    ----------
-    space : Domain
-    values : (N, M) array
-    gradients : (N, M, 3) array
-        Of the values, per scaled unit of length, for "sibson_c1" only.
-    method : {"sibson", "laplace", "sibson_c1"}
-    outside : {"nearest", "project", "nan"}
-
-    Returns
-    -------
-    (K,) array
+    Gradients are per scaled unit of length. Method and rule outside the hull are those
+    of :class:`ikns.NaturalNeighborInterpolator`.
     """
     d = space.diagram
     n, t = len(space.sites), len(d.simplices)

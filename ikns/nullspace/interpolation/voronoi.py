@@ -28,58 +28,28 @@ class Voronoi:
     """Delaunay triangulation and Voronoi diagram of N sites.
 
     T tetrahedra, F facets of which H are on the hull, E edges, S = 3 F sides, P pairs
-    of sides of one face. Arrays are contiguous, of float64 and int64.
-
-    Parameters
-    ----------
-    simplices : (T, 4) integer array
-    neighbors : (T, 4) integer array
-        The tetrahedron across the facet that leaves out each vertex; -1 on the hull.
-    circumcenter, circumcenter_rest : (T, 3) array
-        Seen from the tetrahedron's first site: floats, and what these round off.
-    behind, ahead : (F,) integer array
-        Tetrahedra on the two sides of a facet; `ahead` is T on the hull.
-    length : (F,) array
-        Of the facet's Voronoi edge; infinite on the hull.
-    normal, normal_rest : (F, 3) array
-        Unit vector from behind to ahead: floats, and what these round off.
-    hull : (H,) integer array
-        Which facets are on the hull.
-    hull_facets : (H, 3) integer array
-        Their sites, counterclockwise from outside.
-    edges : (E, 2) integer array
-    axis : (E, 3) array
-        Unit vector from site i to site j.
-    side_facet, side_edge : (S,) integer array
-        Facet and edge of a side.
-    entering, leaving : (S,) integer array
-        Tetrahedra at the start and at the end of the side; T at infinity.
-    first, second : (P,) integer array
-        The pair's sides, in the order of their places.
-    sine : (P,) array
-        Sine of the angle by which the second side turns from the first.
-    pairs : (E,) integer array
-        Where the pairs of an edge's face begin; they follow each other.
+    of sides of one face. Arrays are contiguous, of float64 and int64; a ``_rest`` is
+    what the floats round off.
     """
 
-    simplices: Indices
-    neighbors: Indices
-    circumcenter: Floats
+    simplices: Indices  # (T, 4)
+    neighbors: Indices  # (T, 4) across the facet without each vertex; -1 on the hull
+    circumcenter: Floats  # (T, 3) seen from the tetrahedron's first site
     circumcenter_rest: Floats
-    behind: Indices
-    ahead: Indices
-    length: Floats
-    normal: Floats
+    behind: Indices  # (F,) tetrahedron on one side of a facet
+    ahead: Indices  # (F,) on the other; T on the hull
+    length: Floats  # (F,) of the facet's Voronoi edge; infinite on the hull
+    normal: Floats  # (F, 3) unit vector from behind to ahead
     normal_rest: Floats
-    hull: Indices
-    hull_facets: Indices
-    edges: Indices
-    axis: Floats
-    side_facet: Indices
-    side_edge: Indices
-    entering: Indices
-    leaving: Indices
-    first: Indices
+    hull: Indices  # (H,) which facets are on the hull
+    hull_facets: Indices  # (H, 3) their sites, counterclockwise from outside
+    edges: Indices  # (E, 2)
+    axis: Floats  # (E, 3) unit vector from site i to site j
+    side_facet: Indices  # (S,) facet of a side
+    side_edge: Indices  # (S,) and its edge
+    entering: Indices  # (S,) tetrahedron at the start of the side; T at infinity
+    leaving: Indices  # (S,) at its end
+    first: Indices  # (P,) the pair's sides, in the order of their places
     second: Indices
-    sine: Floats
-    pairs: Indices
+    sine: Floats  # (P,) of the angle by which the second side turns from the first
+    pairs: Indices  # (E,) where the pairs of an edge's face begin, one after another

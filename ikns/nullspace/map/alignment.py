@@ -19,19 +19,8 @@ def spanning_tree(
 ) -> list[tuple[int, int]]:
     """Maximum spanning tree of a connected graph, grown from its root (Prim 1957).
 
-    Parameters
-    ----------
-    strength : (E,) array
-        Weight of each edge.
-    edges : (E, 2) integer array
-        Pairs of nodes.
-    root : int
-
-    Returns
-    -------
-    list of (parent, child)
-        In the order in which they are added; a parent is the root or an earlier
-        child.
+    Edges (E, 2) between nodes have strengths (E,). Returns (parent, child) in the order
+    in which they are added; a parent is the root or an earlier child.
     """
     tree: list[tuple[int, int]] = []
     reached = np.zeros(edges.max(initial=root) + 1, dtype=bool)
@@ -65,22 +54,10 @@ def align(
     best agreement: the smallest cosine between the spans of the `n_dof` leading
     components at both ends.
 
-    Parameters
-    ----------
-    components : sequence of P (k_i, n) arrays
-        Orthonormal rows, leading one first; at least `n_dof`, or none where no joint
-        moves.
-    weights : sequence of P (k_i,) arrays
-        Used for one degree of freedom.
-    n_dof : int
-        Degrees of freedom d.
-    edges : (E, 2) integer array
-        Neighbors, as a connected graph.
-    root : int
-        Root of the tree.
-    reference : (d, n) array, optional
-        The sum of all directions has a positive dot product with it, row by row.
-        Without it the entry of largest magnitude of that sum is positive.
+    Components and weights (the latter for one degree of freedom) are those of
+    :func:`ikns.nullspace.map.assembly.assemble`, `edges` (E, 2) pairs of neighbors. The
+    sum of all directions has a positive dot product with the reference (d, n), row by
+    row; without it the entry of largest magnitude of that sum is positive.
 
     Returns
     -------

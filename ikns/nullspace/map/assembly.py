@@ -30,14 +30,14 @@ def assemble(
     settings: MapSettings,
     edges: NDArray[np.int64],
 ) -> tuple[Floats, Floats, Floats]:
-    """Directions and ranges of all points.
+    """Directions and ranges of all points, with a MapWarning where these are uncertain.
 
     Parameters
     ----------
     centers : (P, 3) array
         Where the points are, m.
     components : sequence of P (k_i, n) arrays
-        Orthonormal rows, leading one first; none where no joint moves.
+        Orthonormal rows, leading one first, at least d; none where no joint moves.
     weights : sequence of P (k_i,) arrays
         Weight of each component in the sum, for one degree of freedom.
     samples : sequence of P (N_i, n) arrays
@@ -51,11 +51,6 @@ def assemble(
     directions : (P, d, n) array
     lower, upper : (P, d) arrays
         Quantiles of the projections of the uncentered samples, rad.
-
-    Warns
-    -----
-    MapWarning
-        When neighbors disagree or the reference decides nothing.
     """
     sizes = [
         len(q) * (len(rows) > 0) for q, rows in zip(samples, components, strict=True)

@@ -39,21 +39,12 @@ class MapWarning(UserWarning):
 
 
 class MapSettings(NamedTuple):
-    """Checked parameters of a map.
-
-    Parameters
-    ----------
-    n_dof : int
-    variance : float
-    quantiles : (float, float)
-    reference : (d, n) array or None
-    min_samples : int
-    """
+    """Checked parameters of a map."""
 
     n_dof: int
     variance: float
     quantiles: tuple[float, float]
-    reference: Floats | None
+    reference: Floats | None  # (d, n)
     min_samples: int
 
 
@@ -155,18 +146,7 @@ def checked_velocities(velocity: ArrayLike | None, q: Floats) -> Floats:
 
 
 def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
-    """Points with enough samples; warn about the others.
-
-    Parameters
-    ----------
-    found : BoundingBoxKMeans
-        Fitted clusters of the hand positions.
-    need : int
-        Least number of samples.
-
-    Returns
-    -------
-    list of int
+    """Points of fitted clusters with at least so many samples; warn about the others.
 
     Raises
     ------

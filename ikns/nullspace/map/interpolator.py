@@ -33,18 +33,7 @@ def make_interpolator(
 ) -> NaturalNeighborInterpolator | NearestPoint:
     """Interpolator between points (P, d): natural neighbors for 4 or more in space.
 
-    Parameters
-    ----------
-    points : (P, d) array
-    outside, interpolation : str
-        Of :class:`ikns.NullSpaceMap`.
-
-    Raises
-    ------
-    InvalidInput
-        For an unknown interpolation.
-    NotEnoughData
-        When 4 or more points in space lie in a plane.
+    Options and errors are those of :class:`ikns.NullSpaceMap`.
     """
     known = (*_METHODS, "nearest")
     if interpolation not in known:
@@ -63,19 +52,9 @@ def _in_space(points: NDArray[np.float64]) -> bool:
 
 
 class NearestPoint:
-    """Weights of 1 for the nearest point, in any dimension.
+    """Weights of 1 for the nearest of points (P, d), in any dimension.
 
-    Same methods as
-    :class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`.
-
-    Parameters
-    ----------
-    points : (P, d) array
-        Where values are known.
-
-    Attributes
-    ----------
-    points : (P, d) array
+    Same methods as :class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`.
     """
 
     def __init__(self, points: ArrayLike) -> None:

@@ -43,11 +43,6 @@ def read_c3d(path: Path) -> Recording:
     Frame 1 is at 0 s; a part of a longer recording keeps its times. Positions without a
     unit are taken as mm, the usual unit of C3D files, and refused when that is not
     plausible. Analog channels are ignored.
-
-    Raises
-    ------
-    FileError
-        When the file is not C3D, is cut off or damaged, or holds no marker.
     """
     layout = read_layout(path)
     rate = checked_rate(path, layout.number("POINT:RATE", layout.rate) or layout.rate)

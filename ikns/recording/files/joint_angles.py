@@ -20,27 +20,11 @@ _UNITS = {"_rad": 1.0, "_m": 1.0, "_deg": 0.017453292519943295}
 
 
 def read_joint_angles(path: Path, joint_names: Sequence[str]) -> tuple[Array, Array]:
-    """Read the joint positions of a robot over time.
+    """Read time (T,), s, and joint positions (T, n), rad or m, of a robot.
 
-    Parameters
-    ----------
-    path : Path
-        CSV with a column ``time_s`` and one for each joint: ``<joint>_rad``,
-        ``<joint>_deg``, or ``<joint>_m`` of a sliding joint. Others are ignored.
-    joint_names : sequence of n str
-
-    Returns
-    -------
-    time : (T,) array
-        s, increasing.
-    q : (T, n) array
-        rad, or m; rows in which a value is missing are left out.
-
-    Raises
-    ------
-    FileError
-        When the file is no table of numbers, lacks a column or has fewer than two
-        rows, or the time does not increase.
+    A CSV with a column ``time_s`` and one for each joint: ``<joint>_rad``,
+    ``<joint>_deg``, or ``<joint>_m`` of a sliding joint. Others are ignored; rows in
+    which a value is missing are left out.
     """
     header, table = _number_table(path)
     columns = {"time_s": (header.index("time_s"), 1.0)} if "time_s" in header else {}

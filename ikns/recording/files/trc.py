@@ -33,12 +33,6 @@ def read_trc(path: Path) -> Recording:
 
     Times are computed from frame number and rate where these agree with the printed
     times to half a frame, as printed times are rounded; else the printed ones are used.
-
-    Raises
-    ------
-    FileError
-        When the file is not a tab-separated TRC file, or its content does not match
-        its header.
     """
     lines = text_lines(path)
     if not lines[0].startswith("PathFileType"):

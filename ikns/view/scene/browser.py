@@ -44,13 +44,6 @@ _LONGEST = 60.0  # s for one picture
 def find_browser(environ: Mapping[str, str] | None = None) -> str | None:
     """Path of a Chromium or Chrome: that in ``CHROME``, else the first on ``PATH``.
 
-    Parameters
-    ----------
-    environ : mapping, optional
-        Default: the environment of this process.
-
-    Examples
-    --------
     >>> find_browser({"PATH": ""}) is None
     True
     """
@@ -73,18 +66,10 @@ def browser_options() -> list[str]:
 def screenshot(
     browser: str, page: str, *, width: int, height: int, scale: float = 2.0
 ) -> bytes | None:
-    """Picture of a page as PNG, or None when the browser made none.
+    """Picture of a page of HTML as PNG, or None when the browser made none.
 
-    Parameters
-    ----------
-    browser : str
-        Path of the program.
-    page : str
-        HTML text.
-    width, height : int
-        Size of the window, in CSS pixels.
-    scale : float
-        Pixels of the picture per CSS pixel.
+    Width and height of the window are in CSS pixels, the scale is pixels of the picture
+    per CSS pixel.
     """
     with tempfile.TemporaryDirectory(
         prefix="ikns-view-", ignore_cleanup_errors=True

@@ -87,25 +87,12 @@ def object_command(
     shiny: bool = True,
     on_top: bool = False,
 ) -> Command:
-    """Draw a geometry.
+    """Draw a geometry as three.js has it, without uuid.
 
-    Parameters
-    ----------
-    path : str
-        Node that shows it.
-    geometry : dict
-        As three.js has it, without uuid.
-    color : color
-        Whatever matplotlib takes for one.
-    opacity : float
-        Below 1 it is translucent.
-    layer : int
-        Translucent objects are drawn in this order. Those that share a number above 0
-        are drawn as one body: where two overlap, only one is visible.
-    shiny : bool
-        Whether it is shaded and reflects light.
-    on_top : bool
-        Whether it is visible through objects in front of it.
+    Below an opacity of 1 it is translucent. Translucent objects are drawn in the order
+    of their layers. Those that share a number above 0 are drawn as one body: where two
+    overlap, only one is visible. A shiny object is shaded and reflects light, one on
+    top is visible through objects in front of it.
     """
     material: dict[str, Any] = {
         "uuid": f"{path}:material",

@@ -44,19 +44,7 @@ def finger_path(side: str) -> str:
 
 
 def with_finger(scene: Scene, skeleton: Skeleton, side: str) -> Scene:
-    """Add an open finger on a forearm to a scene with a body.
-
-    Parameters
-    ----------
-    scene : Scene
-    skeleton : Skeleton
-        Of the scene.
-    side : "right" or "left"
-
-    Returns
-    -------
-    Scene
-    """
+    """Add an open finger on the forearm of a side to a scene with a body."""
     base = finger_path(side)
     paths = _paths(base)
     last = max(paths.values(), key=len)

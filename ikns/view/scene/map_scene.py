@@ -56,10 +56,6 @@ def map_scene(
         Row of ``learned.centers_`` at which the body is drawn. Default: the point with
         the widest range.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     InvalidInput

@@ -17,31 +17,16 @@ _WIDTH, _HEIGHT, _SCALE = 1100, 800, 1.5
 
 
 class ScenePicture(NamedTuple):
-    """A picture and a note on how it was drawn.
-
-    Parameters
-    ----------
-    png : bytes
-    note : str or None
-        Why it is plainer than the page, and what to install; None from a browser.
-    """
+    """A picture and a note on how it was drawn."""
 
     png: bytes
-    note: str | None
+    note: str | None  # why it is plain and what to install; None from a browser
 
 
 def scene_picture(
     scene: Scene, *, environ: Mapping[str, str] | None = None
 ) -> ScenePicture:
-    """Draw a scene as it looks at its start.
-
-    Parameters
-    ----------
-    scene : Scene
-    environ : mapping, optional
-        Environment in which a browser is searched, see
-        :func:`ikns.view.scene.browser.find_browser`.
-    """
+    """Draw a scene as it looks at its start; `environ` is for :func:`find_browser`."""
     browser = find_browser(environ)
     if browser is None:
         note = f"the picture is drawn plainly: {HOW_TO_GET_ONE}"

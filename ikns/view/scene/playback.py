@@ -35,22 +35,14 @@ MOST_FRAMES = 18_000
 class Track:
     """How a node moves in its parent.
 
-    Parameters
-    ----------
-    path : str
-        The node.
-    position : (F, 3) array
-        m.
-    quaternion : (F, 4) array, optional
-        x, y, z, w; neighbors have one sign, as a player interpolates between them.
-    visible : (F,) boolean array, optional
-        Whether it is shown; a hidden node keeps its last place.
+    Neighboring quaternions have one sign, as a player interpolates between them. A
+    hidden node keeps its last place.
     """
 
     path: str
-    position: Array
-    quaternion: Array | None = None
-    visible: NDArray[np.bool_] | None = None
+    position: Array  # (F, 3) m
+    quaternion: Array | None = None  # (F, 4) x, y, z, w
+    visible: NDArray[np.bool_] | None = None  # (F,)
 
 
 def kept_frames(time: Array, *, rate: float = 30.0) -> NDArray[np.int64]:
@@ -58,8 +50,6 @@ def kept_frames(time: Array, *, rate: float = 30.0) -> NDArray[np.int64]:
 
     Never more than 18 000 (ten minutes at 30/s).
 
-    Examples
-    --------
     >>> kept_frames(np.arange(10) / 100.0)
     array([0, 3, 6, 9])
     """

@@ -72,10 +72,6 @@ def recording_scene(
     recording : Recording
         Gives the markers.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     InvalidInput

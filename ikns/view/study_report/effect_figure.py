@@ -25,15 +25,8 @@ def effect_figure(
 ) -> Figure:
     """Draw the 90 % interval against the margin, next to standardized effects.
 
-    Parameters
-    ----------
-    same : Equivalence or None
-        None: no margin was declared; that panel is left out.
-    effects : sequence of Effect
-        Standardized ones are drawn with their 95 % intervals.
-    quantity : str
-        Such as ``RMSE``.
-    simulated : bool
+    Without a declared margin the first panel is left out. Standardized effects are
+    drawn with their 95 % intervals; the quantity is such as ``RMSE``.
     """
     shown = [effect for effect in effects if not effect.unit]
     with figure_style():

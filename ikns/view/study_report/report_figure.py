@@ -47,22 +47,10 @@ def difference_figures(
     caption: str,
     simulated: bool,
 ) -> list[ReportFigure]:
-    """Draw the difference of every comparison that has effects.
+    """Draw the difference of every comparison of an experiment that has effects.
 
-    Parameters
-    ----------
-    experiment : str
-        For the names of the files.
-    comparisons : iterable
-        Of an experiment's summary.
-    equivalence : callable
-        Returns a comparison's test of equivalence, or None.
-    quantity : str
-        That is compared.
-    caption : str
-        After "A minus B".
-    simulated : bool
-        Whether the participants are.
+    `equivalence` returns a comparison's test of equivalence, or None; the caption
+    follows "A minus B".
     """
     return [
         ReportFigure(

@@ -13,14 +13,7 @@ __all__ = ["effects_table", "tests_table"]
 
 
 def tests_table(paper: Sequence[Any], others: Sequence[tuple[str, Any]]) -> Table:
-    """Return the sentences of all tests, the paper's first.
-
-    Parameters
-    ----------
-    paper : sequence of result or None
-        Of :mod:`ikns.statistics`, with a ``sentence()``.
-    others : sequence of (name, result or None)
-    """
+    """Return the sentences of all tests that there are, the paper's first, by name."""
     rows: list[list[Cell]] = [
         ["the paper's own", each.sentence()] for each in paper if each is not None
     ]

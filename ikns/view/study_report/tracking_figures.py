@@ -83,17 +83,7 @@ def _grid(
 ) -> tuple[Figure, list[tuple[str, str, Any]]]:
     """Figure over time with one panel a condition (rows) and trajectory (columns).
 
-    Parameters
-    ----------
-    found : TrackingSummary
-    title : str
-    height : float
-        Of a row, inches.
-
-    Returns
-    -------
-    figure : Figure
-    panels : list of (condition, trajectory, axes)
+    The height is that of a row, inches.
     """
     conditions, trajectories = found.conditions, found.trajectories
     figure = study_figure(

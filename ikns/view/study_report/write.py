@@ -89,13 +89,7 @@ def write_study_report(
 
     ``report.html`` loads nothing from elsewhere; ``figures/`` has each figure as PDF
     and SVG; ``numbers.json`` and ``tables/*.csv`` have every number and trial.
-
-    Parameters
-    ----------
-    folder : Path
-    summary : StudySummary
-    progress : callable
-        Called with (step, done, total).
+    `progress` is called with (step, done, total).
     """
     progress("drawing", 0, 1)
     page, drawn = study_page(summary)
