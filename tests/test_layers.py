@@ -9,7 +9,7 @@ import pytest
 # Lowest floor first. A room imports from lower floors and from itself; rooms on one
 # floor do not know each other.
 FLOORS = (
-    "errors",
+    "arrays errors",
     "_kernels output",
     "numerics",
     "recording finger statistics",

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices
 from ikns.body.model_file import urdf_folder
 from ikns.errors import FileError, MarkerMismatch
 
@@ -119,7 +119,7 @@ class MarkerSet:
         """Names of the markers, in order."""
         return tuple(marker.label for marker in self.markers)
 
-    def columns(self, labels: Sequence[str]) -> NDArray[np.int64]:
+    def columns(self, labels: Sequence[str]) -> Indices:
         """Find each marker among a recording's labels, (M,); -1 where it is missing.
 
         A subject prefix is ignored (``ADL001:RSHO1`` is ``RSHO1``), as is case, and an
@@ -147,9 +147,7 @@ class MarkerSet:
                 found[i] = matches[0]
         return found
 
-    def pick(
-        self, labels: Sequence[str], markers: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def pick(self, labels: Sequence[str], markers: Array) -> Array:
         """Sort a recording's markers into this set's order.
 
         Parameters
@@ -183,7 +181,7 @@ class MarkerSet:
         kept = set(labels)
         return replace(self, markers=tuple(m for m in self.markers if m.label in kept))
 
-    def at(self, positions: NDArray[np.float64]) -> MarkerSet:
+    def at(self, positions: Array) -> MarkerSet:
         """Return the set with markers at these positions, (M, 3) m in their links."""
         moved = tuple(
             replace(marker, position=(float(p[0]), float(p[1]), float(p[2])))

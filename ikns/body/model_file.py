@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.anthropometry import Segment
 from ikns.errors import FileError, InvalidInput
 
@@ -90,7 +90,7 @@ def segment_lengths(urdf: str) -> dict[str, float]:
     }
 
 
-def segment_ends(urdf: str) -> dict[str, NDArray[np.float64]]:
+def segment_ends(urdf: str) -> dict[str, Array]:
     """Joint that ends each limb segment, in its link's frame, (3,) m."""
     origins = _joint_origins(urdf)
     return {name: origins[end] for name, end in SEGMENTS.items() if end in origins}
@@ -199,7 +199,7 @@ def _set_inertial(link: ET.Element, inertial: Inertial) -> None:
     link.insert(0, element)
 
 
-def _joint_origins(urdf: str) -> dict[str | None, NDArray[np.float64]]:
+def _joint_origins(urdf: str) -> dict[str | None, Array]:
     """Place of each joint in its parent link, (3,) m, by joint name."""
     return {
         joint.get("name"): _vector(joint.find("origin"), "xyz")
@@ -207,7 +207,7 @@ def _joint_origins(urdf: str) -> dict[str | None, NDArray[np.float64]]:
     }
 
 
-def _vector(element: ET.Element | None, attribute: str) -> NDArray[np.float64]:
+def _vector(element: ET.Element | None, attribute: str) -> Array:
     if element is None:
         return np.zeros(3)
     return np.array([float(x) for x in element.get(attribute, "0 0 0").split()])
@@ -218,6 +218,6 @@ def _scale(element: ET.Element | None, attribute: str, factor: float) -> None:
         element.set(attribute, _text(factor * _vector(element, attribute)))
 
 
-def _text(values: NDArray[np.float64]) -> str:
+def _text(values: Array) -> str:
     # Adding zero turns -0 into 0.
     return " ".join(f"{value + 0.0:.9g}" for value in values)

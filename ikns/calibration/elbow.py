@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 
 __all__ = ["elbow_reference"]
-
-Array = NDArray[np.float64]
 
 #: Angle step of the central difference, rad: its error is of the order of the step
 #: squared (1e-10 m/rad), that of rounding 1e-16 m over the step (1e-11 m/rad).

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Mask
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.scaling import ScalingReport
@@ -40,7 +40,7 @@ def static_report(static: Recording, scaling: ScalingReport) -> dict[str, Any]:
 
 
 def exploration_report(
-    recording: Recording, motion: Motion, gate: NDArray[np.bool_]
+    recording: Recording, motion: Motion, gate: Mask
 ) -> dict[str, Any]:
     """How well a recording was tracked and how much of it is still."""
     residual = motion.residual[np.isfinite(motion.residual)]
@@ -81,9 +81,7 @@ def points_report(learned: NullSpaceMap, *, rate: float) -> list[dict[str, Any]]
 
 
 def extrinsic_report(
-    skeleton: Skeleton,
-    pairs: Sequence[tuple[Motion, NDArray[np.bool_]]],
-    chain: str,
+    skeleton: Skeleton, pairs: Sequence[tuple[Motion, Mask]], chain: str
 ) -> dict[str, Any]:
     """Motion of thorax and joints outside the chain while the hand was still.
 

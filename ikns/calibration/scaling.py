@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.size_fit import (
@@ -19,8 +20,6 @@ from ikns.calibration.static_trial import seen_markers, static_posture
 from ikns.recording.recording import Recording
 
 __all__ = ["ScalingReport", "scale"]
-
-Array = NDArray[np.float64]
 
 #: A marker that the static trial does not show is kept only where its nominal place is
 #: known this well, standard deviation of all directions together, m: on landmarks, not

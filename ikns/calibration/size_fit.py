@@ -19,9 +19,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.static_trial import seen_markers
@@ -39,8 +39,6 @@ __all__ = [
     "size_covariance",
     "size_factors",
 ]
-
-Array = NDArray[np.float64]
 
 #: Error of a marker's mean position over the trial, m: 0.1 to 1 mm of it is that of the
 #: cameras, the rest comes from segments that are not quite rigid.
@@ -152,10 +150,10 @@ def _assemble(
     by_size: Array,
     by_place: Array,
     by_pose: Array,
-    seen: NDArray[np.bool_],
+    seen: Mask,
     weight: Array,
     placement: Array,
-    free: NDArray[np.int64],
+    free: Indices,
 ) -> Array:
     """Jacobian of the residuals, columns sizes, marker offsets, free pose."""
     n_seen, n_markers, n_sizes = int(seen.sum()), len(seen), by_size.shape[2]

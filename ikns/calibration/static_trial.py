@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Mask
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
@@ -16,8 +16,6 @@ from ikns.numerics.rigid import rigid_transform
 from ikns.recording.recording import Recording
 
 __all__ = ["seen_markers", "static_posture"]
-
-Array = NDArray[np.float64]
 
 #: With this many frames that show every marker only these are averaged; noise is then a
 #: third.
@@ -106,6 +104,6 @@ def _absent_joints(
     return tuple(joint for joint in absent if joint not in worn.held)
 
 
-def seen_markers(markers: Array) -> NDArray[np.bool_]:
+def seen_markers(markers: Array) -> Mask:
     """Which markers (..., 3) were seen, (...)."""
     return np.asarray(np.isfinite(markers).all(axis=-1))

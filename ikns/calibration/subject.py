@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import chain_joints
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
@@ -77,7 +77,7 @@ class Subject:
     chain: str
     report: dict[str, Any]
     motions: tuple[Motion, ...] = field(default=(), repr=False)
-    samples: NDArray[np.float64] | None = field(default=None, repr=False)
+    samples: Array | None = field(default=None, repr=False)
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Write the subject folder, completely or not at all.
@@ -228,7 +228,7 @@ def _read_xml(path: Path) -> str:
     return text
 
 
-def _read_samples(path: Path, *, n_points: int) -> NDArray[np.float64] | None:
+def _read_samples(path: Path, *, n_points: int) -> Array | None:
     """Read the still samples; None where a folder has none."""
     if not path.exists():
         return None

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Indices
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.nullspace.map import still_mask
@@ -17,10 +18,10 @@ __all__ = ["SwivelSamples", "swivel_samples"]
 class SwivelSamples(NamedTuple):
     """The still samples that a map was learned from, with the true swivel."""
 
-    hand: NDArray[np.float64]  # (N, 3) m in the thorax frame
-    labels: NDArray[np.int64]  # (N,) PCA point, -1 for none
-    c: NDArray[np.float64]  # (N,) control signal, not clipped
-    swivel: NDArray[np.float64]  # (N,) true elbow swivel, rad
+    hand: Array  # (N, 3) m in the thorax frame
+    labels: Indices  # (N,) PCA point, -1 for none
+    c: Array  # (N,) control signal, not clipped
+    swivel: Array  # (N,) true elbow swivel, rad
     correlations: list[float]  # of c and swivel at each of P points
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.motion.motion import Motion
 from ikns.numerics.median import finite_median
 
@@ -23,7 +23,7 @@ class MotionTable(NamedTuple):
     """
 
     columns: list[str]
-    rows: NDArray[np.float64]  # (T, columns); NaN where not seen
+    rows: Array  # (T, columns); NaN where not seen
     range_deg: dict[str, tuple[float, float]]  # of every joint; NaN for one never seen
     summary: dict[str, Any]  # frames, residual (m), held joints; ready for JSON
 

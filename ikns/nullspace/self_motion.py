@@ -6,17 +6,16 @@ Postures are joint angles alone, (18,) or (N, 18) rad; hands are seen from the t
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import null_projector
 
 __all__ = ["posture_at_point", "postures_along", "self_motion", "visited_posture"]
-
-Array = NDArray[np.float64]
 
 #: An arm resting on a table in front, rad.
 _REST = {

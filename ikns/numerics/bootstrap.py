@@ -20,9 +20,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
+from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
 __all__ = [
@@ -32,8 +33,6 @@ __all__ = [
     "length_interval",
     "student_interval",
 ]
-
-Array = NDArray[np.float64]
 
 #: Least number of blocks; fewer hardly determine their own spread.
 _LEAST_BLOCKS = 3
@@ -104,7 +103,7 @@ def _length_of_one(x: Array, most: int) -> int:
 
 def block_rows(
     n: int, length: int, resamples: int, rng: np.random.Generator
-) -> NDArray[np.int64]:
+) -> Indices:
     """Draw blocks of neighboring rows of `n`, wrapping around the end, (resamples, n).
 
     The last block of each series is cut to fit.

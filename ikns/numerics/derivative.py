@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
+
+from ikns.arrays import Array, Mask
 
 __all__ = ["slope"]
 
@@ -18,11 +19,7 @@ _MOST_VARIANCE = 2.0
 _BATCH = 2048
 
 
-def slope(
-    values: NDArray[np.float64],
-    time: NDArray[np.float64],
-    known: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
+def slope(values: Array, time: Array, known: Mask | None = None) -> Array:
     """Time derivative by a moving parabola (Savitzky and Golay 1964).
 
     Of values (T, ...) at evenly spaced times (T,), s. The parabola is fitted over
@@ -69,9 +66,9 @@ def slope(
 
 
 def _mend(
-    found: NDArray[np.float64],
-    values: NDArray[np.float64],
-    known: NDArray[np.bool_],
+    found: Array,
+    values: Array,
+    known: Mask,
     columns: list[int],
     window: int,
     step: float,
@@ -93,9 +90,7 @@ def _mend(
         found[batch[:, None], columns] = fitted
 
 
-def _weights(
-    x: NDArray[np.float64], known: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _weights(x: Array, known: Mask) -> tuple[Array, Array]:
     """Of values at x (N, w) in the slope at 0 of their parabola, and its variance.
 
     Of values with a variance of 1; NaN where fewer than three are known.

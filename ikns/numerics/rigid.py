@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+
+from ikns.arrays import Array
 
 __all__ = ["pose_steps", "rigid_transform"]
 
 
-def rigid_transform(
-    source: NDArray[np.float64], target: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def rigid_transform(source: Array, target: Array) -> tuple[Array, Array]:
     """Rotation (3, 3) and shift that best map points (N, 3) to points (Kabsch 1976).
 
     ``target ~ source @ rotation.T + shift``, with N >= 3.
@@ -23,7 +22,7 @@ def rigid_transform(
     return rotation, b - rotation @ a
 
 
-def pose_steps(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def pose_steps(poses: Array) -> Array:
     """Return the step from each pose to the next, as seen from the first of the two.
 
     The logarithm of the motion between them, ``log(T_0^-1 T_1)``: with the rotation

@@ -16,10 +16,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ikns._kernels.null_space import write_bases
 from ikns._kernels.principal_angles import write_principal_angles
+from ikns._kernels.row_space import write_bases
+from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
 __all__ = [
@@ -37,7 +38,7 @@ __all__ = [
 _DEPENDENT = 1e-12
 
 
-def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
+def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> Array:
     """Orthonormal basis of the joint motions that leave a task unchanged.
 
     Parameters
@@ -67,9 +68,7 @@ def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64
     return basis
 
 
-def null_spaces(
-    jacobians: ArrayLike, *, rtol: float = 1e-9
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def null_spaces(jacobians: ArrayLike, *, rtol: float = 1e-9) -> tuple[Array, Indices]:
     """Orthonormal bases of many null spaces, of any rank.
 
     Parameters
@@ -112,7 +111,7 @@ def null_spaces(
     return basis.reshape(*batch, *basis.shape[1:]), rank.reshape(batch)
 
 
-def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
+def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> Array:
     """Orthogonal projectors (..., n, n) onto null spaces, of any rank.
 
     ``P`` with ``P @ P == P``, ``jacobian @ P == 0`` and trace ``n - rank``; NaN for
@@ -124,7 +123,7 @@ def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.flo
     return projector
 
 
-def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
+def principal_angles(A: ArrayLike, B: ArrayLike) -> Array:
     """Principal angles between two subspaces, accurate from tiny to right angles.
 
     The method is that of :mod:`ikns._kernels.principal_angles`. Rows of A (..., p, n)
@@ -152,7 +151,7 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
 
 def mean_null_direction(
     jacobians: ArrayLike, d: int = 1, *, rtol: float = 1e-9
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Null space averaged over visited postures with finite Jacobians (N, k, n).
 
     The mean of the null-space projectors has eigenvalues between 0 and 1: an
@@ -183,9 +182,7 @@ def mean_null_direction(
     return directions, np.clip(values[::-1], 0.0, 1.0)
 
 
-def principal_components(
-    rows: NDArray[np.float64], *, centered: bool = True
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def principal_components(rows: Array, *, centered: bool = True) -> tuple[Array, Array]:
     """Principal components of vectors (N, n), about their mean or about zero.
 
     Returns
@@ -204,13 +201,13 @@ def principal_components(
     return vectors[:, ::-1].T, variances / variances.sum()
 
 
-def largest_entry_positive(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def largest_entry_positive(rows: Array) -> Array:
     """Rows (d, n), negated where their entry of largest magnitude is negative."""
     largest = np.take_along_axis(rows, np.abs(rows).argmax(axis=1)[:, None], axis=1)
     return np.where(largest < 0, -rows, rows)
 
 
-def _flat(matrices: NDArray[np.float64], batch: tuple[int, ...]) -> NDArray[np.float64]:
+def _flat(matrices: Array, batch: tuple[int, ...]) -> Array:
     """Matrices as (N, k, n), in the memory layout that kernels are compiled for."""
     shape = matrices.shape[-2:]
     every = np.broadcast_to(matrices, (*batch, *shape))
@@ -218,7 +215,7 @@ def _flat(matrices: NDArray[np.float64], batch: tuple[int, ...]) -> NDArray[np.f
     return every.reshape(math.prod(batch), *shape)
 
 
-def _orthonormal_rows(rows: ArrayLike) -> NDArray[np.float64]:
+def _orthonormal_rows(rows: ArrayLike) -> Array:
     array = np.asarray(rows, dtype=np.float64)
     if array.ndim < 2 or 0 in array.shape[-2:] or not np.isfinite(array).all():
         raise InvalidInput(

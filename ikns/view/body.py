@@ -6,16 +6,15 @@ All coordinates are meters in the thorax frame: X forward, Y up, Z right.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 
 __all__ = ["arm_points", "body_surfaces"]
-
-Array = NDArray[np.float64]
 
 # Girth of the drawing as fractions of the shoulder-to-shoulder distance, read off the
 # shapes of urdf/upper_body.urdf. Nothing is computed from it.

@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ikns.analysis.compare import Crosstalk, NullSpaceComparison
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.style import BLUE, GREY, INK, MARKS, figure_style, new_figure
 
 __all__ = ["comparison_figure"]
-
-Array = NDArray[np.float64]
 
 
 def comparison_figure(

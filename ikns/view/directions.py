@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.style import (
     BLUE,
@@ -22,8 +23,6 @@ from ikns.view.style import (
 )
 
 __all__ = ["directions_figure", "principal_angle_figure"]
-
-Array = NDArray[np.float64]
 
 _COLUMNS = 5
 _MARKS = (*MARKS, (RED, "v"))
@@ -100,10 +99,7 @@ def directions_figure(
 
 
 def principal_angle_figure(
-    angles: Mapping[str, ArrayLike],
-    *,
-    simulated: bool,
-    goal: float | None = None,
+    angles: Mapping[str, ArrayLike], *, simulated: bool, goal: float | None = None
 ) -> Figure:
     """Draw the angle between learned and analytic null space at every PCA point.
 

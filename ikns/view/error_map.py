@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Mask
 from ikns.errors import InvalidInput
 from ikns.view.style import GREY, INK, PAGE_WIDTH, PALE, figure_style, new_figure
 
 __all__ = ["Slices", "error_map_figure", "workspace_slices"]
-
-Array = NDArray[np.float64]
 
 _MARGIN = 0.03  # m around the PCA points
 
@@ -139,7 +138,7 @@ def _where(height: float) -> str:
     return f"{100 * abs(height):.0f} cm {side} the notch"
 
 
-def _draw_points(axes: Any, points: Array, here: NDArray[np.bool_]) -> None:
+def _draw_points(axes: Any, points: Array, here: Mask) -> None:
     for k in np.flatnonzero(here):
         forward, _, right = points[k]
         axes.plot(right, forward, "o", color="white", mec=INK, mew=0.9, ms=10)

@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.arrays import same_length, series
 from ikns.view.style import BLUE, GREY, PALE, RED, figure_style, new_figure
 
 __all__ = ["residual_figure"]
-
-Array = NDArray[np.float64]
 
 
 def residual_figure(

@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Mask
 from ikns.view.arrays import same_length, series
 from ikns.view.style import BLUE, GREY, INK, figure_style, new_figure, point_color
 
 __all__ = ["control_figure", "swivel_figure"]
-
-Array = NDArray[np.float64]
 
 _COLUMNS = 5
 #: Widest axis of c: outside the volume c has no bound.
@@ -136,7 +135,7 @@ def control_figure(
     return figure
 
 
-def _shade(axes: Any, time: Array, where: NDArray[np.bool_]) -> None:
+def _shade(axes: Any, time: Array, where: Mask) -> None:
     """Shade the time intervals in which `where` holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
     if not edges.size:

@@ -6,15 +6,14 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.arrays import same_length, series
 from ikns.view.style import BLUE, GREY, INK, ORANGE, figure_style, new_figure
 
 __all__ = ["variance_split_figure"]
-
-Array = NDArray[np.float64]
 
 _AXIS = {"time": "normalized time (%)", "points": "PCA point"}
 

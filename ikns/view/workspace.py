@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.colors import LightSource, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.arrays import outward
 from ikns.view.body import body_surfaces
@@ -24,8 +25,6 @@ from ikns.view.style import (
 )
 
 __all__ = ["workspace_figure"]
-
-Array = NDArray[np.float64]
 
 #: Thorax frame (X forward, Y up, Z right) to the drawing's right, forward, up.
 _TO_DRAWING = [2, 0, 1]

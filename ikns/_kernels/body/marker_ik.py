@@ -13,14 +13,14 @@ centimeters Gauss-Newton needs many times as many steps.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.body.descent import copy, descend, errors_at
 from ikns._kernels.body.marker_errors import take_markers
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
 from ikns._kernels.body.rigid import rigid_pose
-from ikns._kernels.body.tree import FREE_FLYER, Floats, Indices
+from ikns._kernels.body.tree import FREE_FLYER
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices, Mask
 
 __all__ = ["INFINITE", "solve_frame", "solve_frames"]
 
@@ -31,18 +31,18 @@ INFINITE = -1
 @compiled
 def solve_frames(
     whole: Indices,
-    real: Floats,
-    markers: Floats,
+    real: Array,
+    markers: Array,
     first: int,
     last: int,
     way: int,
-    before: Floats,
+    before: Array,
     from_scratch: bool,
-    work: Floats,
-    q: Floats,
-    residual: Floats,
+    work: Array,
+    q: Array,
+    residual: Array,
     iterations: Indices,
-    converged: NDArray[np.bool_],
+    converged: Mask,
 ) -> None:
     """Solve frames from `first` to before `last`, `way` (1 or -1) one after the other.
 
@@ -68,7 +68,7 @@ def solve_frames(
 
 
 @compiled
-def _finite(q: Floats) -> bool:
+def _finite(q: Array) -> bool:
     total = 0.0
     for i in range(len(q)):
         total += q[i] - q[i]
@@ -79,10 +79,10 @@ def _finite(q: Floats) -> bool:
 def solve_frame(
     problem: MarkerProblem,
     s: Scratch,
-    seen: Floats,
-    before: Floats,
+    seen: Array,
+    before: Array,
     from_scratch: bool,
-    q: Floats,
+    q: Array,
 ) -> tuple[float, int, bool]:
     """Write the solution of one frame, (nq,); return residual, iterations, converged.
 
@@ -127,7 +127,7 @@ def solve_frame(
 
 @compiled
 def _sum_by_limb(
-    branch: Indices, weight: Floats, error: Floats, residuals: Floats
+    branch: Indices, weight: Array, error: Array, residuals: Array
 ) -> None:
     """Write each limb's squared errors after the first entry."""
     for b in range(1, len(residuals)):
@@ -139,9 +139,7 @@ def _sum_by_limb(
 
 
 @compiled
-def _join_limbs(
-    branch: Indices, solved: Floats, residuals: Floats, start: Floats
-) -> None:
+def _join_limbs(branch: Indices, solved: Array, residuals: Array, start: Array) -> None:
     """Write the best solution, with each limb from the solution that fits it best."""
     best = 0
     for k in range(len(solved)):

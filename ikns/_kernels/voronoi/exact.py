@@ -15,10 +15,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.double_double import difference
+from ikns.arrays import Array, Indices
 
 __all__ = [
     "CENTER",
@@ -36,9 +36,6 @@ __all__ = [
     "sign_of",
     "values",
 ]
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Sites are cut off to steps of this size.
 _FINEST = 2.0**-100
@@ -106,11 +103,11 @@ _TERM = np.array([term for stage in _STAGES for _, terms in stage for term in te
 class Sites(NamedTuple):
     """N sites, as the predicates want them."""
 
-    x: Floats  # (N, 3)
-    grain: Floats  # (N,) powers of two that a site's coordinates are multiples of
+    x: Array  # (N, 3)
+    grain: Array  # (N,) powers of two that a site's coordinates are multiples of
 
 
-def on_lattice(points: Floats) -> Sites:
+def on_lattice(points: Array) -> Sites:
     """Sites (N, 3), at most 2**10 wide, cut off to steps of 2**-100."""
     x = np.trunc(points / _FINEST) * _FINEST
     fraction, exponent = np.frexp(x)
@@ -122,7 +119,7 @@ def on_lattice(points: Floats) -> Sites:
 
 @compiled
 def determinants(
-    sites: Sites, R: Integers, a: int, b: int, c: int, d: int, e: int, last: int
+    sites: Sites, R: Indices, a: int, b: int, c: int, d: int, e: int, last: int
 ) -> tuple[float, int]:
     """Compute the rows of all stages up to the last one, for five sites.
 
@@ -147,7 +144,7 @@ def determinants(
 
 
 @compiled
-def _load(R: Integers, row: int, a: float, b: float, step: float, n: int) -> None:
+def _load(R: Indices, row: int, a: float, b: float, step: float, n: int) -> None:
     """Write b - a in n digits."""
     high, rest = difference(b, a)
     high, rest = high / step, rest / step
@@ -160,7 +157,7 @@ def _load(R: Integers, row: int, a: float, b: float, step: float, n: int) -> Non
 
 
 @compiled
-def _carry(R: Integers, row: int, n: int) -> None:
+def _carry(R: Indices, row: int, n: int) -> None:
     """Bring the digits of a row back into their range."""
     carry = 0
     for i in range(n - 1):
@@ -171,7 +168,7 @@ def _carry(R: Integers, row: int, n: int) -> None:
 
 
 @compiled
-def _compute(R: Integers, last: int, n: int) -> None:
+def _compute(R: Indices, last: int, n: int) -> None:
     """Compute the rows of all stages up to the last from vectors of n digits."""
     for r in range(_STAGE_BEGIN[last + 1]):
         row = _ROW[r]
@@ -189,7 +186,7 @@ def _compute(R: Integers, last: int, n: int) -> None:
 
 
 @compiled
-def sign_of(R: Integers, row: int, n: int) -> int:
+def sign_of(R: Indices, row: int, n: int) -> int:
     """Sign of a row computed for vectors of n digits."""
     for i in range(_DEGREE[row] * n - 1, -1, -1):
         if R[row, i] != 0:
@@ -199,7 +196,7 @@ def sign_of(R: Integers, row: int, n: int) -> int:
 
 @compiled
 def values(
-    sites: Sites, fives: Integers, last: int, row: int, value: Floats, rest: Floats
+    sites: Sites, fives: Indices, last: int, row: int, value: Array, rest: Array
 ) -> None:
     """Write M rows, from `row` on, of K sets of five sites, by the stages up to `last`.
 
@@ -215,7 +212,7 @@ def values(
 
 
 @compiled
-def _value(R: Integers, row: int, step: float, n: int) -> tuple[float, float]:
+def _value(R: Indices, row: int, step: float, n: int) -> tuple[float, float]:
     top = _DEGREE[row] * n - 1
     while top > 0 and R[row, top] == 0:
         top -= 1

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ikns.arrays import Array, Indices
 
 __all__ = ["insertion_order"]
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
-
-def insertion_order(points: Floats) -> Integers:
+def insertion_order(points: Array) -> Indices:
     """Biased randomized insertion order: most sites are close to the one before.
 
     First four far apart. Then random rounds, each of half of what is left, so that no
@@ -30,7 +28,7 @@ def insertion_order(points: Floats) -> Integers:
     return np.lexsort([curve, rounds])
 
 
-def _far_apart(points: Floats) -> list[int]:
+def _far_apart(points: Array) -> list[int]:
     """Four sites that span space, as far as rounding can tell."""
     u = points - points[0]
     found = [0, int((u * u).sum(axis=1).argmax())]

@@ -6,19 +6,17 @@ The Voronoi face of an edge has the Voronoi edges of these facets as its sides.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.delaunay import OUTWARD
+from ikns.arrays import Indices
 
 __all__ = ["list_facets", "list_sides"]
 
-Integers = NDArray[np.int64]
-
 
 def list_facets(
-    simplices: Integers, neighbors: Integers
-) -> tuple[Integers, Integers, Integers]:
+    simplices: Indices, neighbors: Indices
+) -> tuple[Indices, Indices, Indices]:
     """Every facet once, turned away from the tetrahedron behind it.
 
     Returns their sites (F, 3), counterclockwise from ahead, and the tetrahedra behind
@@ -33,8 +31,8 @@ def list_facets(
 
 
 def list_sides(
-    facets: Integers, behind: Integers, ahead: Integers, outside: int
-) -> tuple[Integers, Integers, Integers, Integers, Integers, Integers]:
+    facets: Indices, behind: Indices, ahead: Indices, outside: int
+) -> tuple[Indices, Indices, Indices, Indices, Indices, Indices]:
     """Sides of each edge's face, counterclockwise; from the ray, if there is one.
 
     Counterclockwise about an edge in the direction of the facet's turn, its Voronoi
@@ -59,11 +57,11 @@ def list_sides(
 
 @compiled
 def sort_sides(
-    begin: Integers,
+    begin: Indices,
     outside: int,
-    side_facet: Integers,
-    entering: Integers,
-    leaving: Integers,
+    side_facet: Indices,
+    entering: Indices,
+    leaving: Indices,
 ) -> None:
     """Sort the sides of each face: each starts where the last one ends."""
     for e in range(len(begin) - 1):

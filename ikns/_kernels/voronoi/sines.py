@@ -13,33 +13,30 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.double_double import difference, double_double_dot
+from ikns.arrays import Array, Indices
 
 __all__ = ["sines"]
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @compiled
 def sines(
-    x: Floats,
-    facets: Integers,
-    behind: Integers,
-    normal: Floats,
-    normal_rest: Floats,
-    area: Floats,
-    edges: Integers,
-    begin: Integers,
-    side_facet: Integers,
-    entering: Integers,
+    x: Array,
+    facets: Indices,
+    behind: Indices,
+    normal: Array,
+    normal_rest: Array,
+    area: Array,
+    edges: Indices,
+    begin: Indices,
+    side_facet: Indices,
+    entering: Indices,
     canceled: float,
-    first: Integers,
-    second: Integers,
-    sine: Floats,
+    first: Indices,
+    second: Indices,
+    sine: Array,
 ) -> None:
     """Write the pairs of sides of each face, edge by edge, and their sines.
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import hypot
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.anthropometry.measures import check_stature, expected_measure
 from ikns.body.anthropometry.shoulder import clavicle_length, shoulder_joints
 from ikns.body.anthropometry.tables import row, subjects
@@ -106,9 +107,7 @@ def length_uncertainty(sex: str) -> dict[str, float]:
     return spread
 
 
-def person_length(
-    name: str, stature: ArrayLike, surface: ArrayLike, sex: str
-) -> NDArray[np.float64]:
+def person_length(name: str, stature: ArrayLike, surface: ArrayLike, sex: str) -> Array:
     """Length of a limb segment of a person whose surface measure is known, meters.
 
     ``expected length(stature) * surface / expected surface(stature)``: the ratio to the

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.anthropometry.tables import row
 from ikns.errors import InvalidInput
 
@@ -28,19 +29,19 @@ MASS_LIMITS = (25.0, 250.0)
 BIACROMIAL_LIMITS = (0.2, 0.6)
 
 
-def check_stature(stature: ArrayLike) -> NDArray[np.float64]:
+def check_stature(stature: ArrayLike) -> Array:
     """Return stature as an array, m, or refuse it outside :data:`STATURE_LIMITS`."""
     return _within(
         stature, STATURE_LIMITS, "stature", "m", "did you give centimeters or feet?"
     )
 
 
-def check_mass(mass: ArrayLike) -> NDArray[np.float64]:
+def check_mass(mass: ArrayLike) -> Array:
     """Return mass as an array, kg, or refuse it outside :data:`MASS_LIMITS`."""
     return _within(mass, MASS_LIMITS, "mass", "kg", "did you give grams or pounds?")
 
 
-def check_biacromial(breadth: ArrayLike) -> NDArray[np.float64]:
+def check_biacromial(breadth: ArrayLike) -> Array:
     """Return biacromial breadth as an array, m, or refuse it likewise."""
     return _within(
         breadth,
@@ -51,7 +52,7 @@ def check_biacromial(breadth: ArrayLike) -> NDArray[np.float64]:
     )
 
 
-def expected_measure(name: str, stature: ArrayLike, sex: str) -> NDArray[np.float64]:
+def expected_measure(name: str, stature: ArrayLike, sex: str) -> Array:
     """Mean of an ANSUR II measure among people of a stature, meters.
 
     The regression line ``mean + r * sd / sd_stature * (stature - mean_stature)`` of a
@@ -66,7 +67,7 @@ def expected_measure(name: str, stature: ArrayLike, sex: str) -> NDArray[np.floa
 
 def _within(
     value: ArrayLike, limits: tuple[float, float], what: str, unit: str, hint: str
-) -> NDArray[np.float64]:
+) -> Array:
     low, high = limits
     try:
         number = np.asarray(value, dtype=np.float64)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.anthropometry.lengths import (
     LIMB_SEGMENTS,
     expected_lengths,
@@ -198,9 +198,7 @@ def _trunk_head(stature: float, mass: float, sex: str, girdle: Segment) -> Segme
     )
 
 
-def _combine(
-    parts: list[tuple[float, float, NDArray[np.float64]]],
-) -> tuple[float, float, NDArray[np.float64]]:
+def _combine(parts: list[tuple[float, float, Array]]) -> tuple[float, float, Array]:
     """Combine bodies with centers on one vertical; a negative mass is subtracted."""
     total = sum(mass for mass, _, _ in parts)
     up = sum(mass * height for mass, height, _ in parts) / total

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.anthropometry.measures import (
     check_biacromial,
     check_stature,
@@ -17,7 +18,7 @@ __all__ = ["clavicle_length", "shoulder_joints"]
 
 def shoulder_joints(
     stature: ArrayLike, sex: str, *, biacromial: ArrayLike | None = None
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Array]:
     """Joints and acromion of the right shoulder girdle of a person who stands upright.
 
     No table gives the glenohumeral center's distance from the midline, so it is half
@@ -59,7 +60,7 @@ def shoulder_joints(
     else:
         breadth = check_biacromial(biacromial)
 
-    def offset(name: str) -> NDArray[np.float64]:
+    def offset(name: str) -> Array:
         return np.asarray(row("shoulder", name, sex=sex)["offset"])
 
     lateral = breadth / 2 - offset("acromion_to_glenohumeral") * height
@@ -75,7 +76,7 @@ def shoulder_joints(
 
 def clavicle_length(
     stature: ArrayLike, sex: str, *, biacromial: ArrayLike | None = None
-) -> NDArray[np.float64]:
+) -> Array:
     """Distance from the sternoclavicular to the glenohumeral joint center, meters.
 
     Parameters and errors as in :func:`shoulder_joints`; () or (N,) array.

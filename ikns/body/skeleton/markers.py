@@ -6,15 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS, segment_ends
 from ikns.errors import MarkerMismatch
 
 __all__ = ["Markers", "grown_positions", "part_along"]
-
-Array = NDArray[np.float64]
 
 
 class Markers:

@@ -11,17 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array, Indices
 from ikns.body.skeleton.frames import LinkFrames
 from ikns.body.skeleton.model import build_model, read_urdf
 from ikns.errors import FileError, InvalidInput
 from ikns.numerics.subspace import null_spaces
 
 __all__ = ["Robot"]
-
-Array = NDArray[np.float64]
 
 #: How many of a robot's links an error names.
 _NAMED = 12
@@ -147,7 +146,7 @@ class Robot:
 
     def null_spaces(
         self, q: ArrayLike, *, task: str = "pose", rtol: float = 1e-9
-    ) -> tuple[Array, NDArray[np.int64]]:
+    ) -> tuple[Array, Indices]:
         """Joint motions that leave the frame where it is.
 
         Returns

@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array, Indices
 from ikns.body.anthropometry import Segment, segments
 from ikns.body.chains import SIDES
 from ikns.body.marker_set import MarkerSet
@@ -40,8 +41,6 @@ from ikns.errors import InvalidInput
 from ikns.numerics.subspace import null_spaces
 
 __all__ = ["Skeleton"]
-
-Array = NDArray[np.float64]
 
 
 class Skeleton:
@@ -198,7 +197,7 @@ class Skeleton:
         """Return the tangent step that leads from `q0` to `q1`."""
         return np.array(pin.difference(self._model, q0, q1))
 
-    def columns(self, joints: tuple[str, ...]) -> NDArray[np.int64]:
+    def columns(self, joints: tuple[str, ...]) -> Indices:
         """Columns of the tangent space that belong to these joints."""
         unknown = [joint for joint in joints if joint not in self.joint_names]
         if unknown:
@@ -211,7 +210,7 @@ class Skeleton:
         return self._frames.tree
 
     @cached_property
-    def tree_markers(self) -> tuple[NDArray[np.int64], Array]:
+    def tree_markers(self) -> tuple[Indices, Array]:
         """Each marker's joint in the tree, (M,), and place in its frame, (M, 3) m."""
         joint = self._markers.joint - 1
         turned = self._frames.turned[joint]
@@ -291,7 +290,7 @@ class Skeleton:
 
     def null_spaces(
         self, q: ArrayLike, chain: str, *, task: str = "pose", rtol: float = 1e-9
-    ) -> tuple[Array, NDArray[np.int64]]:
+    ) -> tuple[Array, Indices]:
         """Joint motions of a chain that leave its hands where they are.
 
         Parameters

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from ikns._kernels.body.tree import FREE_FLYER, PRISMATIC, REVOLUTE, Tree
+from ikns.arrays import Array
 
 __all__ = ["joint_tree"]
-
-Array = NDArray[np.float64]
 
 
 def joint_tree(model: pin.Model) -> tuple[Tree, Array]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import threading
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.body.marker_ik import solve_frames
 from ikns._kernels.body.marker_problem import MarkerProblem, pack, scratch_size
 from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array, Indices
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.pose import (
@@ -24,8 +24,6 @@ from ikns.motion.marker_ik.pose import (
 )
 
 __all__ = ["KernelSolver", "marker_problem", "tree_paths"]
-
-Array = NDArray[np.float64]
 
 
 def marker_problem(
@@ -110,13 +108,12 @@ class KernelSolver:
         stand for an infinite marker, an infinite residual for a pose before that is not
         finite.
         """
-        start, scratch = (
-            (before, False) if before is not None else (self._neutral, True)
-        )
+        scratch = before is None
+        start = self._neutral if before is None else before
         solve_frames(*self.packed, markers, *span, start, scratch, self.work, *frames)
 
 
-def tree_paths(tree: Tree) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def tree_paths(tree: Tree) -> tuple[Indices, Indices]:
     """Each degree of freedom's way from the root; see the kernels' `tree_cholesky`."""
     ways: list[list[int]] = []
     for d, parent in enumerate(tree.dof_parent.tolist()):

@@ -15,8 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
@@ -38,8 +39,6 @@ from ikns.numerics.rigid import pose_steps
 from ikns.recording.recording import Recording
 
 __all__ = ["MarkerIK"]
-
-Array = NDArray[np.float64]
 
 #: Frames between two reports of progress: milliseconds.
 _CHUNK = 500

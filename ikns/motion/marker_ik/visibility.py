@@ -12,8 +12,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import SIDES, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import MarkerMismatch
@@ -36,8 +36,8 @@ class Visibility(NamedTuple):
     """What the markers of T frames show."""
 
     segments: tuple[str, ...]  # S links that carry markers, and the thorax
-    seen: NDArray[np.bool_]  # (T, S) whether each is in sight
-    known: NDArray[np.bool_]  # (T, J) whether each joint angle is known
+    seen: Mask  # (T, S) whether each is in sight
+    known: Mask  # (T, J) whether each joint angle is known
 
 
 class _Segment(NamedTuple):
@@ -59,7 +59,7 @@ def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], in
     }
 
 
-def visible_segments(skeleton: Skeleton, markers: NDArray[np.float64]) -> Visibility:
+def visible_segments(skeleton: Skeleton, markers: Array) -> Visibility:
     """Say which segments markers (T, M, 3) show, and which joints are known.
 
     While an arm is in sight from the thorax to the hand, all its joints are known.
@@ -80,7 +80,7 @@ def visible_segments(skeleton: Skeleton, markers: NDArray[np.float64]) -> Visibi
     }
     seen = {link: count[link] >= segment.need for link, segment in segments.items()}
     determined = {"thorax": seen["thorax"]}
-    known: NDArray[np.bool_] = np.zeros((n, len(skeleton.joint_names)), dtype=bool)
+    known: Mask = np.zeros((n, len(skeleton.joint_names)), dtype=bool)
     for link, (_, _, before, joints, free) in segments.items():
         if link == "thorax":
             continue
@@ -114,9 +114,7 @@ def require_sight(skeleton: Skeleton, visibility: Visibility, chain: str) -> Non
             )
 
 
-def segment_pairs(
-    skeleton: Skeleton, chain: str
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def segment_pairs(skeleton: Skeleton, chain: str) -> tuple[Indices, Array]:
     """Markers of the same segment of a chain, or of the thorax, two and two.
 
     Segments hardly stretch: where a distance differs, a marker has moved, or is taken
@@ -137,7 +135,7 @@ def segment_pairs(
     return pairs, np.linalg.norm(first - second, axis=1)
 
 
-def say_apart(skeleton: Skeleton, pair: NDArray[np.int64], change: float) -> str:
+def say_apart(skeleton: Skeleton, pair: Indices, change: float) -> str:
     """Say that two markers are nearer or farther than on the person, by so many m."""
     first, second = (skeleton.marker_set.labels[column] for column in pair)
     side = "farther apart" if change > 0 else "closer"

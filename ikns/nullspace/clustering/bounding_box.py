@@ -6,10 +6,11 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 from scipy.spatial.distance import cdist
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 
 __all__ = ["BoundingBox", "box_surface_points", "minimum_bounding_box"]
@@ -36,9 +37,9 @@ class BoundingBox(NamedTuple):
         Half the side along each axis; zero where the points are flat.
     """
 
-    center: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    half_lengths: NDArray[np.float64]
+    center: Array
+    axes: Array
+    half_lengths: Array
 
 
 def minimum_bounding_box(points: ArrayLike) -> BoundingBox:
@@ -104,7 +105,7 @@ def minimum_bounding_box(points: ArrayLike) -> BoundingBox:
 
 def box_surface_points(
     box: BoundingBox, n: int, *, up: ArrayLike | None = None
-) -> NDArray[np.float64]:
+) -> Array:
     """Points on the surface of a box where `n` centroids start.
 
     In this order: vertices; centers of the upper and the lower face; centers of the
@@ -157,9 +158,7 @@ def box_surface_points(
     return box.center + chosen @ box.axes[sides]
 
 
-def _spread(
-    places: NDArray[np.float64], half: NDArray[np.float64], n: int
-) -> NDArray[np.float64]:
+def _spread(places: Array, half: Array, n: int) -> Array:
     """Add places of a grid on the surface, farthest first, until there are `n`."""
     if n <= len(places):
         return places
@@ -180,9 +179,7 @@ def _spread(
     return np.array(chosen)
 
 
-def _smallest_axes(
-    x: NDArray[np.float64], coordinate_axes: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _smallest_axes(x: Array, coordinate_axes: Array) -> Array:
     """Axes (rows) of the smallest box found around points (N, 2 or 3) that fill it.
 
     `x` is in principal axes, whose signs are arbitrary; starting frames that differ by
@@ -208,9 +205,7 @@ def _smallest_axes(
     return _shrunk(x, min(found, key=lambda axes: _volume(x, axes)))
 
 
-def _shrunk(
-    x: NDArray[np.float64], axes: NDArray[np.float64], *, rounds: int = 30
-) -> NDArray[np.float64]:
+def _shrunk(x: Array, axes: Array, *, rounds: int = 30) -> Array:
     """Rotate about one axis after the other until no rotation shrinks the box."""
     volume = _volume(x, axes)
     for _ in range(rounds):
@@ -224,13 +219,11 @@ def _shrunk(
     return axes
 
 
-def _volume(x: NDArray[np.float64], axes: NDArray[np.float64]) -> float:
+def _volume(x: Array, axes: Array) -> float:
     return float(np.ptp(x @ axes.T, axis=0).prod())
 
 
-def _turned(
-    x: NDArray[np.float64], axes: NDArray[np.float64], i: int, j: int
-) -> NDArray[np.float64]:
+def _turned(x: Array, axes: Array, i: int, j: int) -> Array:
     """Axes with `i` and `j` rotated to the smallest rectangle around the points."""
     seen = x @ axes[[i, j]].T
     outline = seen[ConvexHull(seen).vertices]

@@ -20,7 +20,6 @@ cancels keeps its digits and ties are 0.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.voronoi import exact
 from ikns._kernels.voronoi.delaunay import triangulate
@@ -28,6 +27,7 @@ from ikns._kernels.voronoi.exact import Sites, on_lattice
 from ikns._kernels.voronoi.insertion_order import insertion_order
 from ikns._kernels.voronoi.rings import list_facets, list_sides
 from ikns._kernels.voronoi.sines import sines
+from ikns.arrays import Array, Indices
 from ikns.nullspace.interpolation.double_double import (
     difference,
     double_double_dot,
@@ -37,8 +37,6 @@ from ikns.nullspace.interpolation.voronoi import Voronoi
 
 __all__ = ["diagram"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Stage = np.signedinteger
 
 #: Where a sum known to 2**-97 of the size of its terms is below this part of that, it
@@ -46,7 +44,7 @@ Stage = np.signedinteger
 _CANCELED = 2.0**-40
 
 
-def diagram(points: Floats) -> Voronoi:
+def diagram(points: Array) -> Voronoi:
     """Build the diagram of sites (N, 3) that span space and are all different.
 
     They are scaled so that the set is about 1 wide.
@@ -102,16 +100,14 @@ def diagram(points: Floats) -> Voronoi:
 
 def _determinants(
     sites: Sites, fives: Indices, last: Stage, row: Stage, width: int
-) -> tuple[Floats, Floats]:
+) -> tuple[Array, Array]:
     """Rows of determinants of sets of five sites, and what these round off."""
     value, rest = np.empty((2, len(fives), width))
     exact.values(sites, fives, last, row, value, rest)
     return value, rest
 
 
-def _ratio(
-    a: Floats, a_rest: Floats, b: Floats, b_rest: Floats
-) -> tuple[Floats, Floats]:
+def _ratio(a: Array, a_rest: Array, b: Array, b_rest: Array) -> tuple[Array, Array]:
     """Return a / b as a float, and what that float rounds off."""
     value = a / b
     back, lost = product(value, b)
@@ -120,7 +116,7 @@ def _ratio(
     return total, rest - (total - value)
 
 
-def _circumcenters(sites: Sites, simplices: Indices) -> tuple[Floats, Floats, Floats]:
+def _circumcenters(sites: Sites, simplices: Indices) -> tuple[Array, Array, Array]:
     """Return circumcenters, what these round off, and six times the volumes."""
     fives = simplices.take([0, 1, 2, 3, 3], axis=1)
     value, rest = _determinants(sites, fives, exact.SPHERE, exact.DETERMINANT, 4)
@@ -128,7 +124,7 @@ def _circumcenters(sites: Sites, simplices: Indices) -> tuple[Floats, Floats, Fl
     return *_ratio(value[:, 1:], rest[:, 1:], below, below_rest), value[:, 0]
 
 
-def _normals(sites: Sites, facets: Indices) -> tuple[Floats, Floats, Floats]:
+def _normals(sites: Sites, facets: Indices) -> tuple[Array, Array, Array]:
     """Return unit normals, what these round off, and twice the areas."""
     fives = facets.take([0, 0, 1, 2, 0], axis=1)
     value, rest = _determinants(sites, fives, exact.NORMAL, exact.VW, 3)
@@ -137,8 +133,8 @@ def _normals(sites: Sites, facets: Indices) -> tuple[Floats, Floats, Floats]:
 
 
 def _powers(
-    sites: Sites, fives: Indices, c: Floats, c_rest: Floats, volume: Floats
-) -> Floats:
+    sites: Sites, fives: Indices, c: Array, c_rest: Array, volume: Array
+) -> Array:
     """Power of the last of five sites to the sphere of the others, about c."""
     p, p_rest = difference(sites.x[fives[:, 4]], sites.x[fives[:, 0]])
     reach, reach_rest = difference(p, 2 * c)
@@ -160,15 +156,15 @@ def _sines(
     sites: Sites,
     facets: Indices,
     behind: Indices,
-    normal: Floats,
-    normal_rest: Floats,
-    area: Floats,
+    normal: Array,
+    normal_rest: Array,
+    area: Array,
     edges: Indices,
     begin: Indices,
     side_facet: Indices,
     side_edge: Indices,
     entering: Indices,
-) -> tuple[Indices, Indices, Floats]:
+) -> tuple[Indices, Indices, Array]:
     """Pairs of sides of one face, and the sines of the angles between them."""
     count = _pairs_before(begin)[-1]
     first, second = np.empty((2, count), dtype=np.int64)

@@ -6,16 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.voronoi.hull import CANCELED
+from ikns.arrays import Array
 from ikns.nullspace.interpolation.diagram import diagram as voronoi
 from ikns.nullspace.interpolation.double_double import difference, double_double_dot
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
 __all__ = ["Domain", "domain"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -23,14 +21,14 @@ class Domain:
     """Where natural neighbors interpolate."""
 
     scale: float  # a power of two: what points in m are multiplied with
-    sites: Floats  # (N, 3) scaled
+    sites: Array  # (N, 3) scaled
     diagram: Voronoi  # of the scaled sites
-    center: Floats  # (3,) the middle of the scaled sites
-    center_depth: Floats  # (H,) how far it lies behind each facet of the hull
+    center: Array  # (3,) the middle of the scaled sites
+    center_depth: Array  # (H,) how far it lies behind each facet of the hull
     rounding: float  # scaled points that lie outside by less are on the hull
 
 
-def domain(points: Floats) -> Domain:
+def domain(points: Array) -> Domain:
     """Prepare points (N, 3), m, that span space and are all different."""
     size = float(np.ptp(points, axis=0).max())
     # A power of two scales exactly.
@@ -48,7 +46,7 @@ def domain(points: Floats) -> Domain:
     )
 
 
-def _depths(diagram: Voronoi, sites: Floats, x: Floats) -> Floats:
+def _depths(diagram: Voronoi, sites: Array, x: Array) -> Array:
     """How far a point lies behind each facet of the hull, (H,); positive inside."""
     site = sites[diagram.hull_facets[:, 0]]
     normal, rest = diagram.normal[diagram.hull], diagram.normal_rest[diagram.hull]

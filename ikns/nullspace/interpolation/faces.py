@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ikns._kernels.voronoi import faces
+from ikns.arrays import Array
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
 __all__ = ["solid_angles"]
 
-Floats = NDArray[np.float64]
 
-
-def solid_angles(diagram: Voronoi, points: Floats) -> Floats:
+def solid_angles(diagram: Voronoi, points: Array) -> Array:
     """Solid angle of the face of each edge, seen from either of its sites.
 
     Diagonals of co-spherical sites are chosen by chance or by rounding; their faces

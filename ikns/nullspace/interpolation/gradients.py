@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.nullspace.interpolation.domain import Domain
 
 __all__ = ["scaled_gradients"]
 
-Floats = NDArray[np.float64]
-
 
 def scaled_gradients(
-    space: Domain, angle: Floats, values: Floats | None, gradients: ArrayLike | None
-) -> Floats:
+    space: Domain, angle: Array, values: Array | None, gradients: ArrayLike | None
+) -> Array:
     """Gradients at the sites: those that are given, or estimated from the values.
 
     The solid angles of the edges' faces are (E,), values (N, ...), gradients (N, ...,
@@ -36,7 +35,7 @@ def scaled_gradients(
     return given.reshape(len(values), -1, 3) / space.scale
 
 
-def _estimated(space: Domain, angle: Floats, values: Floats) -> Floats:
+def _estimated(space: Domain, angle: Array, values: Array) -> Array:
     """Least-squares gradients: of the plane through a site's value that fits others.
 
     Each neighbor is weighted with the solid angle of the face between over the squared

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ikns.arrays import Array, Indices
 
 __all__ = ["morton_order"]
-
-Floats = NDArray[np.float64]
 
 #: Bits for each axis: a cell for each of a billion sites.
 _BITS = 10
 
 
-def morton_order(places: Floats, low: Floats, high: Floats) -> NDArray[np.int64]:
+def morton_order(places: Array, low: Array, high: Array) -> Indices:
     """Sort places along the Z-shaped curve (G. M. Morton, IBM, 1966).
 
     Parameters

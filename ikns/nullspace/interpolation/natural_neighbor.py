@@ -12,12 +12,13 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy import empty, ndarray
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.voronoi.batch import answer_batch, batch_scratch_rows
 from ikns._kernels.voronoi.diagram import TETRAHEDRA, UNSURE
 from ikns._kernels.voronoi.hull import inside_many
 from ikns._kernels.voronoi.query import answer_many, answer_one
+from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
 from ikns.nullspace.interpolation.domain import domain
 from ikns.nullspace.interpolation.faces import solid_angles
@@ -35,7 +36,6 @@ __all__ = ["Method", "NaturalNeighborInterpolator", "Outside"]
 
 Method = Literal["sibson", "laplace", "sibson_c1"]
 Outside = Literal["nearest", "project", "nan"]
-Floats = NDArray[np.float64]
 
 _FLOAT = np.dtype(np.float64)
 #: Sites whose face has a smaller solid angle are no neighbors, steradian.
@@ -163,7 +163,7 @@ class NaturalNeighborInterpolator:
         self._each = there.shape[1:], (n,)  # shapes of a value and of weights
         self._width, self._is_row = self._flat.shape[1], there.ndim == 2
         self._gradients = np.empty((n, 0, 3))
-        self.gradients: Floats | None = None
+        self.gradients: Array | None = None
         if method == "sibson_c1":
             self._gradients = scaled_gradients(
                 self._space, angle, self.values, gradients
@@ -176,12 +176,12 @@ class NaturalNeighborInterpolator:
             self._space, self._flat, self._gradients, method, outside
         )
         # Copies that no thread is using: queries write to the one they take.
-        self._idle: list[Floats] = []
+        self._idle: list[Array] = []
         for array in (self.points, self.simplices, self.hull_facets, self.edges):
             array.flags.writeable = False
 
     @property
-    def packed(self) -> tuple[Floats, NDArray[np.int64]]:
+    def packed(self) -> tuple[Array, Indices]:
         """All that compiled code needs, one array read as floats and as integers.
 
         For :func:`ikns._kernels.voronoi.query.natural_weights`; not to be changed.
@@ -192,7 +192,7 @@ class NaturalNeighborInterpolator:
         """Leave out scratch memory."""
         return {**self.__dict__, "_idle": []}
 
-    def __call__(self, x: ArrayLike, *, out: Floats | None = None) -> Floats:
+    def __call__(self, x: ArrayLike, *, out: Array | None = None) -> Array:
         """Interpolate the values.
 
         Parameters
@@ -224,7 +224,7 @@ class NaturalNeighborInterpolator:
             )
         return self._answer(x, 0, out)
 
-    def weights(self, x: ArrayLike, *, out: Floats | None = None) -> Floats:
+    def weights(self, x: ArrayLike, *, out: Array | None = None) -> Array:
         """Weights of the sites.
 
         Parameters
@@ -250,7 +250,7 @@ class NaturalNeighborInterpolator:
             )
         return self._answer(x, 1, out)
 
-    def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, x: ArrayLike) -> Mask:
         """Whether queries are in the convex hull or, but for rounding, on it.
 
         Parameters
@@ -269,7 +269,7 @@ class NaturalNeighborInterpolator:
         self._idle.append(diagram)
         return within.reshape(shape)
 
-    def _answer(self, x: ArrayLike, weigh: int, out: Floats | None) -> Floats:
+    def _answer(self, x: ArrayLike, weigh: int, out: Array | None) -> Array:
         """Answer queries with weights or with values."""
         each = self._each[weigh]
         queries, shape = checked_queries(x)
@@ -278,7 +278,7 @@ class NaturalNeighborInterpolator:
         self._answer_many(queries, weigh, answers)
         return found
 
-    def _answer_many(self, x: Floats, weigh: int, found: Floats) -> None:
+    def _answer_many(self, x: Array, weigh: int, found: Array) -> None:
         """Write the weights or values of (Q, 3) queries."""
         diagram, indices = self.packed
         state = np.full(len(x), UNSURE)
@@ -294,7 +294,7 @@ class NaturalNeighborInterpolator:
         answer_many(diagram, x, order, weigh, found, state)
         self._idle.append(diagram)
 
-    def _taken(self) -> Floats:
+    def _taken(self) -> Array:
         """Return a copy of the diagram that no other thread has."""
         try:
             return self._idle.pop()

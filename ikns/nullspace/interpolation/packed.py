@@ -7,18 +7,15 @@ are renumbered, so that those that are close in space are close in memory.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.voronoi import diagram as at
 from ikns._kernels.voronoi.hull import CANCELED
+from ikns.arrays import Array, Indices
 from ikns.nullspace.interpolation.domain import Domain
 from ikns.nullspace.interpolation.morton import morton_order
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
 __all__ = ["BRUTE_FORCE_LIMIT", "packed"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Up to so many tetrahedra checking all is faster than walking (measured).
 BRUTE_FORCE_LIMIT = 60
@@ -28,8 +25,8 @@ _RULES = {"nearest": at.NEAREST, "project": at.PROJECT, "nan": at.NOWHERE}
 
 
 def packed(
-    space: Domain, values: Floats, gradients: Floats, method: str, outside: str
-) -> Floats:
+    space: Domain, values: Array, gradients: Array, method: str, outside: str
+) -> Array:
     """Pack what queries need: values (N, M), and gradients (N, M, 3) for "sibson_c1".
 
     Gradients are per scaled unit of length. Method and rule outside the hull are those
@@ -120,7 +117,7 @@ def _by_tetrahedron(tetrahedron: Indices, *items: Indices) -> list[Indices]:
     return [item[order].reshape(count, -1) for item in items]
 
 
-def _planes(space: Domain) -> Floats:
+def _planes(space: Domain) -> Array:
     """Rows of the planes of facets."""
     d = space.diagram
     site = np.empty(len(d.length), dtype=np.int64)
@@ -133,7 +130,7 @@ def _planes(space: Domain) -> Floats:
 
 def _edges(
     d: Voronoi, number: Indices, facet: Indices
-) -> tuple[Indices, Indices, Floats]:
+) -> tuple[Indices, Indices, Array]:
     """Slots of the tetrahedra's edges, integers and floats of the edges."""
     e, sides = d.side_edge, np.bincount(d.side_edge)
     first = np.cumsum(sides) - sides

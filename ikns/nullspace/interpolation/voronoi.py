@@ -14,13 +14,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from ikns.arrays import Array, Indices
 
 __all__ = ["Voronoi"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -34,22 +30,22 @@ class Voronoi:
 
     simplices: Indices  # (T, 4)
     neighbors: Indices  # (T, 4) across the facet without each vertex; -1 on the hull
-    circumcenter: Floats  # (T, 3) seen from the tetrahedron's first site
-    circumcenter_rest: Floats
+    circumcenter: Array  # (T, 3) seen from the tetrahedron's first site
+    circumcenter_rest: Array
     behind: Indices  # (F,) tetrahedron on one side of a facet
     ahead: Indices  # (F,) on the other; T on the hull
-    length: Floats  # (F,) of the facet's Voronoi edge; infinite on the hull
-    normal: Floats  # (F, 3) unit vector from behind to ahead
-    normal_rest: Floats
+    length: Array  # (F,) of the facet's Voronoi edge; infinite on the hull
+    normal: Array  # (F, 3) unit vector from behind to ahead
+    normal_rest: Array
     hull: Indices  # (H,) which facets are on the hull
     hull_facets: Indices  # (H, 3) their sites, counterclockwise from outside
     edges: Indices  # (E, 2)
-    axis: Floats  # (E, 3) unit vector from site i to site j
+    axis: Array  # (E, 3) unit vector from site i to site j
     side_facet: Indices  # (S,) facet of a side
     side_edge: Indices  # (S,) and its edge
     entering: Indices  # (S,) tetrahedron at the start of the side; T at infinity
     leaving: Indices  # (S,) at its end
     first: Indices  # (P,) the pair's sides, in the order of their places
     second: Indices
-    sine: Floats  # (P,) of the angle by which the second side turns from the first
+    sine: Array  # (P,) of the angle by which the second side turns from the first
     pairs: Indices  # (E,) where the pairs of an edge's face begin, one after another

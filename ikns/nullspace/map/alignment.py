@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices
 from ikns.numerics.subspace import largest_entry_positive
 
 __all__ = ["align", "spanning_tree"]
 
-Floats = NDArray[np.float64]
 
-
-def spanning_tree(
-    strength: Floats, edges: NDArray[np.int64], root: int
-) -> list[tuple[int, int]]:
+def spanning_tree(strength: Array, edges: Indices, root: int) -> list[tuple[int, int]]:
     """Maximum spanning tree of a connected graph, grown from its root (Prim 1957).
 
     Edges (E, 2) between nodes have strengths (E,). Returns (parent, child) in the order
@@ -36,14 +32,14 @@ def spanning_tree(
 
 
 def align(
-    components: Sequence[Floats],
-    weights: Sequence[Floats],
+    components: Sequence[Array],
+    weights: Sequence[Array],
     *,
     n_dof: int,
-    edges: NDArray[np.int64],
+    edges: Indices,
     root: int,
-    reference: Floats | None = None,
-) -> tuple[Floats, list[tuple[int, int]]]:
+    reference: Array | None = None,
+) -> tuple[Array, list[tuple[int, int]]]:
     """Directions of all points with consistent signs.
 
     For one degree of freedom a direction is the normalized sum of the point's
@@ -74,7 +70,7 @@ def align(
     strength = np.linalg.svd(overlap, compute_uv=False).min(axis=1, initial=1.0)
     tree = spanning_tree(strength, edges, root)
 
-    def toward(k: int, target: Floats) -> Floats:
+    def toward(k: int, target: Array) -> Array:
         if not known[k]:
             return target  # pass the sign on to the children
         if n_dof > 1:
@@ -97,11 +93,11 @@ def align(
     return _turn(total, reference) @ directions, tree
 
 
-def _turn(rows: Floats, target: Floats) -> Floats:
+def _turn(rows: Array, target: Array) -> Array:
     """Orthogonal (d, d) matrix that rotates rows (d, n) to best match the target."""
     u, _, vt = np.linalg.svd(target @ rows.T)
     return u @ vt
 
 
-def _procrustes(rows: Floats, target: Floats) -> Floats:
+def _procrustes(rows: Array, target: Array) -> Array:
     return _turn(rows, target) @ rows

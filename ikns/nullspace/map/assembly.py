@@ -6,14 +6,12 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices
 from ikns.nullspace.map.alignment import align
 from ikns.nullspace.map.checks import MapSettings, MapWarning, format_point
 
 __all__ = ["assemble"]
-
-Floats = NDArray[np.float64]
 
 # Directions more than 60 degrees apart say little about each other's sign.
 _WEAK = 0.5
@@ -22,14 +20,14 @@ _INDIFFERENT = 0.1
 
 
 def assemble(
-    centers: Floats,
-    components: Sequence[Floats],
-    weights: Sequence[Floats],
-    samples: Sequence[Floats],
+    centers: Array,
+    components: Sequence[Array],
+    weights: Sequence[Array],
+    samples: Sequence[Array],
     *,
     settings: MapSettings,
-    edges: NDArray[np.int64],
-) -> tuple[Floats, Floats, Floats]:
+    edges: Indices,
+) -> tuple[Array, Array, Array]:
     """Directions and ranges of all points, with a MapWarning where these are uncertain.
 
     Parameters
@@ -74,10 +72,7 @@ def assemble(
 
 
 def _warn_of_disagreement(
-    centers: Floats,
-    directions: Floats,
-    tree: Sequence[tuple[int, int]],
-    edges: NDArray[np.int64],
+    centers: Array, directions: Array, tree: Sequence[tuple[int, int]], edges: Indices
 ) -> None:
     """Name neighbors that are almost orthogonal, or opposed in spite of the tree."""
     weak = []
@@ -97,7 +92,7 @@ def _warn_of_disagreement(
         )
 
 
-def _warn_of_indifference(directions: Floats, reference: Floats) -> None:
+def _warn_of_indifference(directions: Array, reference: Array) -> None:
     """Warn when the reference is almost orthogonal to the sum of the directions."""
     total = directions.sum(axis=0)
     size = np.linalg.norm(total, axis=1) * np.linalg.norm(reference, axis=1)

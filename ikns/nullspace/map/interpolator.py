@@ -10,8 +10,9 @@ import itertools
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
@@ -27,7 +28,7 @@ _METHODS: dict[str, Literal["sibson", "laplace"]] = {
 
 
 def make_interpolator(
-    points: NDArray[np.float64],
+    points: Array,
     outside: Literal["nearest", "project", "nan"],
     interpolation: Interpolation = "natural",
 ) -> NaturalNeighborInterpolator | NearestPoint:
@@ -47,7 +48,7 @@ def make_interpolator(
     )
 
 
-def _in_space(points: NDArray[np.float64]) -> bool:
+def _in_space(points: Array) -> bool:
     return points.shape[1] == 3 and len(points) >= 4
 
 
@@ -61,7 +62,7 @@ class NearestPoint:
         self.points = np.asarray(points, dtype=np.float64)
 
     @property
-    def edges(self) -> NDArray[np.int64]:
+    def edges(self) -> Indices:
         """Pairs of neighbors, (E, 2): of 4 points and more in space natural ones.
 
         Of others all pairs.
@@ -71,7 +72,7 @@ class NearestPoint:
         pairs = list(itertools.combinations(range(len(self.points)), 2))
         return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
-    def weights(self, x: ArrayLike) -> NDArray[np.float64]:
+    def weights(self, x: ArrayLike) -> Array:
         """Weights at queries (..., d), (..., P); NaN where a query is not finite."""
         queries = np.asarray(x, dtype=np.float64)
         flat = queries.reshape(-1, queries.shape[-1])
@@ -81,6 +82,6 @@ class NearestPoint:
         weights[known] = np.eye(len(self.points))[nearest]
         return weights.reshape(*queries.shape[:-1], -1)
 
-    def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, x: ArrayLike) -> Mask:
         """Return false for queries (..., d), (...): the points enclose no volume."""
         return np.zeros(np.shape(x)[:-1], dtype=bool)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.skeleton import Robot
 from ikns.errors import NotEnoughData
 
@@ -13,7 +14,7 @@ __all__ = ["robot_null_space_samples"]
 
 def robot_null_space_samples(
     robot: Robot, time: ArrayLike, q: ArrayLike, *, max_hand_speed: float = 0.05
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Positions of a robot's frame and joint vectors while the frame is held.
 
     As :func:`ikns.nullspace.map.null_space_samples` for a person.

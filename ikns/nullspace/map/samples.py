@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Mask
 from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
 
@@ -17,7 +17,7 @@ def still_mask(
     *,
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Which samples have the chain's hands at rest and all joints known.
 
     Parameters
@@ -59,7 +59,7 @@ def null_space_samples(
     *,
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Hand positions and joint vectors of the samples with still hands.
 
     The matching velocities, for ``NullSpaceMap(domain="velocity")``, are

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
 
@@ -27,7 +28,7 @@ _KEY = 0x50
 _INTEL, _DEC, _MIPS = 84, 85, 86
 _CHAR, _BYTE, _INT, _FLOAT = -1, 1, 2, 4
 
-Value = list[str] | NDArray[np.float64]
+Value = list[str] | Array
 
 
 @dataclass(frozen=True)

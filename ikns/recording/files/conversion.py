@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError, InvalidInput
 from ikns.recording.recording import Recording
 
@@ -106,12 +106,7 @@ def is_unlabeled(label: str) -> bool:
 
 
 def to_recording(
-    path: Path,
-    time: NDArray[np.float64],
-    markers: NDArray[np.float64],
-    labels: Sequence[str],
-    *,
-    unit: str,
+    path: Path, time: Array, markers: Array, labels: Sequence[str], *, unit: str
 ) -> Recording:
     """Return markers (T, M, 3) in meters as a recording, gaps as NaN; changed in place.
 

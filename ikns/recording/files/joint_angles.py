@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 
 __all__ = ["read_joint_angles"]
-
-Array = NDArray[np.float64]
 
 #: Endings of a column's name, and the unit that each stands for, in rad or m.
 _UNITS = {"_rad": 1.0, "_m": 1.0, "_deg": 0.017453292519943295}

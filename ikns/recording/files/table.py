@@ -6,8 +6,8 @@ import codecs
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
 
@@ -25,7 +25,7 @@ def text_lines(path: Path) -> list[str]:
 
 def number_table(
     path: Path, rows: list[tuple[int, str]], n_columns: int, *, delimiter: str
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the numbers of rows (line number, line); empty cells are NaN.
 
     A line may end early (the rest is empty) or in empty cells beyond the last column.

@@ -17,6 +17,8 @@ import numpy as np
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices
+
 __all__ = [
     "ROOT",
     "Command",
@@ -30,7 +32,6 @@ __all__ = [
     "transform_command",
 ]
 
-Array = NDArray[np.float64]
 Command = dict[str, Any]
 
 ROOT = "/ikns"
@@ -195,7 +196,7 @@ def line_mesh(points: Array, *, radius: float) -> dict[str, Any]:
     known = np.all(np.isfinite(points), axis=1)
     turns = np.arange(_SIDES) * 2 * np.pi / _SIDES
     vertices: list[Array] = []
-    faces: list[NDArray[np.int64]] = []
+    faces: list[Indices] = []
     first = 0
     for run in np.split(np.arange(len(points)), np.flatnonzero(np.diff(known)) + 1):
         if len(run) < 2 or not known[run[0]]:

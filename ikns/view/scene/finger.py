@@ -12,8 +12,8 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.model_file import segment_lengths, urdf_folder
 from ikns.body.skeleton import Skeleton
 from ikns.finger.geometry import WIDEST, joint_angles
@@ -28,8 +28,6 @@ from ikns.view.scene.scene import Layer, Scene
 from ikns.view.scene.shapes import visual_shapes
 
 __all__ = ["finger_path", "flexion_commands", "with_finger"]
-
-Array = NDArray[np.float64]
 
 _COLOR, _TIP = "#40454C", "#D97340"
 #: Half the thickness of the hand of ``urdf/upper_body.urdf``, m.

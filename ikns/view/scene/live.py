@@ -13,8 +13,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, InvalidInput
 from ikns.live.web_access import WebAccess
@@ -233,7 +234,7 @@ class _Handler(BaseHTTPRequestHandler):
 def _still(scene: Scene) -> Scene:
     """Return the scene without its animation."""
     commands = [c for c in scene.commands if c["type"] != "set_animation"]
-    nothing: NDArray[np.float64] = np.zeros(0)
+    nothing: Array = np.zeros(0)
     return Scene(
         scene.title,
         "Live, seen from the thorax.",

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.skeleton import Skeleton
 from ikns.view.scene.body import drawn_links
 from ikns.view.scene.commands import ROOT, Command
@@ -24,8 +24,6 @@ __all__ = [
     "markers_in_thorax",
     "pose_tracks",
 ]
-
-Array = NDArray[np.float64]
 
 #: Frames in one page at most: 15 MB of tracks for a body with 24 markers.
 MOST_FRAMES = 18_000
@@ -42,10 +40,10 @@ class Track:
     path: str
     position: Array  # (F, 3) m
     quaternion: Array | None = None  # (F, 4) x, y, z, w
-    visible: NDArray[np.bool_] | None = None  # (F,)
+    visible: Mask | None = None  # (F,)
 
 
-def kept_frames(time: Array, *, rate: float = 30.0) -> NDArray[np.int64]:
+def kept_frames(time: Array, *, rate: float = 30.0) -> Indices:
     """Return the frames to play: every n-th, so that about `rate` per second remain.
 
     Never more than 18 000 (ten minutes at 30/s).

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
 from ikns.view.scene.commands import Command
 
 __all__ = ["FIELD_OF_VIEW", "Layer", "Scene", "camera_and_target"]
-
-Array = NDArray[np.float64]
 
 #: Vertical angle of view, deg: small, so that near objects are not enlarged much.
 FIELD_OF_VIEW = 28.0

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 
 __all__ = ["Shape", "visual_shapes"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
@@ -21,8 +21,6 @@ from ikns.view.scene.playback import Track, body_tracks, pose_tracks
 from ikns.view.style import INK, point_color
 
 __all__ = ["Swivel", "swivel_commands", "swivel_tracks"]
-
-Array = NDArray[np.float64]
 
 #: Control signals of the ghosts; the body is in the middle.
 _STEPS = np.array([0.0, 0.25, 0.75, 1.0])
