@@ -17,7 +17,7 @@ from ikns._kernels.body.step import displacement, integrate
 from ikns._kernels.body.tree import joint_axes, place_joints
 from ikns._kernels.body.tree_cholesky import factor, solve
 from ikns.body.skeleton import Skeleton
-from ikns.body.skeleton.tree import joint_tree
+from ikns.body.skeleton.model import joint_tree
 from ikns.calibration.scaling import scale
 from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
 from ikns.motion.marker_ik.kernel import tree_paths

@@ -39,8 +39,7 @@ class ScalingReport:
     length_sd: dict[str, float]  # its deviation under the assumptions of the fit, m
     residuals: dict[str, float]  # of each marker of the trial from the fitted body, m
     offsets: dict[str, float]  # of each marker from its nominal place, m
-    used: tuple[str, ...]  # markers that the static trial showed
-    unused: tuple[str, ...]  # and those that it lacked
+    unused: tuple[str, ...]  # markers that the static trial lacked
     dropped: tuple[str, ...]
     held: tuple[str, ...]  # joints that the markers cannot observe
     duration: float  # length of the static trial, s
@@ -117,7 +116,6 @@ def scale(
         offsets=_distances(
             labels[seen], fit.positions[seen], sized.marker_positions[seen]
         ),
-        used=tuple(map(str, labels[seen])),
         unused=tuple(map(str, labels[~seen])),
         dropped=tuple(label for label in worn.labels if label not in kept),
         held=worn.held,

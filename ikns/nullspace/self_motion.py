@@ -50,7 +50,9 @@ def posture_at_point(
     (25,) or (18,), by default arms at rest with elbows bent; as near as joint limits
     allow.
     """
-    rest = _rest_posture(skeleton) if start is None else _angles(skeleton, start)
+    rest = _rest_posture(skeleton)
+    if start is not None:
+        rest = np.array(start, dtype=np.float64)[-len(rest) :]
     columns = _columns(skeleton, chain)
     sides = [SIDES.index(side) for side in chain_sides(chain)]
     z, center = learned.directions_[point], learned.centers_[point]
@@ -193,10 +195,6 @@ def _jacobian(skeleton: Skeleton, chain: str, q: Array) -> Array:
 
 def _columns(skeleton: Skeleton, chain: str) -> list[int]:
     return [skeleton.joint_names.index(joint) for joint in chain_joints(chain)]
-
-
-def _angles(skeleton: Skeleton, q: ArrayLike) -> Array:
-    return np.array(q, dtype=np.float64)[-len(skeleton.joint_names) :]
 
 
 def _rest_posture(skeleton: Skeleton) -> Array:

@@ -8,7 +8,6 @@ InvalidInput.
 from ikns.view.body import arm_points
 from ikns.view.comparison import comparison_figure
 from ikns.view.directions import directions_figure, principal_angle_figure
-from ikns.view.error_map import error_map_figure, workspace_slices
 from ikns.view.residuals import residual_figure
 from ikns.view.signals import control_figure, swivel_figure
 from ikns.view.variance_split import variance_split_figure
@@ -19,11 +18,9 @@ __all__ = [
     "comparison_figure",
     "control_figure",
     "directions_figure",
-    "error_map_figure",
     "principal_angle_figure",
     "residual_figure",
     "swivel_figure",
     "variance_split_figure",
     "workspace_figure",
-    "workspace_slices",
 ]

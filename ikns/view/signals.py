@@ -10,7 +10,15 @@ from numpy.typing import ArrayLike
 
 from ikns.arrays import Array, Mask
 from ikns.view.arrays import same_length, series
-from ikns.view.style import BLUE, GREY, INK, figure_style, new_figure, point_color
+from ikns.view.style import (
+    BLUE,
+    GREY,
+    INK,
+    figure_style,
+    new_figure,
+    outside_legend,
+    point_color,
+)
 
 __all__ = ["control_figure", "swivel_figure"]
 
@@ -131,7 +139,7 @@ def control_figure(
         if len(t) > 1:
             lower.set_xlim(t[0], t[-1])
         figure.align_ylabels()
-        _shared_legend(figure, upper, lower)
+        outside_legend(figure, upper, lower)
     return figure
 
 
@@ -169,13 +177,3 @@ def _bound_c(axes: Any, signals: Array) -> None:
             fontsize=7.5,
             color=GREY,
         )
-
-
-def _shared_legend(figure: Figure, *panels: Any) -> None:
-    named: dict[str, Any] = {}
-    for axes in panels:
-        handles, names = axes.get_legend_handles_labels()
-        named |= dict(zip(names, handles, strict=True))
-    figure.legend(
-        list(named.values()), list(named), loc="outside upper right", ncols=len(named)
-    )

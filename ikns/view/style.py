@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import matplotlib.style
 from matplotlib.colors import to_rgb
@@ -24,6 +25,7 @@ __all__ = [
     "figure_style",
     "joint_labels",
     "new_figure",
+    "outside_legend",
     "point_color",
 ]
 
@@ -98,6 +100,21 @@ def new_figure(
     text = f"{title} (simulated subject)" if simulated else title
     figure.suptitle(text, x=0.008, ha="left")
     return figure
+
+
+def outside_legend(figure: Figure, *panels: Any) -> None:
+    """Add one legend for all panels, next to the title."""
+    named: dict[str, Any] = {}
+    for axes in panels:
+        handles, names = axes.get_legend_handles_labels()
+        named |= dict(zip(names, handles, strict=True))
+    if named:
+        figure.legend(
+            list(named.values()),
+            list(named),
+            loc="outside upper right",
+            ncols=len(named),
+        )
 
 
 def point_color(point: int) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array
-from ikns.body.anthropometry.measures import check_stature, expected_measure
+from ikns.body.anthropometry.measures import checked_measure, expected_measure
 from ikns.body.anthropometry.shoulder import clavicle_length, shoulder_joints
 from ikns.body.anthropometry.tables import row, subjects
 
@@ -55,7 +55,7 @@ def expected_lengths(stature: float, sex: str) -> dict[str, float]:
     >>> {k: round(v, 3) for k, v in expected_lengths(1.741, "male").items()}
     {'clavicle': 0.158, 'upper_arm': 0.282, 'forearm': 0.269, 'hand': 0.086}
     """
-    height = check_stature(stature)
+    height = checked_measure("stature", stature)
     arm = {
         name: float(stature_fraction(name, sex) * height)
         for name in LIMB_SEGMENTS

@@ -9,47 +9,21 @@ from ikns.arrays import Array
 from ikns.body.anthropometry.tables import row
 from ikns.errors import InvalidInput
 
-__all__ = [
-    "MASS_LIMITS",
-    "STATURE_LIMITS",
-    "check_biacromial",
-    "check_mass",
-    "check_stature",
-    "expected_measure",
-]
+__all__ = ["checked_measure", "expected_measure"]
 
-#: Plausible statures of adults, meters: wide enough for short and tall people, narrow
-#: enough to detect centimeters and feet.
-STATURE_LIMITS = (1.2, 2.3)
-
-#: Plausible masses of adults, kilograms.
-MASS_LIMITS = (25.0, 250.0)
-
-#: Plausible biacromial breadths of adults, meters.
-BIACROMIAL_LIMITS = (0.2, 0.6)
-
-
-def check_stature(stature: ArrayLike) -> Array:
-    """Return stature as an array, m, or refuse it outside :data:`STATURE_LIMITS`."""
-    return _within(
-        stature, STATURE_LIMITS, "stature", "m", "did you give centimeters or feet?"
-    )
-
-
-def check_mass(mass: ArrayLike) -> Array:
-    """Return mass as an array, kg, or refuse it outside :data:`MASS_LIMITS`."""
-    return _within(mass, MASS_LIMITS, "mass", "kg", "did you give grams or pounds?")
-
-
-def check_biacromial(breadth: ArrayLike) -> Array:
-    """Return biacromial breadth as an array, m, or refuse it likewise."""
-    return _within(
-        breadth,
-        BIACROMIAL_LIMITS,
-        "biacromial breadth",
+#: What is plausible for adults, with the unit and what may have been given instead.
+#: Statures: wide enough for short and tall people, narrow enough to detect centimeters
+#: and feet.
+_PLAUSIBLE = {
+    "stature": (1.2, 2.3, "m", "did you give centimeters or feet?"),
+    "mass": (25.0, 250.0, "kg", "did you give grams or pounds?"),
+    "biacromial breadth": (
+        0.2,
+        0.6,
         "m",
         "did you give millimeters, or half the breadth?",
-    )
+    ),
+}
 
 
 def expected_measure(name: str, stature: ArrayLike, sex: str) -> Array:
@@ -65,10 +39,15 @@ def expected_measure(name: str, stature: ArrayLike, sex: str) -> Array:
     return np.asarray(measure["mean_mm"] / 1000 + slope * above)
 
 
-def _within(
-    value: ArrayLike, limits: tuple[float, float], what: str, unit: str, hint: str
-) -> Array:
-    low, high = limits
+def checked_measure(what: str, value: ArrayLike) -> Array:
+    """Return a stature, mass or biacromial breadth as an array, m or kg, or refuse it.
+
+    Raises
+    ------
+    InvalidInput
+        When it is not a number or not an adult's.
+    """
+    low, high, unit, hint = _PLAUSIBLE[what]
     try:
         number = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):

@@ -13,7 +13,7 @@ from ikns.body.anthropometry.lengths import (
     expected_lengths,
     stature_fraction,
 )
-from ikns.body.anthropometry.measures import check_mass, check_stature
+from ikns.body.anthropometry.measures import checked_measure
 from ikns.body.anthropometry.shoulder import shoulder_joints
 from ikns.body.anthropometry.tables import normalize_sex, row
 from ikns.errors import InvalidInput
@@ -105,7 +105,8 @@ def segments(
     >>> round(arm.length_m, 4), round(arm.mass_kg, 2), round(arm.com_m, 4)
     (0.2817, 1.98, 0.1626)
     """
-    height, weight = check_stature(stature).item(), check_mass(mass).item()
+    height = checked_measure("stature", stature).item()
+    weight = checked_measure("mass", mass).item()
     sex = normalize_sex(sex)
     length = _limb_lengths(height, sex, lengths or {})
     girdle = _segment("clavicle", "shoulder", "girdle", length["clavicle"], weight, sex)

@@ -6,11 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array
-from ikns.body.anthropometry.measures import (
-    check_biacromial,
-    check_stature,
-    expected_measure,
-)
+from ikns.body.anthropometry.measures import checked_measure, expected_measure
 from ikns.body.anthropometry.tables import row
 
 __all__ = ["clavicle_length", "shoulder_joints"]
@@ -54,11 +50,11 @@ def shoulder_joints(
     >>> shoulder_joints(1.75, "male")["glenohumeral"].round(3).tolist()
     [-0.018, -0.016, 0.181]
     """
-    height = check_stature(stature)
+    height = checked_measure("stature", stature)
     if biacromial is None:
         breadth = expected_measure("biacromial_breadth", height, sex)
     else:
-        breadth = check_biacromial(biacromial)
+        breadth = checked_measure("biacromial breadth", biacromial)
 
     def offset(name: str) -> Array:
         return np.asarray(row("shoulder", name, sex=sex)["offset"])

@@ -12,7 +12,7 @@ from ikns._kernels.body.paths import Paths, place_frames, write_jacobians
 from ikns._kernels.body.tree import Tree
 from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints, chain_sides
-from ikns.body.skeleton.tree import joint_tree
+from ikns.body.skeleton.model import joint_tree
 from ikns.errors import FileError, InvalidInput
 
 __all__ = ["LinkFrames"]

@@ -98,14 +98,7 @@ class Robot:
 
     @classmethod
     def load(cls, path: str | Path, frame: str) -> Robot:
-        """Read a URDF file.
-
-        Parameters
-        ----------
-        path : str or Path
-        frame : str
-            The link that does the task.
-        """
+        """Read a URDF file; `frame` is the link that does the task."""
         return cls(read_urdf(Path(path)), frame)
 
     @property
@@ -114,18 +107,9 @@ class Robot:
         return self._frames.tree
 
     def pose(self, q: ArrayLike) -> tuple[Array, Array]:
-        """Frame seen from the base.
+        """Frame seen from the base at joint positions (..., n), rad or m.
 
-        Parameters
-        ----------
-        q : (..., n) array
-            Joint positions, rad or m.
-
-        Returns
-        -------
-        position : (..., 3) array
-            Meters.
-        rotation : (..., 3, 3) array
+        Returns its position (..., 3), m, and rotation (..., 3, 3).
         """
         position, rotation = self._frames.place(self._all(q), (self.frame,))
         return position[..., 0, :], rotation[..., 0, :, :]

@@ -97,16 +97,8 @@ class Skeleton:
     ) -> Skeleton:
         """Return the body of an average adult of this stature, mass and sex.
 
-        Parameters
-        ----------
-        stature : float
-            Meters.
-        mass : float
-            Kilograms.
-        sex : str
-            "female" or "male".
-        marker_set : str or path
-            What the person wears.
+        Stature in m, mass in kg, "female" or "male"; the marker set is what the person
+        wears.
 
         Examples
         --------
@@ -119,14 +111,9 @@ class Skeleton:
         )
 
     def proportioned(self, parts: Mapping[str, Segment], *, stature: float) -> Skeleton:
-        """Return a skeleton with a person's segments.
+        """Return a skeleton with a person's segments and, for the thorax, stature (m).
 
-        Parameters
-        ----------
-        parts : mapping
-            As from :func:`ikns.body.anthropometry.segments`.
-        stature : float
-            Meters; sizes the thorax.
+        Parts are as from :func:`ikns.body.anthropometry.segments`.
         """
         lengths = self.segment_lengths
         factors = {"thorax": stature / GENERIC_STATURE}
@@ -142,10 +129,7 @@ class Skeleton:
     ) -> Skeleton:
         """Return a skeleton with segments resized; markers keep their place along them.
 
-        Parameters
-        ----------
-        factors, inertials
-            As :func:`ikns.body.model_file.resize_urdf` takes them.
+        Arguments are those of :func:`ikns.body.model_file.resize_urdf`.
         """
         urdf = resize_urdf(self.urdf, factors, inertials=inertials)
         positions = grown_positions(self.urdf, self.marker_set, factors)
@@ -234,27 +218,15 @@ class Skeleton:
         return self._markers.place(q)
 
     def marker_jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Marker positions and their derivative by the tangent of `q`.
-
-        Returns
-        -------
-        positions : (M, 3) array
-            Meters in the world.
-        jacobian : (M, 3, nv) array
-            d position / d v.
-        """
+        """Marker positions in the world, (M, 3) m, and d position / d v, (M, 3, nv)."""
         return self._markers.jacobian(q)
 
     def size_jacobian(self, q: Array) -> tuple[Array, Array]:
         """Differentiate the marker positions by the body's sizes.
 
-        Returns
-        -------
-        by_size : (M, 3, S) array
-            d position / d log(factor) of each segment of
-            :data:`ikns.body.model_file.SEGMENTS`, m.
-        by_position : (M, 3, 3) array
-            d position / d (marker position in its link): the link's orientation.
+        Returns d position / d log(factor) of each segment of
+        :data:`ikns.body.model_file.SEGMENTS`, (M, 3, S) m, and d position / d (marker
+        position in its link), which is the link's orientation, (M, 3, 3).
         """
         along = part_along(self.urdf, self.marker_set, self._markers.in_joint)
         return self._markers.by_size(q, along)

@@ -133,19 +133,7 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         self.up = up
 
     def fit(self, X: ArrayLike, y: Any = None) -> Self:
-        """Find the clusters.
-
-        Parameters
-        ----------
-        X : (n_samples, n_features) array
-            Positions, m.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        BoundingBoxKMeans
-            This estimator.
+        """Find the clusters of positions (n_samples, n_features), m; `y` is ignored.
 
         Raises
         ------

@@ -21,7 +21,6 @@ from ikns._kernels.voronoi.query import answer_many, answer_one
 from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
 from ikns.nullspace.interpolation.domain import domain
-from ikns.nullspace.interpolation.faces import solid_angles
 from ikns.nullspace.interpolation.gradients import scaled_gradients
 from ikns.nullspace.interpolation.inputs import (
     checked_out,
@@ -29,8 +28,7 @@ from ikns.nullspace.interpolation.inputs import (
     checked_queries,
     checked_values,
 )
-from ikns.nullspace.interpolation.morton import morton_order
-from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT, packed
+from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT, morton_order, packed
 
 __all__ = ["Method", "NaturalNeighborInterpolator", "Outside"]
 
@@ -155,7 +153,7 @@ class NaturalNeighborInterpolator:
         diagram, n = self._space.diagram, len(self.points)
         self.simplices = diagram.simplices
         self.hull_facets = diagram.hull_facets
-        angle = solid_angles(diagram, self._space.sites)
+        angle = diagram.solid_angles(self._space.sites)
         self.edges = diagram.edges[angle >= _MIN_SOLID_ANGLE]
 
         there = np.empty((n, 0)) if self.values is None else self.values
@@ -225,23 +223,9 @@ class NaturalNeighborInterpolator:
         return self._answer(x, 0, out)
 
     def weights(self, x: ArrayLike, *, out: Array | None = None) -> Array:
-        """Weights of the sites.
+        """Weights of the sites, (..., N); arguments as those of a call.
 
-        Parameters
-        ----------
-        x : (..., 3) array
-            Queries, m. A query that is not finite gives NaN.
-        out : (..., N) array, optional
-            Where to write them: float64, C-contiguous.
-
-        Returns
-        -------
-        (..., N) array
-
-        Raises
-        ------
-        InvalidInput
-            For "sibson_c1", whose values also depend on gradients.
+        For "sibson_c1", whose values also depend on gradients, they are refused.
         """
         if self.method == "sibson_c1":
             raise InvalidInput(
@@ -251,16 +235,9 @@ class NaturalNeighborInterpolator:
         return self._answer(x, 1, out)
 
     def inside(self, x: ArrayLike) -> Mask:
-        """Whether queries are in the convex hull or, but for rounding, on it.
+        """Whether queries (..., 3) are in the convex hull or, but for rounding, on it.
 
-        Parameters
-        ----------
-        x : (..., 3) array
-            Queries, m. A query that is not finite is not inside.
-
-        Returns
-        -------
-        (...) boolean array
+        A query that is not finite is not inside.
         """
         queries, shape = checked_queries(x)
         within = np.empty(len(queries), dtype=bool)

@@ -12,13 +12,14 @@ from ikns._kernels.voronoi import diagram as at
 from ikns._kernels.voronoi.hull import CANCELED
 from ikns.arrays import Array, Indices
 from ikns.nullspace.interpolation.domain import Domain
-from ikns.nullspace.interpolation.morton import morton_order
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["BRUTE_FORCE_LIMIT", "packed"]
+__all__ = ["BRUTE_FORCE_LIMIT", "morton_order", "packed"]
 
 #: Up to so many tetrahedra checking all is faster than walking (measured).
 BRUTE_FORCE_LIMIT = 60
+#: Bits for each axis: a cell for each of a billion sites.
+_BITS = 10
 
 _METHODS = {"sibson": at.SIBSON, "laplace": at.LAPLACE, "sibson_c1": at.SMOOTH}
 _RULES = {"nearest": at.NEAREST, "project": at.PROJECT, "nan": at.NOWHERE}
@@ -100,6 +101,21 @@ def packed(
     return np.concatenate(
         [header.view(np.float64), *(part.view(np.float64) for part in parts)]
     )
+
+
+def morton_order(places: Array, low: Array, high: Array) -> Indices:
+    """Sort places (Q, 3) along the Z-shaped curve (G. M. Morton, IBM, 1966).
+
+    Neighbors are mostly close together. Those that are not finite may come anywhere;
+    places outside of the box from `low` to `high` are taken for the nearest in it.
+    """
+    share = (np.nan_to_num(places).clip(low, high) - low) / (high - low)
+    cell = (share * (2**_BITS - 1)).astype(np.int64)
+    code = np.zeros(len(places), dtype=np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
 
 
 def _inverse(order: Indices) -> Indices:

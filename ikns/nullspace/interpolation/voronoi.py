@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ikns._kernels.voronoi import faces
 from ikns.arrays import Array, Indices
 
 __all__ = ["Voronoi"]
@@ -49,3 +50,23 @@ class Voronoi:
     second: Indices
     sine: Array  # (P,) of the angle by which the second side turns from the first
     pairs: Indices  # (E,) where the pairs of an edge's face begin, one after another
+
+    def solid_angles(self, points: Array) -> Array:
+        """Solid angles of the edges' faces, (E,) sr, seen from either of their sites.
+
+        Exact to about 1e-15; all faces of a cell add up to 4 pi. Diagonals of
+        co-spherical sites are chosen by chance or by rounding; their faces have no
+        area, or hardly any, or they are far away. Their solid angle is small on any
+        scale.
+        """
+        return faces.solid_angles(
+            points,
+            self.circumcenter + points[self.simplices[:, 0]],
+            self.normal,
+            self.edges,
+            self.axis,
+            self.side_facet,
+            self.side_edge,
+            self.entering,
+            self.leaving,
+        )

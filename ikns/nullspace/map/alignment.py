@@ -74,7 +74,7 @@ def align(
         if not known[k]:
             return target  # pass the sign on to the children
         if n_dof > 1:
-            return _procrustes(leading[k], target)
+            return _turn(leading[k], target) @ leading[k]
         sign = np.where(components[k] @ target[0] < 0, -1.0, 1.0)
         direction = (sign * weights[k]) @ components[k]
         return (direction / np.linalg.norm(direction))[None]
@@ -97,7 +97,3 @@ def _turn(rows: Array, target: Array) -> Array:
     """Orthogonal (d, d) matrix that rotates rows (d, n) to best match the target."""
     u, _, vt = np.linalg.svd(target @ rows.T)
     return u @ vt
-
-
-def _procrustes(rows: Array, target: Array) -> Array:
-    return _turn(rows, target) @ rows

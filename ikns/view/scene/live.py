@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import threading
 import webbrowser
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ikns.arrays import Array
 from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, InvalidInput
 from ikns.live.web_access import WebAccess
@@ -75,7 +75,15 @@ class LiveView:
             for command in scene.commands
             if command.get("path", "").endswith("_forearm/finger")
         ]
-        self._page = scene_html(_still(scene), live=_FRAMES).encode()
+        still = replace(
+            scene,
+            caption="Live, seen from the thorax.",
+            commands=[c for c in scene.commands if c["type"] != "set_animation"],
+            times=np.zeros(0),
+            c=np.zeros(0),
+            start=0.0,
+        )
+        self._page = scene_html(still, live=_FRAMES).encode()
         self._changed = threading.Condition()
         self._frame: bytes | None = None
         self._count = 0
@@ -142,7 +150,8 @@ class LiveView:
             for path in self._fingers:
                 moves += flexion_commands(path, flexion)
         frame = {
-            "commands": [_lean(move) for move in moves],
+            # A micrometer cannot be seen.
+            "commands": [m | {"matrix": m["matrix"].round(6)} for m in moves],
             "time": time,
             "c": c if c is not None and np.isfinite(c) else None,
         }
@@ -229,25 +238,3 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing: stdout and stderr belong to the command."""
-
-
-def _still(scene: Scene) -> Scene:
-    """Return the scene without its animation."""
-    commands = [c for c in scene.commands if c["type"] != "set_animation"]
-    nothing: Array = np.zeros(0)
-    return Scene(
-        scene.title,
-        "Live, seen from the thorax.",
-        scene.simulated,
-        commands,
-        scene.layers,
-        scene.camera,
-        scene.target,
-        times=nothing,
-        c=nothing,
-    )
-
-
-def _lean(command: dict[str, Any]) -> dict[str, Any]:
-    """Return the command with fewer digits: a micrometer cannot be seen."""
-    return command | {"matrix": command["matrix"].round(6)}

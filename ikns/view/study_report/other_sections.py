@@ -22,6 +22,8 @@ __all__ = [
     "variation_section",
 ]
 
+#: Visits left out that are listed at most.
+_MOST = 50
 _OUTCOMES = {
     "tracking": ("done", "aborted", "skipped", "again"),
     "pick and place": (
@@ -171,13 +173,13 @@ def methods_section(group: Group) -> Section:
     )
 
 
-def left_out_section(summary: StudySummary, *, most: int = 50) -> Section | None:
+def left_out_section(summary: StudySummary) -> Section | None:
     """Visits that could not be used, each with its reason; None without any."""
     if not summary.left_out:
         return None
-    reasons = [each.reason for each in summary.left_out[:most]]
-    if len(summary.left_out) > most:
-        reasons.append(f"And {len(summary.left_out) - most} more.")
+    reasons = [each.reason for each in summary.left_out[:_MOST]]
+    if len(summary.left_out) > _MOST:
+        reasons.append(f"And {len(summary.left_out) - _MOST} more.")
     count = len(summary.left_out)
     return Section(
         "Left out",

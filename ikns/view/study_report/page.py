@@ -12,7 +12,6 @@ from ikns.experiments.study.summary.answers import (
     picking_answer,
     tracking_answer,
 )
-from ikns.view.document import html_document
 from ikns.view.parts import (
     Cell,
     NextStep,
@@ -22,9 +21,25 @@ from ikns.view.parts import (
     inline,
     steps_html,
 )
-from ikns.view.study_report.texts import BANNER, CANNOT
+from ikns.view.report import html_document
 
 __all__ = ["GroupPart", "study_html"]
+
+_BANNER = "Simulated: no person took part"
+
+#: What a simulation can and cannot show.
+_CANNOT = (
+    "What such a simulation can show: that design, recording, map, control signal and "
+    "statistics work together from end to end; how error, noise, delay and gaps pass "
+    "through that chain; how many participants a real study would need; which settings "
+    "matter to the method itself.",
+    "What it cannot show: how well people do. The operators follow a model of human "
+    "tracking whose free parameters were taken from the literature, and many settings "
+    "of them fit the paper's figures as well; the difference between two devices is "
+    "largely what was put into the model. Comfort, fatigue, attention, "
+    "embodiment and learning by understanding are not in it. A difference between "
+    "conditions here, or none, is no evidence about people.",
+)
 
 
 class GroupPart(NamedTuple):
@@ -55,7 +70,7 @@ def study_html(
     title = f"Study {summary.name}"
     body = [
         "<header>",
-        f'<p class="banner">{BANNER}</p>' if simulated else "",
+        f'<p class="banner">{_BANNER}</p>' if simulated else "",
         f"<h1>{inline(title)}</h1>",
         f'<p class="lead">{inline(_lead(summary, parts))}</p>',
         facts_html(_facts(summary, parts)),
@@ -68,10 +83,12 @@ def study_html(
             name = "Simulated participants" if part.group.simulated else "People"
             body.append(f'<section class="part"><h1>{name}</h1>')
             if part.group.simulated:
-                body.append(f'<p class="banner">{BANNER}</p>')
+                body.append(f'<p class="banner">{_BANNER}</p>')
             body.append("</section>")
         if part.group.simulated:
-            cannot = Section("What such a simulation can and cannot show", list(CANNOT))
+            cannot = Section(
+                "What such a simulation can and cannot show", list(_CANNOT)
+            )
             body.append(page.section(cannot))
         body += [page.section(section) for section in part.sections]
     page.of(simulated=False)

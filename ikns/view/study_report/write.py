@@ -12,6 +12,7 @@ from ikns.experiments.study.summary import Group, StudySummary
 from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_csv
 from ikns.view.parts import NextStep, Section
 from ikns.view.render import pdf, svg
+from ikns.view.study_report.comparisons import ReportFigure
 from ikns.view.study_report.map_section import map_figure, map_section
 from ikns.view.study_report.other_sections import (
     done_section,
@@ -21,7 +22,6 @@ from ikns.view.study_report.other_sections import (
 )
 from ikns.view.study_report.page import GroupPart, study_html
 from ikns.view.study_report.picking_sections import picking_figures, picking_sections
-from ikns.view.study_report.report_figure import ReportFigure
 from ikns.view.study_report.tracking_sections import (
     tracking_figures,
     tracking_sections,
