@@ -57,8 +57,6 @@ def block_length(series: ArrayLike) -> int:
     The longest length of several columns counts. For a statistic that is not a mean,
     pass the influence of each sample.
 
-    Examples
-    --------
     >>> rng = np.random.default_rng(0)
     >>> block_length(rng.normal(size=1000)) < 10
     True

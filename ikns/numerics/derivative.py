@@ -26,8 +26,6 @@ def slope(values: Array, time: Array, known: Mask | None = None) -> Array:
     ``WINDOW`` around each sample, to the known values there; by default all are. NaN
     where the value is unknown, where too few others are known, and for a single sample.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> time = np.arange(100) / 100
     >>> slope(3 * time, time)[50].round(9)

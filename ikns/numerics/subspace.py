@@ -53,8 +53,6 @@ def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> Array:
     (n - rank, n) array
         Orthonormal rows with ``jacobian @ row == 0``.
 
-    Examples
-    --------
     >>> null_space([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]).round(6) ** 2
     array([[0., 0., 1.]])
     """
@@ -88,8 +86,6 @@ def null_spaces(jacobians: ArrayLike, *, rtol: float = 1e-9) -> tuple[Array, Ind
     rank : (...) integer array
         Rank of each Jacobian; -1 where it is not finite.
 
-    Examples
-    --------
     >>> elbow_bent, straight = [[1.0, 0, 0], [0, 2.0, 0]], [[1.0, 0, 0], [2.0, 0, 0]]
     >>> basis, rank = null_spaces([elbow_bent, straight])
     >>> basis.shape, rank.tolist()
@@ -111,13 +107,14 @@ def null_spaces(jacobians: ArrayLike, *, rtol: float = 1e-9) -> tuple[Array, Ind
     return basis.reshape(*batch, *basis.shape[1:]), rank.reshape(batch)
 
 
-def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> Array:
+def null_projector(jacobian: ArrayLike) -> Array:
     """Orthogonal projectors (..., n, n) onto null spaces, of any rank.
 
     ``P`` with ``P @ P == P``, ``jacobian @ P == 0`` and trace ``n - rank``; NaN for
-    postures whose Jacobian is not finite. Arguments as in :func:`null_spaces`.
+    postures whose Jacobian is not finite. Small singular values as in
+    :func:`null_spaces`.
     """
-    basis, rank = null_spaces(jacobian, rtol=rtol)
+    basis, rank = null_spaces(jacobian)
     projector = np.swapaxes(basis, -2, -1) @ basis
     projector[rank < 0] = np.nan
     return projector
@@ -130,8 +127,6 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> Array:
     and B (..., r, n) span the subspaces; they need not be orthonormal. The min(p, r)
     angles increase, radians in [0, pi/2].
 
-    Examples
-    --------
     >>> principal_angles([[1.0, 0.0, 0.0]], [[1.0, 1e-10, 0.0]])
     array([1.e-10])
     """
@@ -149,9 +144,7 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> Array:
     return angles.reshape(*batch, b.shape[-2])
 
 
-def mean_null_direction(
-    jacobians: ArrayLike, d: int = 1, *, rtol: float = 1e-9
-) -> tuple[Array, Array]:
+def mean_null_direction(jacobians: ArrayLike, d: int = 1) -> tuple[Array, Array]:
     """Null space averaged over visited postures with finite Jacobians (N, k, n).
 
     The mean of the null-space projectors has eigenvalues between 0 and 1: an
@@ -176,7 +169,7 @@ def mean_null_direction(
     J = J[np.isfinite(J).all(axis=(1, 2))]
     if not len(J):
         raise NotEnoughData("no posture has a finite Jacobian to average over.")
-    rows = null_spaces(J, rtol=rtol)[0].reshape(-1, J.shape[-1])
+    rows = null_spaces(J)[0].reshape(-1, J.shape[-1])
     values, vectors = np.linalg.eigh(rows.T @ rows / len(J))
     directions = largest_entry_positive(vectors[:, ::-1].T[:d])
     return directions, np.clip(values[::-1], 0.0, 1.0)

@@ -43,7 +43,6 @@ def directions_figure(
         Learned unit directions; a point without one is NaN.
     joint_names : sequence of n str
         In chain order; drawn from top to bottom.
-    simulated : bool
     analytic : array like `directions`, optional
         The Jacobian's directions, drawn as wide pale bars behind.
     """
@@ -108,7 +107,6 @@ def principal_angle_figure(
     angles : mapping of name to (P,) array
         Principal angle per point, radians, for each analytic null space compared with;
         NaN where a point has no direction.
-    simulated : bool
     goal : float, optional
         Angle that should not be exceeded, radians; drawn as a line.
     """

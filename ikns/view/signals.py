@@ -47,7 +47,6 @@ def swivel_figure(
         PCA point of each sample; negative ones are left out.
     correlations : (P,) array
         Correlation r of the two at each point, for the titles.
-    simulated : bool
     """
     angle, signal = series(swivel, "swivel"), series(control_signal, "control_signal")
     point = np.asarray(labels)
@@ -109,7 +108,6 @@ def control_figure(
         m/s in the thorax frame.
     inside : (T,) boolean array
         Whether the hand was inside the interpolation volume.
-    simulated : bool
     gate : float, optional
         Hand speed below which samples were learned from, m/s; drawn as a line.
     """

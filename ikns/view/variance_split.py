@@ -40,7 +40,6 @@ def variance_split_figure(
         Variance per degree of freedom, rad^2; NaN leaves a gap.
     delta_vz : (T,) array
         Log-transformed index.
-    simulated : bool
     over : {"time", "points"}
         What `at` counts: time is drawn as lines, points as marks.
     interval, surrogates : (2, T) array, optional
@@ -63,16 +62,10 @@ def variance_split_figure(
         )
         upper, lower = figure.subplots(2, 1, sharex=True)
         # Distinct in dash and mark as well as in color.
-        _draw(upper, over, x, _square_degrees(ucm), BLUE, "V_UCM: unseen by the task")
-        _draw(
-            upper,
-            over,
-            x,
-            _square_degrees(ort),
-            ORANGE,
-            "V_ORT: moves the task",
-            second=True,
-        )
+        square = np.degrees(1.0) ** 2
+        _draw(upper, over, x, ucm * square, BLUE, "V_UCM: unseen by the task")
+        name = "V_ORT: moves the task"
+        _draw(upper, over, x, ort * square, ORANGE, name, second=True)
         upper.set_ylabel("variance per DoF (deg²)")
         if over == "time" or not (np.nan_to_num([ucm, ort]) > 0).any():
             upper.set_ylim(bottom=0)
@@ -130,10 +123,6 @@ def _draw(
     else:
         mark = "D" if second else "o"
         axes.plot(x, y, mark, color=color, ms=5.5, mew=0, label=name)
-
-
-def _square_degrees(variance: Array) -> Array:
-    return variance * np.degrees(1.0) ** 2
 
 
 def _range(given: ArrayLike | None, n: int) -> Array | None:

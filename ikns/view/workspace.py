@@ -55,7 +55,6 @@ def workspace_figure(
         PCA point of each sample, -1 where it was discarded.
     centers : (P, 3) array
         PCA points, m; numbered from 1 in the figure.
-    simulated : bool
     facets : (F, 3) integer array, optional
         Triangles of the interpolation volume, as rows of `centers`.
     arms : (2, 4, 3) array, optional

@@ -100,11 +100,6 @@ class SolvedFrames(NamedTuple):
             bool(self.converged[i]),
         )
 
-    def put(self, i: int, pose: Pose) -> None:
-        """Write one of them."""
-        self.q[i], self.residual[i] = pose.q, pose.residual
-        self.iterations[i], self.converged[i] = pose.iterations, pose.converged
-
 
 def starting_poses(skeleton: Skeleton) -> Array:
     """Return configurations to start from when nothing is known, (S, nq)."""

@@ -168,13 +168,16 @@ class MarkerIK:
         visibility = visible_segments(self.skeleton, markers)
         if chain is not None:
             with naming(recording.source):
-                self._require(chain, visibility)
+                if n < 2:
+                    raise NotEnoughData(
+                        f"expected at least 2 frames, as one shows no speed, found {n}."
+                    )
+                require_sight(self.skeleton, visibility, chain)
         # Start where most markers are seen, then go both ways.
         visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
         start = int(np.argmax(visible))
-        first = self.solve(markers[start])
-        frames = SolvedFrames.empty(n, len(first.q))
-        frames.put(start, first)
+        frames = SolvedFrames.empty(n, *self._pose_shape)
+        self.solver.solve(markers, (start, start + 1, 1), None, frames)
         done = 1
         for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
             for at in range(begin, end, way * _CHUNK):
@@ -185,15 +188,6 @@ class MarkerIK:
                 if progress is not None:
                     progress(done, n)
         return self._motion(recording.time, frames, visibility)
-
-    def _require(self, chain: str, visibility: Visibility) -> None:
-        """Refuse what does not show a chain."""
-        if len(visibility.seen) < 2:
-            raise NotEnoughData(
-                "expected at least 2 frames, as one shows no speed, found "
-                f"{len(visibility.seen)}."
-            )
-        require_sight(self.skeleton, visibility, chain)
 
     def _motion(
         self, time: Array, frames: SolvedFrames, visibility: Visibility

@@ -1,4 +1,4 @@
-"""Sites, scaled to about 1, with their Voronoi diagram and their hull's measures."""
+"""Sites, scaled to about 1: their Voronoi diagram, their hull, gradients at them."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ikns._kernels.voronoi.hull import CANCELED
 from ikns.arrays import Array
+from ikns.errors import InvalidInput
 from ikns.nullspace.interpolation.diagram import diagram as voronoi
 from ikns.nullspace.interpolation.double_double import difference, double_double_dot
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["Domain", "domain"]
+__all__ = ["Domain", "domain", "scaled_gradients"]
 
 
 @dataclass(frozen=True)
@@ -55,3 +57,48 @@ def _depths(diagram: Voronoi, sites: Array, x: Array) -> Array:
     p, p_rest = difference(site[near], x)
     depth[near] = double_double_dot(normal[near], rest[near], p, p_rest)
     return depth
+
+
+def scaled_gradients(
+    space: Domain, angle: Array, values: Array | None, gradients: ArrayLike | None
+) -> Array:
+    """Gradients for Sibson's smooth interpolant: given, or estimated from the values.
+
+    The solid angles of the edges' faces are (E,), values (N, ...), gradients (N, ...,
+    3) per m; the result (N, M, 3) is per scaled unit of length.
+    """
+    if values is None:
+        raise InvalidInput("method 'sibson_c1' needs values.")
+    if gradients is None:
+        return _estimated(space, angle, values.reshape(len(values), -1))
+    given = np.array(gradients, dtype=np.float64)
+    if given.shape != (*values.shape, 3):
+        raise InvalidInput(
+            f"expected gradients of shape {(*values.shape, 3)}, one for each value, "
+            f"found {given.shape}."
+        )
+    if not np.isfinite(given).all():
+        raise InvalidInput("all gradients must be finite, found NaN or infinity.")
+    return given.reshape(len(values), -1, 3) / space.scale
+
+
+def _estimated(space: Domain, angle: Array, values: Array) -> Array:
+    """Least-squares gradients: of the plane through a site's value that fits others.
+
+    Each neighbor is weighted with the solid angle of the face between over the squared
+    distance. Values that are linear in space have their own gradients.
+    """
+    edges = space.diagram.edges
+    mine = np.concatenate([edges[:, 0], edges[:, 1]])
+    other = np.concatenate([edges[:, 1], edges[:, 0]])
+    step = space.sites[other] - space.sites[mine]
+    weight = np.sqrt(np.tile(angle.clip(0, None), 2) / (step**2).sum(axis=1))[:, None]
+    step, rise = weight * step, weight * (values[other] - values[mine])
+    order, neighbors = np.argsort(mine, kind="stable"), np.bincount(mine)
+    first = np.cumsum(neighbors) - neighbors
+    found = np.empty((len(neighbors), values.shape[1], 3))
+    for count in np.unique(neighbors):
+        sites = np.flatnonzero(neighbors == count)
+        rows = order[first[sites, None] + np.arange(count)]
+        found[sites] = (np.linalg.pinv(step[rows]) @ rise[rows]).transpose(0, 2, 1)
+    return found

@@ -20,8 +20,7 @@ from ikns._kernels.voronoi.hull import inside_many
 from ikns._kernels.voronoi.query import answer_many, answer_one
 from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
-from ikns.nullspace.interpolation.domain import domain
-from ikns.nullspace.interpolation.gradients import scaled_gradients
+from ikns.nullspace.interpolation.domain import domain, scaled_gradients
 from ikns.nullspace.interpolation.inputs import (
     checked_out,
     checked_points,

@@ -1,4 +1,4 @@
-"""What both experiments report: figures with captions, differences, tests, effects."""
+"""What both experiments share in a report: styles, differences, tests, effects."""
 
 from __future__ import annotations
 
@@ -11,22 +11,54 @@ from matplotlib.figure import Figure
 
 from ikns.statistics import Effect, Equivalence
 from ikns.view.parts import Cell, Picture, Table
-from ikns.view.study_report.drawing import study_figure
-from ikns.view.style import BLUE, GREEN, GREY, INK, PALE, figure_style
+from ikns.view.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    MARKS,
+    PALE,
+    figure_style,
+    new_figure,
+)
 
 __all__ = [
     "NO_MARGIN",
     "NO_TRIAL",
     "ReportFigure",
+    "condition_styles",
     "difference_figures",
     "difference_name",
     "effects_table",
+    "scatter_places",
+    "study_figure",
     "tests_table",
 ]
 
 NO_MARGIN = "No margin was declared beforehand, so equivalence was not tested."
 NO_TRIAL = "No trial was finished, so there is nothing to draw or to test."
 _BOX = {"facecolor": GREEN, "alpha": 0.13, "lw": 0}
+_STYLES = (*MARKS, (INK, "v"))
+
+
+def condition_styles(conditions: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return color and mark of every condition, the same in all figures of a report."""
+    return {name: _STYLES[k % len(_STYLES)] for k, name in enumerate(conditions)}
+
+
+def study_figure(title: str, *, simulated: bool, height: float) -> Figure:
+    """Return an empty figure; its title says whether participants are simulated."""
+    text = f"{title} (simulated participants)" if simulated else title
+    return new_figure(text, simulated=False, height=height)
+
+
+def scatter_places(count: int, *, width: float) -> np.ndarray:
+    """Return offsets of dots around 0, so that few hide one another."""
+    if count < 2:
+        return np.zeros(count)
+    # Steps of the golden ratio: neighbors in order are far apart for any count.
+    turns = np.arange(count) * 0.6180339887498949 % 1.0
+    return np.asarray(width * (turns - 0.5))
 
 
 class ReportFigure(NamedTuple):

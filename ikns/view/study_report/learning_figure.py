@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from ikns.experiments.study.summary import TrackingSummary
 from ikns.experiments.study.summary.by_trial import rmse_by_trial
 from ikns.statistics import LearningCurves
-from ikns.view.study_report.drawing import (
+from ikns.view.study_report.comparisons import (
     condition_styles,
     study_figure,
 )

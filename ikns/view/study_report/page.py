@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.resources import files
-from typing import NamedTuple
 
 from ikns.experiments.study.summary import Group, StudySummary
 from ikns.experiments.study.summary.answers import (
@@ -23,7 +22,10 @@ from ikns.view.parts import (
 )
 from ikns.view.report import html_document
 
-__all__ = ["GroupPart", "study_html"]
+__all__ = ["study_html"]
+
+#: The people, or the simulated participants, with the sections on them.
+GroupPart = tuple[Group, Sequence[Section]]
 
 _BANNER = "Simulated: no person took part"
 
@@ -42,13 +44,6 @@ _CANNOT = (
 )
 
 
-class GroupPart(NamedTuple):
-    """Part of a report on the people, or on the simulated participants."""
-
-    group: Group
-    sections: Sequence[Section]
-
-
 def study_html(
     summary: StudySummary,
     parts: Sequence[GroupPart],
@@ -64,7 +59,7 @@ def study_html(
             ("ikns.view.study_report", "study.css"),
         )
     )
-    simulated = all(part.group.simulated for part in parts)
+    simulated = all(group.simulated for group, _ in parts)
     several = len(parts) > 1
     page = _StudyPage()
     title = f"Study {summary.name}"
@@ -74,23 +69,23 @@ def study_html(
         f"<h1>{inline(title)}</h1>",
         f'<p class="lead">{inline(_lead(summary, parts))}</p>',
         facts_html(_facts(summary, parts)),
-        *(_answers(part.group, several=several) for part in parts),
+        *(_answers(group, several=several) for group, _ in parts),
         "</header><main>",
     ]
-    for part in parts:
-        page.of(simulated=part.group.simulated)
+    for group, sections in parts:
+        page.of(simulated=group.simulated)
         if several:
-            name = "Simulated participants" if part.group.simulated else "People"
+            name = "Simulated participants" if group.simulated else "People"
             body.append(f'<section class="part"><h1>{name}</h1>')
-            if part.group.simulated:
+            if group.simulated:
                 body.append(f'<p class="banner">{_BANNER}</p>')
             body.append("</section>")
-        if part.group.simulated:
+        if group.simulated:
             cannot = Section(
                 "What such a simulation can and cannot show", list(_CANNOT)
             )
             body.append(page.section(cannot))
-        body += [page.section(section) for section in part.sections]
+        body += [page.section(section) for section in sections]
     page.of(simulated=False)
     if left_out is not None:
         body.append(page.section(left_out))
@@ -115,7 +110,7 @@ class _StudyPage(ReportPage):
 
 
 def _lead(summary: StudySummary, parts: Sequence[GroupPart]) -> str:
-    who = [people(_count(part.group), simulated=part.group.simulated) for part in parts]
+    who = [people(_count(group), simulated=group.simulated) for group, _ in parts]
     apart = (
         " People and simulated participants are analyzed apart, people first."
         if len(parts) > 1
@@ -123,9 +118,9 @@ def _lead(summary: StudySummary, parts: Sequence[GroupPart]) -> str:
     )
     planned = summary.plan.get("participants")
     came = sum(
-        _count(part.group)
-        for part in parts
-        if part.group.simulated == summary.plan.get("simulated")
+        _count(group)
+        for group, _ in parts
+        if group.simulated == summary.plan.get("simulated")
     )
     so_far = (
         f" The study file declares {planned}, so this is a part of them."
@@ -148,11 +143,11 @@ def _count(group: Group) -> int:
 
 def _facts(summary: StudySummary, parts: Sequence[GroupPart]) -> dict[str, Cell]:
     facts: dict[str, Cell] = {}
-    for part in parts:
-        kind = "simulated" if part.group.simulated else "people"
+    for group, _ in parts:
+        kind = "simulated" if group.simulated else "people"
         for name, each in (
-            ("tracking", part.group.tracking),
-            ("pick and place", part.group.picking),
+            ("tracking", group.tracking),
+            ("pick and place", group.picking),
         ):
             if each is None:
                 continue

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ikns.experiments.study.summary import PickingSummary
-from ikns.view.study_report.drawing import (
+from ikns.view.study_report.comparisons import (
     condition_styles,
     scatter_places,
     study_figure,

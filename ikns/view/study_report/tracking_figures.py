@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ikns.experiments.study.summary import TrackingSummary
 from ikns.experiments.study.summary.means import subject_means
-from ikns.view.study_report.drawing import (
+from ikns.view.study_report.comparisons import (
     condition_styles,
     scatter_places,
     study_figure,

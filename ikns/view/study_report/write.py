@@ -20,7 +20,7 @@ from ikns.view.study_report.other_sections import (
     methods_section,
     variation_section,
 )
-from ikns.view.study_report.page import GroupPart, study_html
+from ikns.view.study_report.page import study_html
 from ikns.view.study_report.picking_sections import picking_figures, picking_sections
 from ikns.view.study_report.tracking_sections import (
     tracking_figures,
@@ -69,7 +69,7 @@ def study_page(summary: StudySummary) -> tuple[str, list[tuple[str, ReportFigure
         figures, sections = _group_contents(group)
         prefix = "simulated_" if group.simulated else ""
         drawn += [(f"{prefix}{each.name}", each) for each in figures]
-        parts.append(GroupPart(group, sections))
+        parts.append((group, sections))
     page = study_html(
         summary,
         parts,
