@@ -14,9 +14,15 @@ from ikns.view.scene.drawing import scene_drawing
 from ikns.view.scene.page import scene_html
 from ikns.view.scene.scene import Scene
 
-__all__ = ["ScenePicture", "find_browser", "scene_picture", "screenshot"]
+__all__ = [
+    "HOW_TO_GET_ONE",
+    "ScenePicture",
+    "find_browser",
+    "scene_picture",
+    "screenshot",
+]
 
-_HOW_TO_GET_ONE = (
+HOW_TO_GET_ONE = (
     "no Chromium or Chrome found; get one with `apt install chromium`, or name yours "
     "in the environment variable CHROME"
 )
@@ -122,7 +128,7 @@ def scene_picture(
     """Draw a scene as it looks at its start; `environ` is for :func:`find_browser`."""
     browser = find_browser(environ)
     if browser is None:
-        note = f"the picture is drawn plainly: {_HOW_TO_GET_ONE}"
+        note = f"the picture is drawn plainly: {HOW_TO_GET_ONE}"
     else:
         taken = screenshot(
             browser, scene_html(scene), width=_WIDTH, height=_HEIGHT, scale=_SCALE

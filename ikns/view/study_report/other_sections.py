@@ -59,7 +59,8 @@ def done_section(group: Group) -> Section:
                 f"because their person could not take part: "
                 f"{'; '.join(each.faults[:3])}{more}."
             )
-        empty = _without(each)
+        there = set(each.trials()["subject"].tolist())
+        empty = [who for who in each.participants if who not in there]
         if empty:
             text.append(
                 f"In {name}, {len(empty)} of "
@@ -68,12 +69,6 @@ def done_section(group: Group) -> Section:
                 f"{' and others' if len(empty) > 10 else ''}."
             )
     return Section("What was done", text, tables=tables)
-
-
-def _without(found: TrackingSummary | PickingSummary) -> list[str]:
-    """Participants without a trial in the study as planned."""
-    there = set(found.trials()["subject"].tolist())
-    return [who for who in found.participants if who not in there]
 
 
 def _attempts(name: str, found: TrackingSummary | PickingSummary) -> Table:
