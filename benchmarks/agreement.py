@@ -10,6 +10,7 @@ much the compiled solution's cost is higher at worst (relative; below 0 is lower
 import argparse
 import os
 import platform
+import sys
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -25,6 +26,9 @@ from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from marker_ik_oracle import PlainMarkerIK
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 #: Who and what is compared, whatever else is there: two people of UE_ADL, three lifts.
@@ -87,7 +91,7 @@ def compared(
     markers = skeleton.marker_set.pick(recording.labels, recording.markers)
     motion = MarkerIK(skeleton).track(recording)
     fast = MarkerIK(skeleton)
-    plain = MarkerIK(skeleton, compiled=False, tolerance=1e-10, max_iterations=5000)
+    plain = PlainMarkerIK(skeleton, tolerance=1e-10, max_iterations=5000)
     apart, higher = [], []
     for i in range(1, len(markers), every):
         before = motion.q[i - 1]

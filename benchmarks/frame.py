@@ -10,6 +10,7 @@ one call (not with --quick), and the memory of the process is read off as they d
 import argparse
 import os
 import platform
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -25,12 +26,16 @@ from ikns.live.control import FrameSolver
 from ikns.motion.marker_ik import MarkerIK
 from ikns.simulation import Protocol, simulate_protocol, virtual_subject
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from marker_ik_oracle import PlainMarkerIK
+
 WINDOW = 100
 
 
-def one_by_one(subject: Subject, *, compiled: bool) -> Callable[[np.ndarray], float]:
+def one_by_one(
+    subject: Subject, solver: MarkerIK | PlainMarkerIK
+) -> Callable[[np.ndarray], float]:
     """Inverse kinematics, then the hand, then the signal."""
-    solver = MarkerIK(subject.skeleton, compiled=compiled)
     joints = ikns.body.chains.chain_joints(subject.chain)
     columns = [subject.skeleton.joint_names.index(name) for name in joints]
     pose = None
@@ -116,8 +121,10 @@ def main() -> None:
     frames = np.resize(there_and_back(markers), (n, *markers.shape[1:]))
     contenders = {
         "one compiled call": in_one(subject),
-        "compiled, step by step": one_by_one(subject, compiled=True),
-        "plain solver, step by step": one_by_one(subject, compiled=False),
+        "compiled, step by step": one_by_one(subject, MarkerIK(subject.skeleton)),
+        "plain solver, step by step": one_by_one(
+            subject, PlainMarkerIK(subject.skeleton)
+        ),
     }
     signals, seconds = race(contenders, frames, rng)
     base = np.percentile(seconds["one compiled call"], 50)

@@ -59,8 +59,8 @@ SOLVERS = {
         {"analytic": True},
         OwnCost(),
     ),
-    "ikns, plain reference": ("ours.Live", {"compiled": False}, OURS),
-    LIVE: ("ours.Live", {"compiled": True}, OURS),
+    "ikns, plain reference": ("ours.Plain", {}, OURS),
+    LIVE: ("ours.Live", {}, OURS),
     "ikns, without pull and limits": (
         "ours.WithoutPull",
         {},

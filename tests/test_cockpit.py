@@ -34,7 +34,7 @@ from ikns.experiments.picking import pick_schedule
 from ikns.experiments.tracking import measure, schedule
 from ikns.experiments.visits import read_visit, tracking_record
 from ikns.finger import Safety, SimulatedFinger
-from ikns.view.scene.browser import HOW_TO_GET_ONE, browser_options, find_browser
+from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
 
 PAGES = ("gamepad", "keyboard", "mouse")
 #: A gamepad as browsers give it; the test moves its stick.

@@ -9,7 +9,7 @@ from interpolation_layouts import JITTERS, LAYOUTS, jittered, turned
 
 from ikns._kernels.voronoi.delaunay import triangulate
 from ikns._kernels.voronoi.exact import on_lattice
-from ikns._kernels.voronoi.insertion_order import insertion_order
+from ikns.nullspace.interpolation.diagram import insertion_order
 
 
 def as_set(simplices):

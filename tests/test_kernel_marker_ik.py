@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from marker_ik_oracle import PlainMarkerIK
 from scipy.spatial.transform import Rotation
 
 from ikns._kernels.body.normal_equations import MOMENTS, linearize
@@ -16,7 +17,7 @@ from ikns._kernels.body.step import displacement, integrate
 from ikns._kernels.body.tree import joint_axes, place_joints
 from ikns._kernels.body.tree_cholesky import factor, solve
 from ikns.body.skeleton import Skeleton
-from ikns.body.skeleton.tree import joint_tree
+from ikns.body.skeleton.model import joint_tree
 from ikns.calibration.scaling import scale
 from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
 from ikns.motion.marker_ik.kernel import tree_paths
@@ -268,9 +269,8 @@ def cost(skeleton, q, before, seen):
 
 def agree(skeleton, seen, before):
     ours = MarkerIK(skeleton).solve(seen, before)
-    exact = MarkerIK(
-        skeleton, compiled=False, tolerance=1e-10, max_iterations=5000
-    ).solve(seen, before)
+    plain = PlainMarkerIK(skeleton, tolerance=1e-10, max_iterations=5000)
+    exact = plain.solve(seen, before)
     assert ours.converged == exact.converged
     if not np.isfinite(exact.residual):
         np.testing.assert_array_equal(ours.q, exact.q)
@@ -284,12 +284,12 @@ def agree(skeleton, seen, before):
     assert ours.residual == pytest.approx(exact.residual, abs=10 * AGREEMENT)
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_markers_of_the_static_trial_alone_weigh_nothing(compiled):
+@pytest.mark.parametrize("solver_class", [MarkerIK, PlainMarkerIK])
+def test_markers_of_the_static_trial_alone_weigh_nothing(solver_class):
     skeleton, rng = Skeleton.load(), np.random.default_rng(0)
     static = np.array([m.static_only for m in skeleton.marker_set.markers])
     assert 0 < static.sum() < len(static)
-    solver = MarkerIK(skeleton, compiled=compiled)
+    solver = solver_class(skeleton)
     q = skeleton.neutral()
     q[7:] += rng.uniform(0.1, 0.4, 18)
     seen = skeleton.markers_in_world(q) + rng.normal(0, 1e-3, (len(static), 3))
@@ -323,7 +323,7 @@ def test_any_frame_has_the_plain_solvers_answer(seed, noise, hidden, spread, off
     before = skeleton.integrate(q, rng.normal(0, off, 24))
     ours = MarkerIK(skeleton).solve(seen, before)
     assert np.isfinite(ours.q).all()
-    plain = MarkerIK(skeleton, compiled=False, tolerance=1e-10, max_iterations=5000)
+    plain = PlainMarkerIK(skeleton, tolerance=1e-10, max_iterations=5000)
     exact = plain.solve(seen, before)
     if not np.isfinite(exact.residual):
         np.testing.assert_array_equal(ours.q, exact.q)
@@ -374,8 +374,7 @@ def test_a_recording_is_its_frames_one_by_one(skeleton):
         poses.append(pose)
         before = pose.q
     batch = SolvedFrames.empty(30, 25)
-    batch.put(0, poses[0])
-    solver.solver.solve_many(np.array(frames), 1, 30, 1, batch)
+    solver.solver.solve(np.array(frames), (0, 30, 1), None, batch)
     np.testing.assert_array_equal(batch.q, [pose.q for pose in poses])
     np.testing.assert_array_equal(batch.residual, [pose.residual for pose in poses])
 

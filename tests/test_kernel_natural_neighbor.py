@@ -42,8 +42,7 @@ from ikns._kernels.voronoi.diagram import (
 from ikns._kernels.voronoi.query import natural_weights
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
-from ikns.nullspace.interpolation.morton import morton_order
-from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT
+from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT, morton_order
 
 TOLERANCE = {"sibson": 1e-14, "laplace": 1e-12}
 BAD = [[np.nan, 0.5, 0.5], [np.inf, 0, 0], [0.5, -np.inf, np.nan], [1e308, 0, 0]]

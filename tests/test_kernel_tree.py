@@ -7,7 +7,7 @@ import pytest
 from ikns._kernels.body.tree import joint_axes, place_joints
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
-from ikns.body.skeleton.tree import joint_tree
+from ikns.body.skeleton.model import joint_tree
 
 # A pose is a product of at most 20 transforms of a few meters, each exact to rounding:
 # 20 * 3 * eps * 10 m = 1e-13.

@@ -12,7 +12,6 @@ from interpolation_layouts import CUBE, JITTERS, LAYOUTS, jittered, turned
 
 from ikns.errors import NotEnoughData
 from ikns.nullspace.interpolation.diagram import diagram
-from ikns.nullspace.interpolation.faces import solid_angles
 from ikns.nullspace.interpolation.inputs import checked_points
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
@@ -121,7 +120,7 @@ def test_lines_between_co_spherical_sites_have_no_length_at_all():
 def test_faces_of_an_inner_site_fill_its_whole_view():
     points = RNG.random((60, 3))
     d = diagram(points)
-    angle = solid_angles(d, points)
+    angle = d.solid_angles(points)
     whole = np.bincount(d.edges.ravel(), np.repeat(angle, 2), len(points))
     inner = np.setdiff1d(np.arange(60), d.hull_facets)
     assert len(inner) > 5
@@ -129,7 +128,7 @@ def test_faces_of_an_inner_site_fill_its_whole_view():
     # rounded by a few 1e-16 times 1 / |cosine| of its slant.
     np.testing.assert_allclose(whole[inner], 4 * np.pi, atol=1e-12)
     cube = diagram(GRID)
-    angle = solid_angles(cube, GRID)
+    angle = cube.solid_angles(GRID)
     seen = angle[angle > 1e-9]
     inner = np.isin(cube.edges[angle > 1e-9], [21, 22, 25, 26, 37, 38, 41, 42])
     np.testing.assert_allclose(seen[inner.any(axis=1)], 4 * np.pi / 6, atol=1e-14)

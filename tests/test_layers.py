@@ -9,7 +9,7 @@ import pytest
 # Lowest floor first. A room imports from lower floors and from itself; rooms on one
 # floor do not know each other.
 FLOORS = (
-    "errors endings",
+    "arrays errors endings",
     "_kernels output",
     "numerics",
     "recording finger statistics",

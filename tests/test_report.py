@@ -225,13 +225,13 @@ def test_a_ragged_table_is_refused() -> None:
 
 def test_write_report_replaces_the_file_whole_or_not_at_all(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
-    write_report(path, title="first", sections=[], simulated=False)
+    write_report(path, report_html(title="first", sections=[], simulated=False))
     assert "first" in path.read_text(encoding="utf-8")
     bad = Section("s", pictures=[Picture(Figure(), "caption", "")])
     with pytest.raises(InvalidInput):
-        write_report(path, title="second", sections=[bad], simulated=False)
+        write_report(path, report_html(title="second", sections=[bad], simulated=False))
     assert "first" in path.read_text(encoding="utf-8")
-    write_report(path, title="third \udcff", sections=[], simulated=False)
+    write_report(path, report_html(title="third \udcff", sections=[], simulated=False))
     assert "third ?" in path.read_text(encoding="utf-8")
     assert list(tmp_path.iterdir()) == [path]
 
@@ -241,9 +241,9 @@ def test_a_folder_that_does_not_exist_is_an_error_in_one_sentence(
 ) -> None:
     path = tmp_path / "missing" / "report.html"
     with pytest.raises(FileError, match="report.html: cannot be written"):
-        write_report(path, title="t", sections=[], simulated=False)
+        write_report(path, report_html(title="t", sections=[], simulated=False))
     with pytest.raises(FileError, match="cannot be written"):
-        write_report(tmp_path, title="t", sections=[], simulated=False)
+        write_report(tmp_path, report_html(title="t", sections=[], simulated=False))
 
 
 def test_report_of_a_whole_recording_stays_under_three_megabytes() -> None:

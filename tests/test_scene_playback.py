@@ -27,10 +27,10 @@ from ikns.recording.files import read
 from ikns.recording.recording import Recording
 from ikns.view.scene import Scene, map_scene, recording_scene, scene_html, scene_picture
 from ikns.view.scene.body import drawn_links
-from ikns.view.scene.browser import find_browser
 from ikns.view.scene.commands import ROOT
 from ikns.view.scene.drawing import visible_nodes
 from ikns.view.scene.page import packed_json
+from ikns.view.scene.picture import find_browser
 from ikns.view.scene.playback import (
     MOST_FRAMES,
     body_tracks,

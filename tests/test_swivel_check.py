@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.calibration.swivel_check import swivel_samples
+from ikns.calibration.simulated import swivel_samples
 from ikns.errors import InvalidInput
 
 

@@ -8,7 +8,7 @@ import pytest
 from ikns.body.chains import CHAINS, chain_joints
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
-from ikns.body.skeleton.tree import joint_tree
+from ikns.body.skeleton.model import joint_tree
 from ikns.errors import InvalidInput
 from ikns.symbolic import chain_jacobian, link_in_thorax, markers_in_world
 from ikns.symbolic.kinematics import joint_frames

@@ -25,7 +25,7 @@ from ikns.view.scene import (
     scene_html,
 )
 from ikns.view.scene.body import drawn_links
-from ikns.view.scene.browser import (
+from ikns.view.scene.picture import (
     HOW_TO_GET_ONE,
     browser_options,
     find_browser,

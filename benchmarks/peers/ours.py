@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from ikns.motion.marker_ik.pose import PRIOR_FROM_SCRATCH
 from peers.problem import Problem
 from peers.timing import FrameByFrame
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+from marker_ik_oracle import PlainMarkerIK
+
 
 class Live(FrameByFrame):
     """One frame a call.
@@ -21,13 +26,14 @@ class Live(FrameByFrame):
     ----------
     problem : Problem
     **options
-        Those of `MarkerIK`: `compiled` for the kernel, else the plain reference.
+        Those of `MarkerIK`.
     """
 
     version = ikns.__version__
+    solver_class: type = MarkerIK
 
     def __init__(self, problem: Problem, **options: object) -> None:
-        self.solver = MarkerIK(problem.skeleton, **options)
+        self.solver = self.solver_class(problem.skeleton, **options)
         self.skeleton = problem.skeleton
         solve = self.solver.solve
         super().__init__(
@@ -49,6 +55,12 @@ class Live(FrameByFrame):
         return 1e-9 * float(np.median(spent))
 
 
+class Plain(Live):
+    """The plain solver that tests check the kernel against."""
+
+    solver_class = PlainMarkerIK
+
+
 class WithoutPull(Live):
     """The kernel with the cost that OpenSim has: marker distances and nothing else.
 
@@ -57,7 +69,7 @@ class WithoutPull(Live):
     """
 
     def __init__(self, problem: Problem) -> None:
-        super().__init__(problem, compiled=True, max_iterations=1000)
+        super().__init__(problem, max_iterations=1000)
         kernel = self.solver.solver
         kernel.problem = kernel.problem._replace(pull=PRIOR_FROM_SCRATCH, limit=0.0)
         kernel.packed = pack(kernel.problem)

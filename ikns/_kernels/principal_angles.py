@@ -10,18 +10,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.row_space import orthogonalize
+from ikns.arrays import Array
 
 __all__ = ["write_principal_angles"]
 
-Floats = NDArray[np.float64]
-
 
 @compiled
-def write_principal_angles(A: Floats, B: Floats, angles: Floats) -> None:
+def write_principal_angles(A: Array, B: Array, angles: Array) -> None:
     """Write the angles (N, r) between rows A (N, p, n) and B (N, r, n), r <= p.
 
     The rows are orthonormal; angles increase, rad.
@@ -50,7 +48,7 @@ def write_principal_angles(A: Floats, B: Floats, angles: Floats) -> None:
 
 
 @compiled
-def _sort(values: Floats) -> None:
+def _sort(values: Array) -> None:
     """Sort a few values in increasing order."""
     for i in range(1, len(values)):
         j = i

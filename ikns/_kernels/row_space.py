@@ -1,4 +1,4 @@
-"""Row space of a matrix and its rank, by Householder reflections.
+"""Orthonormal bases of null spaces and row spaces, by Householder reflections.
 
 The reflections H_0 H_1 ... bring the rows, longest remaining one first, to triangular
 form (QR of the transpose with column pivoting; Businger and Golub 1965, Numer Math
@@ -16,13 +16,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
-__all__ = ["careful_rank", "certain_rank", "orthogonalize", "reflected_axis"]
-
-Floats = NDArray[np.float64]
+__all__ = ["orthogonalize", "write_bases"]
 
 #: Rounding of a double.
 _EPS = 2.0**-52
@@ -33,7 +31,32 @@ _SWEEPS = 30
 
 
 @compiled
-def certain_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> int:
+def write_bases(
+    matrices: Array, rtol: float, of_rows: bool, basis: Array, rank: Indices
+) -> None:
+    """Write bases of (N, k, n) matrices to rows (N, d, n), and their ranks (N,).
+
+    Of the row spaces if `of_rows`, else of the null spaces; cut to d rows, or filled
+    with zeros. NaN and -1 where a matrix is not finite.
+    """
+    count, k, n = matrices.shape
+    work, factors = np.empty((k, n)), np.empty(k)
+    for i in range(count):
+        r = _certain_rank(matrices[i], rtol, work, factors)
+        if r < 0:
+            r = _careful_rank(matrices[i], rtol, work, factors)
+        rank[i] = r
+        first, last = (0, r) if of_rows else (r, n)
+        for row in range(basis.shape[1]):
+            if r >= 0 and first + row < last:
+                _reflected_axis(work, factors, r, first + row, basis[i, row])
+            else:
+                for j in range(n):
+                    basis[i, row, j] = np.nan if r < 0 else 0.0
+
+
+@compiled
+def _certain_rank(rows: Array, rtol: float, work: Array, factors: Array) -> int:
     """Write the reflections of a (k, n) matrix and return its rank; -1 if uncertain.
 
     Singular values up to ``rtol * largest`` count as zero; `rtol` is 1e-16 or more.
@@ -51,7 +74,7 @@ def certain_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> in
 
 
 @compiled
-def careful_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> int:
+def _careful_rank(rows: Array, rtol: float, work: Array, factors: Array) -> int:
     """Do the same by the singular values; -1 when the matrix is not finite."""
     largest = 0.0
     for i in range(rows.shape[0]):
@@ -69,8 +92,8 @@ def careful_rank(rows: Floats, rtol: float, work: Floats, factors: Floats) -> in
 
 
 @compiled
-def reflected_axis(
-    work: Floats, factors: Floats, rank: int, axis: int, row: Floats
+def _reflected_axis(
+    work: Array, factors: Array, rank: int, axis: int, row: Array
 ) -> None:
     """Write axis number `axis` after the first `rank` reflections, (n,)."""
     n = work.shape[1]
@@ -87,7 +110,7 @@ def reflected_axis(
 
 
 @compiled
-def orthogonalize(rows: Floats, rtol: float, squares: Floats) -> int:
+def orthogonalize(rows: Array, rtol: float, squares: Array) -> int:
     """Rotate the rows (k, n) of a matrix until orthogonal; return its rank.
 
     `squares` (k,) gets the squared singular values, unsorted; singular values up to
@@ -137,7 +160,7 @@ def orthogonalize(rows: Floats, rtol: float, squares: Floats) -> int:
 
 
 @compiled
-def _copy(rows: Floats, scale: float, work: Floats, squares: Floats) -> float:
+def _copy(rows: Array, scale: float, work: Array, squares: Array) -> float:
     """Copy a matrix, write the squares of its rows and return their sum."""
     total = 0.0
     for i in range(rows.shape[0]):
@@ -152,11 +175,11 @@ def _copy(rows: Floats, scale: float, work: Floats, squares: Floats) -> float:
 
 
 @compiled
-def _reflect(work: Floats, steps: int, squares: Floats) -> float:
+def _reflect(work: Array, steps: int, squares: Array) -> float:
     """Reflect, longest row first; return a bound below the last singular value.
 
     `squares` holds the squared lengths of the rows, then of their remainders; those of
-    finished rows are replaced by the factors of :func:`certain_rank`.
+    finished rows are replaced by the factors of :func:`_certain_rank`.
     """
     k, n = work.shape
     length, share = 0.0, 2.0

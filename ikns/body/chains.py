@@ -61,8 +61,6 @@ def clavicle_counterpart(chain: str) -> str | None:
 
     None for a chain that has no such counterpart.
 
-    Examples
-    --------
     >>> clavicle_counterpart("right_arm"), clavicle_counterpart("both_arms")
     ('right_arm_clavicle', None)
     """

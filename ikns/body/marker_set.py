@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices
 from ikns.body.model_file import urdf_folder
 from ikns.errors import FileError, MarkerMismatch
 
@@ -27,33 +27,17 @@ _FORMAT = 1
 class Marker:
     """One marker.
 
-    Parameters
-    ----------
-    label : str
-        Its name.
-    link : str
-        The URDF link that carries it.
-    position : (3,) tuple
-        Nominal position in the link's frame, meters.
-    placement_sd : (3,) tuple
-        Standard deviation of its placement along each axis, meters: small on a bony
-        landmark, large for a technical marker. One number in the file is used for all
-        three.
-    static_only : bool
-        Used in the static trial only.
-    aliases : tuple of str
-        Other labels of the same marker.
-    weight : float
-        Weight in inverse kinematics relative to the others: less where soft tissue
-        moves under it.
+    The deviation of its placement along each axis is small on a bony landmark, large
+    for a technical marker; one number in the file is used for all three. Its weight in
+    inverse kinematics relative to the others is less where soft tissue moves under it.
     """
 
     label: str
-    link: str
-    position: tuple[float, float, float]
-    placement_sd: tuple[float, float, float]
-    static_only: bool = False
-    aliases: tuple[str, ...] = ()
+    link: str  # the URDF link that carries it
+    position: tuple[float, float, float]  # nominal, in the link's frame, m
+    placement_sd: tuple[float, float, float]  # standard deviation, m
+    static_only: bool = False  # used in the static trial only
+    aliases: tuple[str, ...] = ()  # other labels of the same marker
     weight: float = 1.0
 
 
@@ -135,7 +119,7 @@ class MarkerSet:
         """Names of the markers, in order."""
         return tuple(marker.label for marker in self.markers)
 
-    def columns(self, labels: Sequence[str]) -> NDArray[np.int64]:
+    def columns(self, labels: Sequence[str]) -> Indices:
         """Find each marker among a recording's labels, (M,); -1 where it is missing.
 
         A subject prefix is ignored (``ADL001:RSHO1`` is ``RSHO1``), as is case, and an
@@ -163,9 +147,7 @@ class MarkerSet:
                 found[i] = matches[0]
         return found
 
-    def pick(
-        self, labels: Sequence[str], markers: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def pick(self, labels: Sequence[str], markers: Array) -> Array:
         """Sort a recording's markers into this set's order.
 
         Parameters
@@ -199,7 +181,7 @@ class MarkerSet:
         kept = set(labels)
         return replace(self, markers=tuple(m for m in self.markers if m.label in kept))
 
-    def at(self, positions: NDArray[np.float64]) -> MarkerSet:
+    def at(self, positions: Array) -> MarkerSet:
         """Return the set with markers at these positions, (M, 3) m in their links."""
         moved = tuple(
             replace(marker, position=(float(p[0]), float(p[1]), float(p[2])))

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.anthropometry import Segment
 from ikns.errors import FileError, InvalidInput
 
@@ -90,7 +90,7 @@ def segment_lengths(urdf: str) -> dict[str, float]:
     }
 
 
-def segment_ends(urdf: str) -> dict[str, NDArray[np.float64]]:
+def segment_ends(urdf: str) -> dict[str, Array]:
     """Joint that ends each limb segment, in its link's frame, (3,) m."""
     origins = _joint_origins(urdf)
     return {name: origins[end] for name, end in SEGMENTS.items() if end in origins}
@@ -110,13 +110,9 @@ def relative_sizes(urdf: str, reference: str) -> dict[str, float]:
 def link_inertials(urdf: str, parts: Mapping[str, Segment]) -> dict[str, Inertial]:
     """Inertial properties of each segment's link, by link name.
 
-    Parameters
-    ----------
-    urdf : str
-        Gives the direction of each segment in its link.
-    parts : mapping
-        As from :func:`ikns.body.anthropometry.segments`: principal moments about the
-        front-back axis, the long axis, and the axis across both, palms forward.
+    The URDF gives the direction of each segment in its link. Parts are as from
+    :func:`ikns.body.anthropometry.segments`: principal moments about the front-back
+    axis, the long axis, and the axis across both, palms forward.
     """
     trunk = parts["trunk_head"]
     inertials = {
@@ -148,23 +144,11 @@ def resize_urdf(
     *,
     inertials: Mapping[str, Inertial] | None = None,
 ) -> str:
-    """Return the URDF with segments resized.
+    """Return the URDF with segments resized by factors, by link name.
 
-    Parameters
-    ----------
-    urdf : str
-        URDF text.
-    factors : mapping
-        Size factor per segment (a link name); a segment without one keeps its size.
-        Lengths scale with the factor, mass with its cube and inertia with its fifth
-        power (same shape, same density), unless `inertials` says otherwise.
-    inertials : mapping, optional
-        New inertial properties by link name.
-
-    Raises
-    ------
-    InvalidInput
-        When a factor is not positive or a segment does not exist.
+    A segment without a factor keeps its size. Lengths scale with the factor, mass with
+    its cube and inertia with its fifth power (same shape, same density), unless
+    `inertials` gives new ones by link name.
     """
     robot = ET.fromstring(
         urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
@@ -215,7 +199,7 @@ def _set_inertial(link: ET.Element, inertial: Inertial) -> None:
     link.insert(0, element)
 
 
-def _joint_origins(urdf: str) -> dict[str | None, NDArray[np.float64]]:
+def _joint_origins(urdf: str) -> dict[str | None, Array]:
     """Place of each joint in its parent link, (3,) m, by joint name."""
     return {
         joint.get("name"): _vector(joint.find("origin"), "xyz")
@@ -223,7 +207,7 @@ def _joint_origins(urdf: str) -> dict[str | None, NDArray[np.float64]]:
     }
 
 
-def _vector(element: ET.Element | None, attribute: str) -> NDArray[np.float64]:
+def _vector(element: ET.Element | None, attribute: str) -> Array:
     if element is None:
         return np.zeros(3)
     return np.array([float(x) for x in element.get(attribute, "0 0 0").split()])
@@ -234,6 +218,6 @@ def _scale(element: ET.Element | None, attribute: str, factor: float) -> None:
         element.set(attribute, _text(factor * _vector(element, attribute)))
 
 
-def _text(values: NDArray[np.float64]) -> str:
+def _text(values: Array) -> str:
     # Adding zero turns -0 into 0.
     return " ".join(f"{value + 0.0:.9g}" for value in values)

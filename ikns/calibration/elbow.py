@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 
 __all__ = ["elbow_reference"]
-
-Array = NDArray[np.float64]
 
 #: Angle step of the central difference, rad: its error is of the order of the step
 #: squared (1e-10 m/rad), that of rounding 1e-16 m over the step (1e-11 m/rad).
@@ -22,16 +20,9 @@ def elbow_reference(
 ) -> Array | None:
     """Gradient of the height of the elbow in the thorax frame, which c increases with.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    q : (25,) or (18,) array
-        Posture, rad.
-    chain : str
-        For two arms the heights of both elbows are summed.
-    n_dof : int
-        With several degrees of freedom each elbow has its own row, followed by forearm
-        pronation, wrist flexion and wrist deviation of each side.
+    At a posture `q` (25,) or (18,), rad. For two arms the heights of both elbows are
+    summed; with several degrees of freedom each elbow has its own row, followed by
+    forearm pronation, wrist flexion and wrist deviation of each side.
 
     Returns
     -------

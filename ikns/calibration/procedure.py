@@ -17,11 +17,11 @@ from ikns.calibration.elbow import elbow_reference
 from ikns.calibration.report import (
     exploration_report,
     extrinsic_report,
+    marker_fault,
     points_report,
     static_report,
 )
 from ikns.calibration.scaling import ScalingReport, scale
-from ikns.calibration.sight import marker_fault
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion.marker_ik import MarkerIK
@@ -118,7 +118,11 @@ def calibrate(
         )
     solver = MarkerIK(skeleton)
     motions = tuple(
-        solver.track(recording, chain=chain, progress=_named(progress, recording))
+        solver.track(
+            recording,
+            chain=chain,
+            progress=progress and partial(progress, Path(recording.source).name),
+        )
         for recording in explorations
     )
     gates = [
@@ -180,13 +184,6 @@ def calibrate(
     step = len(x) // _SHOWN + 1
     shown = np.column_stack([x, learned.labels_ + 1.0])[::step]
     return Subject(skeleton, learned, chain, report, motions, shown)
-
-
-def _named(
-    progress: Callable[[str, int, int], None] | None, recording: Recording
-) -> Callable[[int, int], None] | None:
-    """Report progress under the name of a recording."""
-    return None if progress is None else partial(progress, Path(recording.source).name)
 
 
 def _left_out(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.size_fit import (
@@ -20,8 +21,6 @@ from ikns.recording.recording import Recording
 
 __all__ = ["ScalingReport", "scale"]
 
-Array = NDArray[np.float64]
-
 #: A marker that the static trial does not show is kept only where its nominal place is
 #: known this well, standard deviation of all directions together, m: on landmarks, not
 #: in clusters.
@@ -32,39 +31,19 @@ _KNOWN_PLACE = 0.02
 class ScalingReport:
     """What the fit found, and how well it is known.
 
-    Parameters
-    ----------
-    lengths : dict
-        Joint-to-joint length of each segment, m.
-    length_sd : dict
-        Its standard deviation under the assumptions of the fit, m.
-    residuals : dict
-        Distance of each marker of the static trial from the fitted body, m.
-    offsets : dict
-        How far each marker sits from its nominal place, m.
-    used, unused : tuple of str
-        Markers that the static trial showed, and those that it lacked.
-    dropped : tuple of str
-        Markers not kept: static-only ones, and those that the static trial lacked and
-        whose place is unknown without it.
-    held : tuple of str
-        Joints that the markers cannot observe.
-    duration : float
-        Length of the static trial, s.
-    converged : bool
-        Whether the fit met its tolerance.
+    Dropped are the markers not kept: static-only ones, and those that the static trial
+    lacked and whose place is unknown without it.
     """
 
-    lengths: dict[str, float]
-    length_sd: dict[str, float]
-    residuals: dict[str, float]
-    offsets: dict[str, float]
-    used: tuple[str, ...]
-    unused: tuple[str, ...]
+    lengths: dict[str, float]  # joint-to-joint length of each segment, m
+    length_sd: dict[str, float]  # its deviation under the assumptions of the fit, m
+    residuals: dict[str, float]  # of each marker of the trial from the fitted body, m
+    offsets: dict[str, float]  # of each marker from its nominal place, m
+    unused: tuple[str, ...]  # markers that the static trial lacked
     dropped: tuple[str, ...]
-    held: tuple[str, ...]
-    duration: float
-    converged: bool
+    held: tuple[str, ...]  # joints that the markers cannot observe
+    duration: float  # length of the static trial, s
+    converged: bool  # whether the fit met its tolerance
 
 
 def scale(
@@ -137,7 +116,6 @@ def scale(
         offsets=_distances(
             labels[seen], fit.positions[seen], sized.marker_positions[seen]
         ),
-        used=tuple(map(str, labels[seen])),
         unused=tuple(map(str, labels[~seen])),
         dropped=tuple(label for label in worn.labels if label not in kept),
         held=worn.held,

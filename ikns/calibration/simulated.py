@@ -1,14 +1,21 @@
-"""Whether a subject or a recording is known to be simulated."""
+"""Whether a calibration is known to be simulated, and how near it is to the truth."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ikns.arrays import Array, Indices
 from ikns.calibration.subject import Subject
+from ikns.errors import InvalidInput
+from ikns.nullspace.map import still_mask
 
-__all__ = ["is_simulated"]
+__all__ = ["SwivelSamples", "is_simulated", "swivel_samples"]
 
 
 def is_simulated(
@@ -17,14 +24,8 @@ def is_simulated(
     """Whether the subject or one of the recordings is known to be simulated.
 
     The calibration's report may say so, the ``summary.json`` of ``ikns demo`` next to
-    the subject's folder, or the ``truth.json`` next to a simulated recording.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        Folder that the subject was read from.
-    recordings : sequence of Path
+    the folder that the subject was read from, or the ``truth.json`` next to a simulated
+    recording.
     """
     places = [folder.absolute().parent / "summary.json"]
     places += [path.absolute().parent / "truth.json" for path in recordings]
@@ -37,3 +38,36 @@ def _says_simulated(path: Path) -> bool:
     except (OSError, ValueError):
         return False
     return isinstance(about, dict) and about.get("simulated") is True
+
+
+class SwivelSamples(NamedTuple):
+    """The still samples that a map was learned from, with the true swivel."""
+
+    hand: Array  # (N, 3) m in the thorax frame
+    labels: Indices  # (N,) PCA point, -1 for none
+    c: Array  # (N,) control signal, not clipped
+    swivel: Array  # (N,) true elbow swivel, rad
+    correlations: list[float]  # of c and swivel at each of P points
+
+
+def swivel_samples(subject: Subject, swivel: ArrayLike) -> SwivelSamples:
+    """Compare c with the true swivel on the still samples of a calibration.
+
+    The subject was just calibrated from one exploration of T frames, with one degree of
+    freedom; the true swivel (T,) of each is in rad, NaN where it has none.
+    """
+    true = np.asarray(swivel, dtype=np.float64)
+    if len(subject.motions) != 1 or true.shape != subject.motions[0].time.shape:
+        raise InvalidInput(
+            f"expected a subject with one exploration of {true.size} frames, found "
+            f"{[len(motion.time) for motion in subject.motions]}."
+        )
+    motion, learned = subject.motions[0], subject.null_space_map
+    still = still_mask(motion, subject.chain)
+    hand, true = motion.task_position(subject.chain)[still], true[still]
+    c = learned.control_signal(motion.chain_angles(subject.chain)[still], hand)
+    correlations = []
+    for k in range(len(learned.centers_)):
+        own = (learned.labels_ == k) & np.isfinite(true) & np.isfinite(c)
+        correlations.append(float(np.corrcoef(c[own], true[own])[0, 1]))
+    return SwivelSamples(hand, learned.labels_, c, true, correlations)

@@ -19,9 +19,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.static_trial import seen_markers
@@ -39,8 +39,6 @@ __all__ = [
     "size_covariance",
     "size_factors",
 ]
-
-Array = NDArray[np.float64]
 
 #: Error of a marker's mean position over the trial, m: 0.1 to 1 mm of it is that of the
 #: cameras, the rest comes from segments that are not quite rigid.
@@ -70,39 +68,20 @@ _MAX_STEPS = 100
 
 
 class SizeFit(NamedTuple):
-    """The fitted body.
+    """The fitted body."""
 
-    Parameters
-    ----------
-    log_sizes : (S,) array
-        Log of each segment's size factor, in the order of
-        :data:`ikns.body.model_file.SEGMENTS`.
-    positions : (M, 3) array
-        Markers in their link's frame, m.
-    q : (25,) array
-        Pose in the static trial.
-    covariance : (S, S) array
-        Of the log sizes.
-    converged : bool
-        Whether the fit met its tolerance.
-    """
-
-    log_sizes: Array
-    positions: Array
-    q: Array
-    covariance: Array
-    converged: bool
+    log_sizes: Array  # (S,) of each segment's factor, in the order of `SEGMENTS`
+    positions: Array  # (M, 3) markers in their link's frame, m
+    q: Array  # (25,) pose in the static trial
+    covariance: Array  # (S, S) of the log sizes
+    converged: bool  # whether the fit met its tolerance
 
 
 def fit_sizes(generic: Skeleton, target: Array) -> SizeFit:
     """Gauss-Newton with step halving over sizes, marker places and pose.
 
-    Parameters
-    ----------
-    generic : Skeleton
-        The generic body with the markers at their nominal places.
-    target : (M, 3) array
-        Mean marker positions in the world, m; NaN where never seen.
+    The generic body has the markers at their nominal places; the target is their mean
+    positions in the world (M, 3), m; NaN where never seen.
     """
     worn = generic.marker_set
     seen = seen_markers(target)
@@ -171,10 +150,10 @@ def _assemble(
     by_size: Array,
     by_place: Array,
     by_pose: Array,
-    seen: NDArray[np.bool_],
+    seen: Mask,
     weight: Array,
     placement: Array,
-    free: NDArray[np.int64],
+    free: Indices,
 ) -> Array:
     """Jacobian of the residuals, columns sizes, marker offsets, free pose."""
     n_seen, n_markers, n_sizes = int(seen.sum()), len(seen), by_size.shape[2]

@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Mask
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
@@ -16,8 +16,6 @@ from ikns.numerics.rigid import rigid_transform
 from ikns.recording.recording import Recording
 
 __all__ = ["seen_markers", "static_posture"]
-
-Array = NDArray[np.float64]
 
 #: With this many frames that show every marker only these are averaged; noise is then a
 #: third.
@@ -33,17 +31,9 @@ def static_posture(
 ) -> tuple[Skeleton, Array, float]:
     """Average a static trial, and put the marker set on the generic body.
 
-    Arguments as :func:`ikns.scale` takes them.
-
-    Returns
-    -------
-    reference : Skeleton
-        The generic body with the set at its nominal places; joints of an arm without
-        any marker are held.
-    target : (M, 3) array
-        Mean marker positions, m; NaN where never seen.
-    duration : float
-        Of the trial, s.
+    Arguments as :func:`ikns.scale` takes them. Returns the generic body with the set at
+    its nominal places, where joints of an arm without any marker are held; mean marker
+    positions (M, 3) m, NaN where never seen; and the duration of the trial, s.
     """
     worn = (
         marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
@@ -114,6 +104,6 @@ def _absent_joints(
     return tuple(joint for joint in absent if joint not in worn.held)
 
 
-def seen_markers(markers: Array) -> NDArray[np.bool_]:
+def seen_markers(markers: Array) -> Mask:
     """Which markers (..., 3) were seen, (...)."""
     return np.asarray(np.isfinite(markers).all(axis=-1))

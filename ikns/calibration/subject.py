@@ -8,17 +8,17 @@ still samples of the calibration are known.
 from __future__ import annotations
 
 import json
-import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import chain_joints
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
+from ikns.body.skeleton.model import read_urdf
 from ikns.errors import FileError, IknsError, InvalidInput, naming
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
@@ -77,7 +77,7 @@ class Subject:
     chain: str
     report: dict[str, Any]
     motions: tuple[Motion, ...] = field(default=(), repr=False)
-    samples: NDArray[np.float64] | None = field(default=None, repr=False)
+    samples: Array | None = field(default=None, repr=False)
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Write the subject folder, completely or not at all.
@@ -138,8 +138,9 @@ class Subject:
             )
         urdf = place / "skeleton.urdf"
         worn = MarkerSet.load(place / "markers.toml")
+        text = read_urdf(urdf)
         with naming(str(urdf)):
-            skeleton = Skeleton(_read_xml(urdf), worn)
+            skeleton = Skeleton(text, worn)
         report = _read_json(place / "calibration.json")
         del report["format"]
         table = _read_json(place / "map.json")
@@ -218,17 +219,7 @@ def _write_json(path: Path, table: dict[str, Any]) -> None:
     path.write_text(text + "\n", encoding="utf-8")
 
 
-def _read_xml(path: Path) -> str:
-    # Pinocchio's parser would print errors to stderr.
-    try:
-        text = path.read_text(encoding="utf-8")
-        ET.fromstring(text)
-    except (OSError, ValueError, ET.ParseError) as error:
-        raise FileError(f"{path}: cannot be read as XML: {error}.") from None
-    return text
-
-
-def _read_samples(path: Path, *, n_points: int) -> NDArray[np.float64] | None:
+def _read_samples(path: Path, *, n_points: int) -> Array | None:
     """Read the still samples; None where a folder has none."""
     if not path.exists():
         return None

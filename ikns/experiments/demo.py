@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ikns.calibration import calibrate
+from ikns.calibration.simulated import SwivelSamples, swivel_samples
 from ikns.calibration.subject import Subject
-from ikns.calibration.swivel_check import SwivelSamples, swivel_samples
 from ikns.live.control.recorded import ControlTable, control_table
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion

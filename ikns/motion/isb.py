@@ -7,9 +7,9 @@ the skeleton's own angles, in which the arm's self-motion is straighter (urdf/RE
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 
@@ -18,9 +18,7 @@ __all__ = ["isb_angles"]
 _MIRROR = np.diag([1.0, 1.0, -1.0])
 
 
-def isb_angles(
-    skeleton: Skeleton, q: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
+def isb_angles(skeleton: Skeleton, q: Array) -> dict[str, Array]:
     """Report the arms' angles in ISB's sequences.
 
     Parameters
@@ -49,7 +47,7 @@ def isb_angles(
     >>> angles["right_pronation"].round(4).tolist()
     [1.5708]
     """
-    angles: dict[str, NDArray[np.float64]] = {}
+    angles: dict[str, Array] = {}
     joints = q[:, -len(skeleton.joint_names) :]
     for side in SIDES:
         links = [
@@ -85,7 +83,7 @@ def isb_angles(
     return angles
 
 
-def _yxy(rotation: Rotation) -> NDArray[np.float64]:
+def _yxy(rotation: Rotation) -> Array:
     """Y-X-Y angles with a negative middle angle, as ISB wants elevation, (T, 3) rad."""
     matrix = rotation.as_matrix()
     middle = -np.arccos(np.clip(matrix[:, 1, 1], -1.0, 1.0))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 
 __all__ = ["Motion", "all_seen"]
@@ -58,20 +58,20 @@ class Motion:
         that of :func:`ikns.motion.marker_ik.visibility.visible_segments`.
     """
 
-    time: NDArray[np.float64]
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
+    time: Array
+    q: Array
+    v: Array
     joint_names: tuple[str, ...]
-    hand_in_thorax: NDArray[np.float64]
-    hand_rotation_in_thorax: NDArray[np.float64]
-    hand_velocity_in_thorax: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    iterations: NDArray[np.int64]
-    converged: NDArray[np.bool_]
+    hand_in_thorax: Array
+    hand_rotation_in_thorax: Array
+    hand_velocity_in_thorax: Array
+    residual: Array
+    iterations: Indices
+    converged: Mask
     held: tuple[str, ...] = ()
     segments: tuple[str, ...] = ()
-    seen: NDArray[np.bool_] = field(default_factory=lambda: np.ones((1, 0), bool))
-    known: NDArray[np.bool_] = field(default_factory=lambda: np.ones((1, 1), bool))
+    seen: Mask = field(default_factory=lambda: np.ones((1, 0), bool))
+    known: Mask = field(default_factory=lambda: np.ones((1, 1), bool))
 
     def __post_init__(self) -> None:
         """Hide what was not seen, and freeze the arrays."""
@@ -102,17 +102,17 @@ class Motion:
                 object.__setattr__(self, one.name, frozen)
 
     @property
-    def angles(self) -> NDArray[np.float64]:
+    def angles(self) -> Array:
         """Joint angles, (T, len(joint_names)) radians; NaN where not known."""
         return np.where(self.known, self.q[:, -len(self.joint_names) :], np.nan)
 
     @property
-    def thorax_in_world(self) -> NDArray[np.float64]:
+    def thorax_in_world(self) -> Array:
         """Pose of the thorax, (T, 7) m and a quaternion; NaN where it was not seen."""
         pose = self.q[:, : -len(self.joint_names)]
         return np.where(all_seen(self.segments, self.seen)[:, None], pose, np.nan)
 
-    def in_sight(self, chain: str) -> NDArray[np.bool_]:
+    def in_sight(self, chain: str) -> Mask:
         """Whether the thorax and every segment of a chain were seen, (T,)."""
         return all_seen(self.segments, self.seen, *chain_sides(chain))
 
@@ -125,22 +125,22 @@ class Motion:
             if link.startswith(own) and not seen.any()
         )
 
-    def chain_angles(self, chain: str) -> NDArray[np.float64]:
+    def chain_angles(self, chain: str) -> Array:
         """Joint angles of a chain, (T, n) radians in chain order; NaN out of sight."""
         return self._while_in_sight(chain, self.angles)
 
-    def chain_velocities(self, chain: str) -> NDArray[np.float64]:
+    def chain_velocities(self, chain: str) -> Array:
         """Joint velocities of a chain, (T, n) rad/s, likewise."""
         return self._while_in_sight(chain, self.v[:, -len(self.joint_names) :])
 
-    def task_position(self, chain: str) -> NDArray[np.float64]:
+    def task_position(self, chain: str) -> Array:
         """Where the task happens: the hand, or the midpoint of both, (T, 3) m.
 
         NaN while the chain is out of sight.
         """
         return self.hand_in_thorax[:, self._sides(chain)].mean(axis=1)
 
-    def hand_speed(self, chain: str) -> NDArray[np.float64]:
+    def hand_speed(self, chain: str) -> Array:
         """Speed of the chain's fastest hand relative to the thorax, (T,) m/s.
 
         NaN while the chain is out of sight.
@@ -148,9 +148,7 @@ class Motion:
         velocity = self.hand_velocity_in_thorax[:, self._sides(chain)]
         return np.linalg.norm(velocity, axis=2).max(axis=1)
 
-    def _while_in_sight(
-        self, chain: str, values: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _while_in_sight(self, chain: str, values: Array) -> Array:
         columns = [self.joint_names.index(name) for name in chain_joints(chain)]
         return np.where(self.in_sight(chain)[:, None], values[:, columns], np.nan)
 
@@ -158,9 +156,7 @@ class Motion:
         return [SIDES.index(side) for side in chain_sides(chain)]
 
 
-def all_seen(
-    segments: tuple[str, ...], seen: NDArray[np.bool_], *sides: str
-) -> NDArray[np.bool_]:
+def all_seen(segments: tuple[str, ...], seen: Mask, *sides: str) -> Mask:
     """Whether the thorax and every segment of these arms were seen, (T,).
 
     Arguments are those of :class:`Motion`, and names of :data:`ikns.body.chains.SIDES`.

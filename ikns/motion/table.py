@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.motion.motion import Motion
 from ikns.numerics.median import finite_median
 
@@ -18,33 +18,18 @@ _THORAX = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
 class MotionTable(NamedTuple):
     """Joint angles in degrees, the pose of the thorax and residuals, by frame.
 
-    Parameters
-    ----------
-    columns : list of str
-        ``time_s``; ``<joint>_deg``; ``thorax_<part>``, m and a unit quaternion in the
-        world; ``residual_m``; ``converged``, 0 or 1.
-    rows : (T, len(columns)) array
-        NaN where a joint, or the thorax, was not seen.
-    range_deg : dict
-        Lowest and highest angle of every joint, deg; NaN for one never seen.
-    summary : dict
-        Counts of frames, median residual (m) and held joints, ready for JSON.
+    Columns are ``time_s``; ``<joint>_deg``; ``thorax_<part>``, m and a unit quaternion
+    in the world; ``residual_m``; ``converged``, 0 or 1.
     """
 
     columns: list[str]
-    rows: NDArray[np.float64]
-    range_deg: dict[str, tuple[float, float]]
-    summary: dict[str, Any]
+    rows: Array  # (T, columns); NaN where not seen
+    range_deg: dict[str, tuple[float, float]]  # of every joint; NaN for one never seen
+    summary: dict[str, Any]  # frames, residual (m), held joints; ready for JSON
 
 
 def motion_table(motion: Motion) -> MotionTable:
-    """Return a motion of a body with a thorax as a table.
-
-    Parameters
-    ----------
-    motion : Motion
-        At least one frame.
-    """
+    """Return a motion of a body with a thorax, of at least one frame, as a table."""
     degrees = np.degrees(motion.angles)
     columns = [
         "time_s",

@@ -6,17 +6,16 @@ Postures are joint angles alone, (18,) or (N, 18) rad; hands are seen from the t
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import null_projector
 
 __all__ = ["posture_at_point", "postures_along", "self_motion", "visited_posture"]
-
-Array = NDArray[np.float64]
 
 #: An arm resting on a table in front, rad.
 _REST = {
@@ -46,26 +45,14 @@ def posture_at_point(
     """Posture near rest with the hand at a PCA point, in the middle of its range.
 
     A subject folder holds the hand positions and the range of ``Z @ q``, but not the
-    postures. Of all postures with the hand at the point and ``Z @ q`` halfway, this is
-    (to first order at each step) the nearest to `start`.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    learned : NullSpaceMap
-    chain : str
-        Joints of the map.
-    point : int
-        Row of ``learned.centers_``.
-    start : (25,) or (18,) array, optional
-        Default: arms at rest, elbows bent.
-
-    Returns
-    -------
-    (18,) array
-        As near to the point as joint limits allow.
+    postures. Of all postures with the hand at row `point` of ``learned.centers_`` and
+    ``Z @ q`` halfway, this is (to first order at each step) the nearest to `start`
+    (25,) or (18,), by default arms at rest with elbows bent; as near as joint limits
+    allow.
     """
-    rest = _rest_posture(skeleton) if start is None else _angles(skeleton, start)
+    rest = _rest_posture(skeleton)
+    if start is not None:
+        rest = np.array(start, dtype=np.float64)[-len(rest) :]
     columns = _columns(skeleton, chain)
     sides = [SIDES.index(side) for side in chain_sides(chain)]
     z, center = learned.directions_[point], learned.centers_[point]
@@ -111,19 +98,8 @@ def postures_along(
 ) -> Array:
     """Postures straight along Z through `q` at which the point's control signal is `c`.
 
-    Parameters
-    ----------
-    skeleton, learned, chain, point
-        As :func:`posture_at_point` takes them.
-    q : (18,) array
-        Posture, rad.
-    c : (N,) array
-        0 at m and 1 at M.
-
-    Returns
-    -------
-    (N, 18) array
-        ``q + s Z``; the hand moves as far as Z is not a null direction.
+    The control signal (N,) is 0 at m and 1 at M. The result (N, 18) is ``q + s Z``; the
+    hand moves as far as Z is not a null direction.
     """
     columns = _columns(skeleton, chain)
     z = learned.directions_[point, 0]
@@ -138,23 +114,12 @@ def postures_along(
 def self_motion(
     skeleton: Skeleton, learned: NullSpaceMap, chain: str, point: int, q: Array
 ) -> Array:
-    """Self-motion through `q`: postures that hold the pose of the hands.
+    """Self-motion through `q`: postures that hold the pose of the hands, (N, 18).
 
     Each step goes along the Jacobian's null space (along the projection of Z, where it
-    has several dimensions) and is then corrected by Newton's method.
-
-    Parameters
-    ----------
-    skeleton, learned, chain, point
-        As :func:`posture_at_point` takes them; Z sets the direction, m and M the ends.
-    q : (18,) array
-        Posture to start from, rad.
-
-    Returns
-    -------
-    (N, 18) array
-        From ``Z @ q = m`` to ``Z @ q = M``, or to where a joint limit or a straight arm
-        stops it. `q` is one of them, and the only one if nothing can move.
+    has several dimensions) and is then corrected by Newton's method, from ``Z @ q = m``
+    to ``Z @ q = M``, or to where a joint limit or a straight arm stops it. `q` is one
+    of the postures, and the only one if nothing can move.
     """
     z = learned.directions_[point, 0]
     ends = learned.lower_[point, 0], learned.upper_[point, 0]
@@ -230,10 +195,6 @@ def _jacobian(skeleton: Skeleton, chain: str, q: Array) -> Array:
 
 def _columns(skeleton: Skeleton, chain: str) -> list[int]:
     return [skeleton.joint_names.index(joint) for joint in chain_joints(chain)]
-
-
-def _angles(skeleton: Skeleton, q: ArrayLike) -> Array:
-    return np.array(q, dtype=np.float64)[-len(skeleton.joint_names) :]
 
 
 def _rest_posture(skeleton: Skeleton) -> Array:

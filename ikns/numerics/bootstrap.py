@@ -20,9 +20,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
+from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
 __all__ = [
@@ -33,8 +34,6 @@ __all__ = [
     "student_interval",
 ]
 
-Array = NDArray[np.float64]
-
 #: Least number of blocks; fewer hardly determine their own spread.
 _LEAST_BLOCKS = 3
 #: Share of the variance that may be lost at block ends: a twentieth of an interval.
@@ -42,37 +41,22 @@ _BIAS = 0.1
 
 
 def block_length(series: ArrayLike) -> int:
-    """Block length for a series, in samples.
+    """Block length for a series (N,) or (N, m), in samples, from 1 to a third of N.
 
     Blocks cut correlations at their ends. The relative bias of a variance from blocks
-    of length b is therefore ``-G / (g(0) b)``, where g(0) is the long-run variance,
-    the sum of all autocovariances R(k), and G the sum of ``|k| R(k)``. The length
-    returned makes that bias a tenth. Both sums run over lags up to twice the one beyond
-    which autocorrelations are only noise, with a flat-top window (Politis
-    and White 2004, Econometric Reviews 23:53; corrected by Patton, Politis and White
-    2009, 28:372). Their own length, which grows with the cube root of N, has the least
-    mean squared error of the variance; intervals keep their level with longer blocks,
-    while the small number of blocks is allowed for (Sun, Phillips and Jin 2008,
-    Econometrica 76:175).
+    of length b is therefore ``-G / (g(0) b)``, where g(0) is the long-run variance, the
+    sum of all autocovariances R(k), and G the sum of ``|k| R(k)``. The length returned
+    makes that bias a tenth. Both sums run over lags up to twice the one beyond which
+    autocorrelations are only noise, with a flat-top window (Politis and White 2004,
+    Econometric Reviews 23:53; corrected by Patton, Politis and White 2009, 28:372).
+    Their own length, which grows with the cube root of N, has the least mean squared
+    error of the variance; intervals keep their level with longer blocks, while the
+    small number of blocks is allowed for (Sun, Phillips and Jin 2008, Econometrica
+    76:175).
 
-    Parameters
-    ----------
-    series : (N,) or (N, m) array
-        What is averaged, finite; the longest length of several columns counts. For a
-        statistic that is not a mean: the influence of each sample.
+    The longest length of several columns counts. For a statistic that is not a mean,
+    pass the influence of each sample.
 
-    Returns
-    -------
-    int
-        Between 1 and a third of N.
-
-    Raises
-    ------
-    NotEnoughData
-        With fewer than 6 samples.
-
-    Examples
-    --------
     >>> rng = np.random.default_rng(0)
     >>> block_length(rng.normal(size=1000)) < 10
     True
@@ -117,27 +101,11 @@ def _length_of_one(x: Array, most: int) -> int:
 
 def block_rows(
     n: int, length: int, resamples: int, rng: np.random.Generator
-) -> NDArray[np.int64]:
-    """Draw blocks of neighboring rows, wrapping around the end.
+) -> Indices:
+    """Draw blocks of neighboring rows of `n`, wrapping around the end, (resamples, n).
 
-    Parameters
-    ----------
-    n : int
-        Rows of the series.
-    length : int
-        Of a block, 1 to n.
-    resamples : int
-        How many series to draw.
-    rng : numpy.random.Generator
-        Source of randomness.
+    The last block of each series is cut to fit.
 
-    Returns
-    -------
-    (resamples, n) integer array
-        Rows of each drawn series; its last block is cut to fit.
-
-    Examples
-    --------
     >>> block_rows(4, 4, 1, np.random.default_rng(3)).tolist()
     [[3, 0, 1, 2]]
     """
@@ -169,20 +137,8 @@ def student_interval(
 ) -> tuple[float, float]:
     """Confidence interval of a number from the spread of its bootstrap replicates.
 
-    Parameters
-    ----------
-    estimate : float
-    replicates : (B,) array
-        Replicates that are not finite are ignored.
-    blocks : float
-        How many blocks fit into the series.
-    level : float
-        Confidence, in (0, 1).
-
-    Returns
-    -------
-    (float, float)
-        NaN with fewer than two finite replicates.
+    `blocks` is how many blocks fit into the series. Replicates (B,) that are not finite
+    are ignored; with fewer than two others the interval is NaN.
     """
     values = np.asarray(replicates, dtype=np.float64)
     values = values[np.isfinite(values)]
@@ -209,22 +165,8 @@ def length_interval(
     the errors of the replicates, widened as in :func:`student_interval` (test
     inversion, Carpenter 1999, Statistics in Medicine 18:1).
 
-    Parameters
-    ----------
-    estimate : (m,) array
-    replicates : (B, m) array
-        Of the vector; rows that are not finite are ignored.
-    blocks : float
-        How many blocks fit into the series.
-    rng : numpy.random.Generator
-        Source of randomness, for the widening.
-    level : float
-        Confidence, in (0, 1).
-
-    Returns
-    -------
-    (float, float)
-        The lower end is 0 where the vector is within its noise.
+    The estimate is (m,); rows of the replicates (B, m) that are not finite are ignored.
+    The lower end is 0 where the vector is within its noise.
     """
     vector = np.asarray(estimate, dtype=np.float64)
     rows = np.asarray(replicates, dtype=np.float64).reshape(-1, len(vector))

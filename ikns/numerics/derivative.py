@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
+
+from ikns.arrays import Array, Mask
 
 __all__ = ["slope"]
 
@@ -18,31 +19,13 @@ _MOST_VARIANCE = 2.0
 _BATCH = 2048
 
 
-def slope(
-    values: NDArray[np.float64],
-    time: NDArray[np.float64],
-    known: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
+def slope(values: Array, time: Array, known: Mask | None = None) -> Array:
     """Time derivative by a moving parabola (Savitzky and Golay 1964).
 
-    Parameters
-    ----------
-    values : (T, ...) array
-        Any quantity.
-    time : (T,) array
-        Seconds, evenly spaced.
-    known : (T, ...) boolean array, optional
-        Which values count, of the shape of `values`. Default: all.
+    Of values (T, ...) at evenly spaced times (T,), s. The parabola is fitted over
+    ``WINDOW`` around each sample, to the known values there; by default all are. NaN
+    where the value is unknown, where too few others are known, and for a single sample.
 
-    Returns
-    -------
-    (T, ...) array
-        Slope of the parabola fitted over ``WINDOW`` around each sample, to the known
-        values there. NaN where the value is unknown, where too few others are known,
-        and for a single sample.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> time = np.arange(100) / 100
     >>> slope(3 * time, time)[50].round(9)
@@ -81,9 +64,9 @@ def slope(
 
 
 def _mend(
-    found: NDArray[np.float64],
-    values: NDArray[np.float64],
-    known: NDArray[np.bool_],
+    found: Array,
+    values: Array,
+    known: Mask,
     columns: list[int],
     window: int,
     step: float,
@@ -105,9 +88,7 @@ def _mend(
         found[batch[:, None], columns] = fitted
 
 
-def _weights(
-    x: NDArray[np.float64], known: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _weights(x: Array, known: Mask) -> tuple[Array, Array]:
     """Of values at x (N, w) in the slope at 0 of their parabola, and its variance.
 
     Of values with a variance of 1; NaN where fewer than three are known.

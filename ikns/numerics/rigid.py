@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+
+from ikns.arrays import Array
 
 __all__ = ["pose_steps", "rigid_transform"]
 
 
-def rigid_transform(
-    source: NDArray[np.float64], target: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rotation and translation that best map points to points (Kabsch 1976).
+def rigid_transform(source: Array, target: Array) -> tuple[Array, Array]:
+    """Rotation (3, 3) and shift that best map points (N, 3) to points (Kabsch 1976).
 
-    Parameters
-    ----------
-    source, target : (N, 3) array
-        Matching points, N >= 3.
-
-    Returns
-    -------
-    rotation : (3, 3) array
-    shift : (3,) array
-        ``target ~ source @ rotation.T + shift``.
+    ``target ~ source @ rotation.T + shift``, with N >= 3.
     """
     a, b = source.mean(axis=0), target.mean(axis=0)
     u, _, vt = np.linalg.svd((target - b).T @ (source - a))
@@ -32,7 +22,7 @@ def rigid_transform(
     return rotation, b - rotation @ a
 
 
-def pose_steps(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def pose_steps(poses: Array) -> Array:
     """Return the step from each pose to the next, as seen from the first of the two.
 
     The logarithm of the motion between them, ``log(T_0^-1 T_1)``: with the rotation
@@ -41,15 +31,8 @@ def pose_steps(poses: NDArray[np.float64]) -> NDArray[np.float64]:
 
         p - w x p / 2 + (1 - (a / 2) / tan(a / 2)) / a^2  w x (w x p)
 
-    Parameters
-    ----------
-    poses : (T, 7) array
-        Position (m) and unit quaternion x, y, z, w.
-
-    Returns
-    -------
-    (T - 1, 6) array
-        Linear (m) and angular (rad) part.
+    Poses (T, 7) are position (m) and unit quaternion x, y, z, w; steps (T - 1, 6) are
+    linear (m) and angular (rad).
     """
     turns = Rotation.from_quat(poses[:, 3:])
     back = turns[:-1].inv()

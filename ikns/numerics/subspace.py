@@ -6,6 +6,9 @@ rows are scaled (``J n = 0`` row by row), but singular values do, and with them 
 decision which of them are zero. The default ``rtol`` of 1e-9 is far below the ratios
 due to a change of unit or an almost straight arm (1e-3 each) and far above rounding
 (1e-16), so the decision is the same in meters and in millimeters.
+
+Arrays of the wrong shape, and rows that are not finite where no NaN is promised, raise
+InvalidInput.
 """
 
 from __future__ import annotations
@@ -13,10 +16,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ikns._kernels.null_space import write_bases
 from ikns._kernels.principal_angles import write_principal_angles
+from ikns._kernels.row_space import write_bases
+from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
 __all__ = [
@@ -34,7 +38,7 @@ __all__ = [
 _DEPENDENT = 1e-12
 
 
-def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
+def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> Array:
     """Orthonormal basis of the joint motions that leave a task unchanged.
 
     Parameters
@@ -49,13 +53,6 @@ def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64
     (n - rank, n) array
         Orthonormal rows with ``jacobian @ row == 0``.
 
-    Raises
-    ------
-    InvalidInput
-        When the Jacobian is not a matrix of finite numbers.
-
-    Examples
-    --------
     >>> null_space([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]).round(6) ** 2
     array([[0., 0., 1.]])
     """
@@ -69,9 +66,7 @@ def null_space(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64
     return basis
 
 
-def null_spaces(
-    jacobians: ArrayLike, *, rtol: float = 1e-9
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def null_spaces(jacobians: ArrayLike, *, rtol: float = 1e-9) -> tuple[Array, Indices]:
     """Orthonormal bases of many null spaces, of any rank.
 
     Parameters
@@ -91,13 +86,6 @@ def null_spaces(
     rank : (...) integer array
         Rank of each Jacobian; -1 where it is not finite.
 
-    Raises
-    ------
-    InvalidInput
-        When the array has fewer than two axes.
-
-    Examples
-    --------
     >>> elbow_bent, straight = [[1.0, 0, 0], [0, 2.0, 0]], [[1.0, 0, 0], [2.0, 0, 0]]
     >>> basis, rank = null_spaces([elbow_bent, straight])
     >>> basis.shape, rank.tolist()
@@ -119,59 +107,26 @@ def null_spaces(
     return basis.reshape(*batch, *basis.shape[1:]), rank.reshape(batch)
 
 
-def null_projector(jacobian: ArrayLike, *, rtol: float = 1e-9) -> NDArray[np.float64]:
-    """Orthogonal projectors onto null spaces, of any rank.
+def null_projector(jacobian: ArrayLike) -> Array:
+    """Orthogonal projectors (..., n, n) onto null spaces, of any rank.
 
-    Parameters
-    ----------
-    jacobian : (..., k, n) array
-        Task rates per joint rate, one Jacobian a posture.
-    rtol : float
-        Singular values up to ``rtol * largest`` (of the same posture) count as zero.
-
-    Returns
-    -------
-    (..., n, n) array
-        ``P`` with ``P @ P == P``, ``jacobian @ P == 0`` and trace ``n - rank``; NaN for
-        postures whose Jacobian is not finite.
-
-    Raises
-    ------
-    InvalidInput
-        When the array has fewer than two axes.
+    ``P`` with ``P @ P == P``, ``jacobian @ P == 0`` and trace ``n - rank``; NaN for
+    postures whose Jacobian is not finite. Small singular values as in
+    :func:`null_spaces`.
     """
-    basis, rank = null_spaces(jacobian, rtol=rtol)
+    basis, rank = null_spaces(jacobian)
     projector = np.swapaxes(basis, -2, -1) @ basis
     projector[rank < 0] = np.nan
     return projector
 
 
-def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
+def principal_angles(A: ArrayLike, B: ArrayLike) -> Array:
     """Principal angles between two subspaces, accurate from tiny to right angles.
 
-    Cosines are the singular values of ``Qa' Qb``, sines those of ``Qb - Qa Qa' Qb``
-    (Bjorck and Golub 1973). Each is exact to rounding in absolute terms, and so is
-    ``atan2(sine, cosine)`` from 0 to pi/2.
+    The method is that of :mod:`ikns._kernels.principal_angles`. Rows of A (..., p, n)
+    and B (..., r, n) span the subspaces; they need not be orthonormal. The min(p, r)
+    angles increase, radians in [0, pi/2].
 
-    Parameters
-    ----------
-    A : (..., p, n) array
-        Rows spanning the first subspace; need not be orthonormal.
-    B : (..., r, n) array
-        Rows spanning the second.
-
-    Returns
-    -------
-    (..., min(p, r)) array
-        Radians in [0, pi/2], increasing.
-
-    Raises
-    ------
-    InvalidInput
-        When the spaces have different dimension, or rows are not finite or dependent.
-
-    Examples
-    --------
     >>> principal_angles([[1.0, 0.0, 0.0]], [[1.0, 1e-10, 0.0]])
     array([1.e-10])
     """
@@ -189,23 +144,12 @@ def principal_angles(A: ArrayLike, B: ArrayLike) -> NDArray[np.float64]:
     return angles.reshape(*batch, b.shape[-2])
 
 
-def mean_null_direction(
-    jacobians: ArrayLike, d: int = 1, *, rtol: float = 1e-9
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Null space averaged over visited postures.
+def mean_null_direction(jacobians: ArrayLike, d: int = 1) -> tuple[Array, Array]:
+    """Null space averaged over visited postures with finite Jacobians (N, k, n).
 
     The mean of the null-space projectors has eigenvalues between 0 and 1: an
     eigenvector with eigenvalue 1 lies in the null space of every posture. (For lines
     this is the Bingham mean direction, blind to the sign of each.)
-
-    Parameters
-    ----------
-    jacobians : (N, k, n) array
-        One Jacobian per visited posture; those that are not finite are ignored.
-    d : int
-        How many directions.
-    rtol : float
-        Singular values up to ``rtol * largest`` count as zero.
 
     Returns
     -------
@@ -214,13 +158,6 @@ def mean_null_direction(
     concentration : (n,) array
         All eigenvalues, decreasing; the first `d` belong to the directions. Where
         entry ``d`` is close to entry ``d - 1`` the directions are not unique.
-
-    Raises
-    ------
-    InvalidInput
-        When the array is not (N, k, n) or `d` is not between 1 and n.
-    NotEnoughData
-        When no Jacobian is finite.
     """
     J = np.asarray(jacobians, dtype=np.float64)
     if J.ndim != 3:
@@ -232,23 +169,14 @@ def mean_null_direction(
     J = J[np.isfinite(J).all(axis=(1, 2))]
     if not len(J):
         raise NotEnoughData("no posture has a finite Jacobian to average over.")
-    rows = null_spaces(J, rtol=rtol)[0].reshape(-1, J.shape[-1])
+    rows = null_spaces(J)[0].reshape(-1, J.shape[-1])
     values, vectors = np.linalg.eigh(rows.T @ rows / len(J))
     directions = largest_entry_positive(vectors[:, ::-1].T[:d])
     return directions, np.clip(values[::-1], 0.0, 1.0)
 
 
-def principal_components(
-    rows: NDArray[np.float64], *, centered: bool = True
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Principal components of vectors.
-
-    Parameters
-    ----------
-    rows : (N, n) array
-        Vectors.
-    centered : bool
-        About their mean, or about zero.
+def principal_components(rows: Array, *, centered: bool = True) -> tuple[Array, Array]:
+    """Principal components of vectors (N, n), about their mean or about zero.
 
     Returns
     -------
@@ -266,13 +194,13 @@ def principal_components(
     return vectors[:, ::-1].T, variances / variances.sum()
 
 
-def largest_entry_positive(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def largest_entry_positive(rows: Array) -> Array:
     """Rows (d, n), negated where their entry of largest magnitude is negative."""
     largest = np.take_along_axis(rows, np.abs(rows).argmax(axis=1)[:, None], axis=1)
     return np.where(largest < 0, -rows, rows)
 
 
-def _flat(matrices: NDArray[np.float64], batch: tuple[int, ...]) -> NDArray[np.float64]:
+def _flat(matrices: Array, batch: tuple[int, ...]) -> Array:
     """Matrices as (N, k, n), in the memory layout that kernels are compiled for."""
     shape = matrices.shape[-2:]
     every = np.broadcast_to(matrices, (*batch, *shape))
@@ -280,7 +208,7 @@ def _flat(matrices: NDArray[np.float64], batch: tuple[int, ...]) -> NDArray[np.f
     return every.reshape(math.prod(batch), *shape)
 
 
-def _orthonormal_rows(rows: ArrayLike) -> NDArray[np.float64]:
+def _orthonormal_rows(rows: ArrayLike) -> Array:
     array = np.asarray(rows, dtype=np.float64)
     if array.ndim < 2 or 0 in array.shape[-2:] or not np.isfinite(array).all():
         raise InvalidInput(

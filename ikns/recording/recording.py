@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, MarkerMismatch
 
 __all__ = ["Recording"]
@@ -47,8 +48,8 @@ class Recording:
     (100.0, (3, 1, 3))
     """
 
-    time: NDArray[np.float64]
-    markers: NDArray[np.float64]
+    time: Array
+    markers: Array
     labels: tuple[str, ...]
     source: str
 

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 
 __all__ = ["outward", "same_length", "series"]
 
 
-def series(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def series(values: ArrayLike, name: str) -> Array:
     """Return `values` as a float array with one axis."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1:
@@ -20,7 +21,7 @@ def series(values: ArrayLike, name: str) -> NDArray[np.float64]:
     return array
 
 
-def outward(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def outward(points: Array) -> Array:
     """Return unit vectors from the mean of points (n, 3) to each; zero at the mean.
 
     >>> outward(np.array([[1.0, 0, 0], [-1.0, 0, 0], [0.0, 0, 0]]))[:, 0]

@@ -6,16 +6,15 @@ All coordinates are meters in the thorax frame: X forward, Y up, Z right.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 
 __all__ = ["arm_points", "body_surfaces"]
-
-Array = NDArray[np.float64]
 
 # Girth of the drawing as fractions of the shoulder-to-shoulder distance, read off the
 # shapes of urdf/upper_body.urdf. Nothing is computed from it.
@@ -50,18 +49,7 @@ def arm_points(skeleton: Skeleton, q: ArrayLike) -> Array:
 
 
 def body_surfaces(arms: ArrayLike) -> list[Array]:
-    """Surfaces of trunk, neck, head and arms.
-
-    Parameters
-    ----------
-    arms : (2, 4, 3) array
-        As :func:`arm_points` gives them.
-
-    Returns
-    -------
-    list of (u, v, 3) array
-        Grids of points to be drawn as surfaces.
-    """
+    """Surfaces of trunk, neck, head and :func:`arm_points`, as (u, v, 3) grids."""
     points = np.asarray(arms, dtype=np.float64)
     if points.shape != (2, 4, 3):
         raise InvalidInput(f"expected arms (2, 4, 3), found {points.shape}.")

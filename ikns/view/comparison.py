@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ikns.analysis.compare import Crosstalk, NullSpaceComparison
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.style import BLUE, GREY, INK, MARKS, figure_style, new_figure
 
 __all__ = ["comparison_figure"]
-
-Array = NDArray[np.float64]
 
 
 def comparison_figure(
@@ -27,19 +25,8 @@ def comparison_figure(
 ) -> Figure:
     """Draw angles, variance, leak and crosstalk, with intervals and chance levels.
 
-    Parameters
-    ----------
-    found : mapping of name to NullSpaceComparison
-        Of one map, at most four, such as one for each task of the hand.
-    simulated : bool
-        Whether the data come from a virtual subject; the title says so.
-    crosstalk : Crosstalk, optional
-        On natural reaches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Four panels; points of the map are numbered from 1.
+    At most four comparisons by name, of one map, such as one for each task of the hand;
+    the crosstalk is that of natural reaches. Points of the map are numbered from 1.
     """
     if not 1 <= len(found) <= len(MARKS):
         raise InvalidInput(

@@ -28,6 +28,7 @@ from ikns.view.report import (
     Picture,
     Section,
     Table,
+    report_html,
     write_report,
 )
 from ikns.view.style import figure_style
@@ -65,20 +66,14 @@ _NEXT_STEPS = (
 def write_demo_report(path: Path, demo: Demo, summary: Mapping[str, Any]) -> None:
     """Write ``report.html``, and next to it ``workspace.png`` for slides.
 
-    Parameters
-    ----------
-    path : Path
-    demo : Demo
-    summary : mapping
-        From :func:`ikns.experiments.demo.demo_summary`.
+    The summary is from :func:`ikns.experiments.demo.demo_summary`.
     """
     figures = _figures(demo, summary)
     with figure_style():
         figures["workspace"].savefig(
             path.with_name("workspace.png"), dpi=_DPI, metadata={"Software": None}
         )
-    write_report(
-        path,
+    page = report_html(
         title=f"Virtual subject {demo.seed}: from markers to a control signal",
         lead=_LEAD,
         facts={
@@ -96,6 +91,7 @@ def write_demo_report(path: Path, demo: Demo, summary: Mapping[str, Any]) -> Non
         next_steps=_NEXT_STEPS,
         simulated=True,
     )
+    write_report(path, page)
 
 
 def _figures(demo: Demo, summary: Mapping[str, Any]) -> dict[str, Figure]:

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.style import (
     BLUE,
@@ -22,8 +23,6 @@ from ikns.view.style import (
 )
 
 __all__ = ["directions_figure", "principal_angle_figure"]
-
-Array = NDArray[np.float64]
 
 _COLUMNS = 5
 _MARKS = (*MARKS, (RED, "v"))
@@ -44,15 +43,8 @@ def directions_figure(
         Learned unit directions; a point without one is NaN.
     joint_names : sequence of n str
         In chain order; drawn from top to bottom.
-    simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     analytic : array like `directions`, optional
         The Jacobian's directions, drawn as wide pale bars behind.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One panel per point and direction.
     """
     learned = _stacked(directions, len(joint_names))
     behind = None if analytic is None else _stacked(analytic, len(joint_names))
@@ -106,10 +98,7 @@ def directions_figure(
 
 
 def principal_angle_figure(
-    angles: Mapping[str, ArrayLike],
-    *,
-    simulated: bool,
-    goal: float | None = None,
+    angles: Mapping[str, ArrayLike], *, simulated: bool, goal: float | None = None
 ) -> Figure:
     """Draw the angle between learned and analytic null space at every PCA point.
 
@@ -118,14 +107,8 @@ def principal_angle_figure(
     angles : mapping of name to (P,) array
         Principal angle per point, radians, for each analytic null space compared with;
         NaN where a point has no direction.
-    simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     goal : float, optional
         Angle that should not be exceeded, radians; drawn as a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     series = {name: np.asarray(given, dtype=float) for name, given in angles.items()}
     sizes = {values.shape for values in series.values()}

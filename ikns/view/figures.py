@@ -1,13 +1,13 @@
 """Every figure of the package: plain SI arrays in, a matplotlib Figure out.
 
-No figure uses pyplot or needs a screen. Each takes ``simulated`` and says in its title
-when the data come from a virtual subject.
+No figure uses pyplot or needs a screen. Each takes ``simulated``, whether the data come
+from a virtual subject, and says so in its title. Arrays of the wrong shape raise
+InvalidInput.
 """
 
 from ikns.view.body import arm_points
 from ikns.view.comparison import comparison_figure
 from ikns.view.directions import directions_figure, principal_angle_figure
-from ikns.view.error_map import error_map_figure, workspace_slices
 from ikns.view.residuals import residual_figure
 from ikns.view.signals import control_figure, swivel_figure
 from ikns.view.variance_split import variance_split_figure
@@ -18,11 +18,9 @@ __all__ = [
     "comparison_figure",
     "control_figure",
     "directions_figure",
-    "error_map_figure",
     "principal_angle_figure",
     "residual_figure",
     "swivel_figure",
     "variance_split_figure",
     "workspace_figure",
-    "workspace_slices",
 ]

@@ -82,10 +82,7 @@ class NextStep:
 class ReportPage:
     """Turns parts into HTML and numbers figures and tables in their order.
 
-    Parameters
-    ----------
-    simulated : bool
-        Whether every caption must say that the data are simulated.
+    Where data are simulated every caption says so.
     """
 
     def __init__(self, simulated: bool) -> None:

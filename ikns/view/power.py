@@ -41,21 +41,10 @@ def power_figure(
         Target power, 0 to 1; drawn as a line.
     simulated : bool
         Whether the assumed spread comes from virtual subjects; the title says so.
-    needed : int, optional
-        Fewest participants that reach the target.
-    declared : int, optional
-        Participants that the study declares.
+    needed, declared : int, optional
+        Fewest participants that reach the target; participants that the study declares.
     note : str
         Source of the assumed spread; printed below the axis.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    InvalidInput
-        When shapes disagree, or a share is not within 0 to 1.
     """
     n, share = series(participants, "participants"), series(power, "power")
     same_length(participants=n, power=share)

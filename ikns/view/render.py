@@ -48,10 +48,9 @@ def data_uri(figure: Figure) -> str:
 
 
 def _is_crowded(figure: Figure) -> bool:
-    lines = [line for axes in figure.axes for line in axes.lines]
-    points = sum(np.size(line.get_xdata()) for line in lines)
+    sizes = (np.size(line.get_xdata()) for axes in figure.axes for line in axes.lines)
     # 3-D axes are used for surfaces and clouds of points.
-    return points > _MOST_POINTS or any(axes.name == "3d" for axes in figure.axes)
+    return sum(sizes) > _MOST_POINTS or any(axes.name == "3d" for axes in figure.axes)
 
 
 def _saved(figure: Figure, kind: str) -> bytes:

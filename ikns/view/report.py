@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
 from importlib.resources import files
 from pathlib import Path
 
 from ikns.errors import FileError
 from ikns.output.file import write_bytes
-from ikns.view.document import html_document
 from ikns.view.parts import (
     Cell,
     KeyNumber,
@@ -28,60 +28,14 @@ __all__ = [
     "Section",
     "NextStep",
     "Table",
+    "html_document",
     "report_html",
     "write_report",
 ]
 
 
-def write_report(
-    path: str | Path,
-    *,
-    title: str,
-    sections: Sequence[Section],
-    simulated: bool,
-    lead: str = "",
-    facts: Mapping[str, Cell] | None = None,
-    key_numbers: Sequence[KeyNumber] = (),
-    next_steps: Sequence[NextStep] = (),
-) -> None:
-    """Write a report; an earlier file is kept until the new one is complete.
-
-    Parameters
-    ----------
-    path : str or Path
-        The HTML file.
-    title : str
-        Heading of the page.
-    sections : sequence of Section
-        In order.
-    simulated : bool
-        Whether the data come from a virtual subject; the header, every caption and
-        every table then say so.
-    lead : str
-        Paragraph under the title: the outcome.
-    facts : mapping, optional
-        Subject and provenance for the header: side, chain, seed, versions.
-    key_numbers : sequence of KeyNumber
-        Results to see first.
-    next_steps : sequence of NextStep
-        Commands for the end of the page.
-
-    Raises
-    ------
-    InvalidInput
-        When a picture has no alternative text or a table's row is too short or long.
-    FileError
-        When the file cannot be written.
-    """
-    page = report_html(
-        title=title,
-        sections=sections,
-        simulated=simulated,
-        lead=lead,
-        facts=facts,
-        key_numbers=key_numbers,
-        next_steps=next_steps,
-    )
+def write_report(path: str | Path, page: str) -> None:
+    """Write a page; an earlier file is kept until the new one is complete."""
     target = Path(path)
     try:
         # File names may hold bytes that are not text; they become question marks.
@@ -100,7 +54,26 @@ def report_html(
     key_numbers: Sequence[KeyNumber] = (),
     next_steps: Sequence[NextStep] = (),
 ) -> str:
-    """Return the page that :func:`write_report` writes; same input, same text."""
+    """Return the page of a report; same input, same text.
+
+    Parameters
+    ----------
+    title : str
+        Heading of the page.
+    sections : sequence of Section
+        In order.
+    simulated : bool
+        Whether the data come from a virtual subject; the header, every caption and
+        every table then say so.
+    lead : str
+        Paragraph under the title: the outcome.
+    facts : mapping, optional
+        Subject and provenance for the header: side, chain, seed, versions.
+    key_numbers : sequence of KeyNumber
+        Results to see first.
+    next_steps : sequence of NextStep
+        Commands for the end of the page.
+    """
     page = ReportPage(simulated)
     style = files("ikns.view").joinpath("report.css").read_text(encoding="utf-8")
     badge = '<p class="badge">Simulated subject</p>' if simulated else ""
@@ -115,3 +88,24 @@ def report_html(
         "</main>",
     ]
     return html_document(title, style, body)
+
+
+def html_document(title: str, style: str, body: Iterable[str]) -> str:
+    """Return a document; the browser itself refuses whatever it would load.
+
+    Title is plain text, style CSS; body are HTML elements, of which empty ones are left
+    out.
+    """
+    parts = [
+        "<!DOCTYPE html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
+        "img-src data:; style-src 'unsafe-inline'\">",
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        '<meta name="color-scheme" content="light dark">',
+        f"<title>{escape(title)}</title>",
+        f"<style>\n{style}</style></head><body>",
+        *body,
+        "</body></html>",
+    ]
+    return "\n".join(part for part in parts if part) + "\n"

@@ -6,14 +6,21 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Mask
 from ikns.view.arrays import same_length, series
-from ikns.view.style import BLUE, GREY, INK, figure_style, new_figure, point_color
+from ikns.view.style import (
+    BLUE,
+    GREY,
+    INK,
+    figure_style,
+    new_figure,
+    outside_legend,
+    point_color,
+)
 
 __all__ = ["control_figure", "swivel_figure"]
-
-Array = NDArray[np.float64]
 
 _COLUMNS = 5
 #: Widest axis of c: outside the volume c has no bound.
@@ -40,12 +47,6 @@ def swivel_figure(
         PCA point of each sample; negative ones are left out.
     correlations : (P,) array
         Correlation r of the two at each point, for the titles.
-    simulated : bool
-        Whether the data come from a virtual subject; the title says so.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     angle, signal = series(swivel, "swivel"), series(control_signal, "control_signal")
     point = np.asarray(labels)
@@ -107,14 +108,8 @@ def control_figure(
         m/s in the thorax frame.
     inside : (T,) boolean array
         Whether the hand was inside the interpolation volume.
-    simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     gate : float, optional
         Hand speed below which samples were learned from, m/s; drawn as a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     t, speed = series(time, "time"), series(hand_speed, "hand_speed")
     signal = np.asarray(control_signal, dtype=np.float64)
@@ -142,11 +137,11 @@ def control_figure(
         if len(t) > 1:
             lower.set_xlim(t[0], t[-1])
         figure.align_ylabels()
-        _shared_legend(figure, upper, lower)
+        outside_legend(figure, upper, lower)
     return figure
 
 
-def _shade(axes: Any, time: Array, where: NDArray[np.bool_]) -> None:
+def _shade(axes: Any, time: Array, where: Mask) -> None:
     """Shade the time intervals in which `where` holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
     if not edges.size:
@@ -180,13 +175,3 @@ def _bound_c(axes: Any, signals: Array) -> None:
             fontsize=7.5,
             color=GREY,
         )
-
-
-def _shared_legend(figure: Figure, *panels: Any) -> None:
-    named: dict[str, Any] = {}
-    for axes in panels:
-        handles, names = axes.get_legend_handles_labels()
-        named |= dict(zip(names, handles, strict=True))
-    figure.legend(
-        list(named.values()), list(named), loc="outside upper right", ncols=len(named)
-    )

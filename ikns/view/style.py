@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import matplotlib.style
 from matplotlib.colors import to_rgb
@@ -24,6 +25,7 @@ __all__ = [
     "figure_style",
     "joint_labels",
     "new_figure",
+    "outside_legend",
     "point_color",
 ]
 
@@ -91,23 +93,28 @@ def figure_style() -> Iterator[None]:
 def new_figure(
     title: str, *, simulated: bool, height: float, width: float = PAGE_WIDTH
 ) -> Figure:
-    """Return an empty figure that says in its title whether the data are simulated.
-
-    Parameters
-    ----------
-    title : str
-        What the figure shows.
-    simulated : bool
-        Whether any of the data come from a virtual subject.
-    height, width : float
-        Inches.
-    """
+    """Return an empty figure (inches); its title says whether data are simulated."""
     # Inches around each panel.
     layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06)
     figure = Figure(figsize=(width, height), layout=layout)
     text = f"{title} (simulated subject)" if simulated else title
     figure.suptitle(text, x=0.008, ha="left")
     return figure
+
+
+def outside_legend(figure: Figure, *panels: Any) -> None:
+    """Add one legend for all panels, next to the title."""
+    named: dict[str, Any] = {}
+    for axes in panels:
+        handles, names = axes.get_legend_handles_labels()
+        named |= dict(zip(names, handles, strict=True))
+    if named:
+        figure.legend(
+            list(named.values()),
+            list(named),
+            loc="outside upper right",
+            ncols=len(named),
+        )
 
 
 def point_color(point: int) -> tuple[float, float, float]:
@@ -126,8 +133,6 @@ def joint_labels(joint_names: Sequence[str]) -> list[str]:
 
     >>> joint_labels(["right_elbow_flexion", "right_wrist_flexion"])
     ['elbow flexion', 'wrist flexion']
-    >>> joint_labels(["right_elbow_flexion", "left_elbow_flexion"])
-    ['right elbow flexion', 'left elbow flexion']
     """
     words = [name.replace("_", " ") for name in joint_names]
     for side in ("right ", "left "):

@@ -6,15 +6,14 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.arrays import same_length, series
 from ikns.view.style import BLUE, GREY, INK, ORANGE, figure_style, new_figure
 
 __all__ = ["variance_split_figure"]
-
-Array = NDArray[np.float64]
 
 _AXIS = {"time": "normalized time (%)", "points": "PCA point"}
 
@@ -41,20 +40,12 @@ def variance_split_figure(
         Variance per degree of freedom, rad^2; NaN leaves a gap.
     delta_vz : (T,) array
         Log-transformed index.
-    simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     over : {"time", "points"}
         What `at` counts: time is drawn as lines, points as marks.
-    interval : (2, T) array, optional
-        Confidence interval of dVz, low and high.
-    surrogates : (2, T) array, optional
-        Range of dVz of surrogates, low and high, drawn as a band.
+    interval, surrogates : (2, T) array, optional
+        Low and high of dVz: its confidence interval, and the range of surrogates.
     no_structure : float, optional
         dVz of equal V_UCM and V_ORT, ln(d/k)/2; drawn as a line.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     if over not in _AXIS:
         raise InvalidInput(f"over must be 'time' or 'points', not {over!r}.")
@@ -71,16 +62,10 @@ def variance_split_figure(
         )
         upper, lower = figure.subplots(2, 1, sharex=True)
         # Distinct in dash and mark as well as in color.
-        _draw(upper, over, x, _square_degrees(ucm), BLUE, "V_UCM: unseen by the task")
-        _draw(
-            upper,
-            over,
-            x,
-            _square_degrees(ort),
-            ORANGE,
-            "V_ORT: moves the task",
-            second=True,
-        )
+        square = np.degrees(1.0) ** 2
+        _draw(upper, over, x, ucm * square, BLUE, "V_UCM: unseen by the task")
+        name = "V_ORT: moves the task"
+        _draw(upper, over, x, ort * square, ORANGE, name, second=True)
         upper.set_ylabel("variance per DoF (deg²)")
         if over == "time" or not (np.nan_to_num([ucm, ort]) > 0).any():
             upper.set_ylim(bottom=0)
@@ -138,10 +123,6 @@ def _draw(
     else:
         mark = "D" if second else "o"
         axes.plot(x, y, mark, color=color, ms=5.5, mew=0, label=name)
-
-
-def _square_degrees(variance: Array) -> Array:
-    return variance * np.degrees(1.0) ** 2
 
 
 def _range(given: ArrayLike | None, n: int) -> Array | None:

@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.colors import LightSource, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.arrays import outward
 from ikns.view.body import body_surfaces
@@ -24,8 +25,6 @@ from ikns.view.style import (
 )
 
 __all__ = ["workspace_figure"]
-
-Array = NDArray[np.float64]
 
 #: Thorax frame (X forward, Y up, Z right) to the drawing's right, forward, up.
 _TO_DRAWING = [2, 0, 1]
@@ -51,21 +50,15 @@ def workspace_figure(
     hand : (T, 3) array
         Where the hand was, m in the thorax frame; NaN breaks the line.
     samples : (N, 3) array
-        Still samples, m in the thorax frame.
+        Still samples, likewise.
     labels : (N,) integer array
         PCA point of each sample, -1 where it was discarded.
     centers : (P, 3) array
         PCA points, m; numbered from 1 in the figure.
-    simulated : bool
-        Whether the data come from a virtual subject; the title says so.
     facets : (F, 3) integer array, optional
         Triangles of the interpolation volume, as rows of `centers`.
     arms : (2, 4, 3) array, optional
         Both arms (see :func:`ikns.view.body.arm_points`); draws a body behind.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     path, still = _points(hand, "hand"), _points(samples, "samples")
     point = _points(centers, "centers")

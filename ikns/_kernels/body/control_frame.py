@@ -17,100 +17,62 @@ from ikns._kernels.body.descent import errors_at
 from ikns._kernels.body.marker_ik import solve_frame
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
 from ikns._kernels.body.paths import Paths, place_frames
-from ikns._kernels.body.tree import Floats, Indices
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import NOT_FINITE, OUTSIDE_HULL
 from ikns._kernels.voronoi.query import natural_weights
+from ikns.arrays import Array, Indices
 
 __all__ = ["ControlMap", "control_frame"]
 
 
 class ControlMap(NamedTuple):
-    """P points for d signals of n joints, seen by M markers on L links.
+    """P points for d signals of n joints, seen by M markers on L links."""
 
-    Parameters
-    ----------
-    points : (P, 3) array
-        m; without natural neighbors the nearest of these has all the weight.
-    numbers, indices : arrays
-        A packed interpolator; `indices` is empty where there is none.
-    directions : (P, d, n) array
-    lower, upper : (P, d) array
-        rad.
-    columns : (n,) integer array
-        The chain's joints among the angles.
-    hands : (1,) or (2,) integer array
-        The chain's hands, of right and left.
-    link : (M,) integer array
-        Link that a marker belongs to, or -1.
-    need : (L,) integer array
-        How many markers of a link must be seen.
-    pair : (N, 2) integer array
-        Pairs of markers of the same link.
-    apart : (N,) array
-        Their distance on the link, m.
-    """
-
-    points: Floats
-    numbers: Floats
-    indices: Indices
-    directions: Floats
-    lower: Floats
-    upper: Floats
-    columns: Indices
-    hands: Indices
-    link: Indices
-    need: Indices
-    pair: Indices
-    apart: Floats
+    points: Array  # (P, 3) m; without natural neighbors the nearest has all the weight
+    numbers: Array  # a packed interpolator, as floats
+    indices: Indices  # the same as integers; empty where there is none
+    directions: Array  # (P, d, n)
+    lower: Array  # (P, d) rad
+    upper: Array  # (P, d) rad
+    columns: Indices  # (n,) the chain's joints among the angles
+    hands: Indices  # (1,) or (2,) the chain's hands, of right and left
+    link: Indices  # (M,) link that a marker belongs to, or -1
+    need: Indices  # (L,) how many markers of a link must be seen
+    pair: Indices  # (N, 2) pairs of markers of the same link
+    apart: Array  # (N,) their distance on the link, m
 
 
 @compiled
 def control_frame(
     whole: Indices,
-    real: Floats,
+    real: Array,
     paths: Paths,
     control_map: ControlMap,
-    markers: Floats,
+    markers: Array,
     from_scratch: bool,
-    q: Floats,
-    work: Floats,
-    cavity_work: Floats,
-    rotation: Floats,
-    position: Floats,
-    weights: Floats,
-    place: Floats,
-    c: Floats,
+    q: Array,
+    work: Array,
+    cavity_work: Array,
+    rotation: Array,
+    position: Array,
+    weights: Array,
+    place: Array,
+    c: Array,
 ) -> tuple[float, float, float, int, bool, bool, int]:
-    """Solve one frame.
+    """Solve one frame of markers (M, 3) in the world, m; NaN where not seen.
 
-    Parameters
-    ----------
-    whole, real : arrays
-        As in :func:`ikns._kernels.body.marker_ik.solve_frames`.
-    paths : Paths
-        To both hands.
-    control_map : ControlMap
-    markers : (M, 3) array
-        In the world, m; NaN where not seen.
-    from_scratch : bool
-        Whether there is no pose to start from in `q`.
-    q : (nq,) array
-        The previous pose; overwritten by the solution.
-    work, cavity_work, rotation (1, 2, 3, 3), weights (P,) : arrays
-        Scratch.
-    position : (1, 2, 3) array
-        Right and left hand in the thorax frame, m, written.
-    place : (3,) array
-        Position of the task, written, m.
-    c : (d,) array
-        The signals, written, not clipped; NaN while the chain is not in sight, and
-        where the weights are NaN or the range is zero.
+    `whole`, `real` and `q`, the previous pose, are as in
+    :func:`ikns._kernels.body.marker_ik.solve_frames`, `paths` lead to both hands;
+    `work`, `cavity_work`, `rotation` (1, 2, 3, 3) and `weights` (P,) are scratch.
+    Written are the pose `q` (nq,), the right and left hand `position` (1, 2, 3) and the
+    task's `place` (3,) in the thorax frame, m, and the signals `c` (d,), not clipped:
+    NaN while the chain is not in sight, and where the weights are NaN or the range is
+    zero.
 
     Returns
     -------
     residual : float
-        As from marker inverse kinematics.
+        As from marker inverse kinematics, like `iterations` and `converged`.
     worst : float
         Largest residual of a marker on the chain's links, m; NaN without any.
     intermarker : float
@@ -118,7 +80,6 @@ def control_frame(
         seen.
     iterations : int
     converged : bool
-        As from marker inverse kinematics.
     known : bool
         Whether the chain is in sight.
     status : int
@@ -165,7 +126,7 @@ def control_frame(
 
 @compiled
 def _worst_residual(
-    problem: MarkerProblem, s: Scratch, link: Indices, q: Floats
+    problem: MarkerProblem, s: Scratch, link: Indices, q: Array
 ) -> float:
     """Largest residual of the current markers at `q`, m."""
     errors_at(problem, s, q)
@@ -180,7 +141,7 @@ def _worst_residual(
 
 
 @compiled
-def _intermarker_error(markers: Floats, pair: Indices, apart: Floats) -> float:
+def _intermarker_error(markers: Array, pair: Indices, apart: Array) -> float:
     largest = 0.0
     for i in range(len(pair)):
         square = total = 0.0
@@ -194,7 +155,7 @@ def _intermarker_error(markers: Floats, pair: Indices, apart: Floats) -> float:
 
 
 @compiled
-def _in_sight(markers: Floats, link: Indices, need: Indices) -> bool:
+def _in_sight(markers: Array, link: Indices, need: Indices) -> bool:
     for i in range(len(need)):
         seen = 0
         for m in range(len(link)):
@@ -207,7 +168,7 @@ def _in_sight(markers: Floats, link: Indices, need: Indices) -> bool:
 
 
 @compiled
-def _nearest_weights(points: Floats, place: Floats, weights: Floats) -> int:
+def _nearest_weights(points: Array, place: Array, weights: Array) -> int:
     nearest, least = 0, np.inf
     for i in range(len(points)):
         square = 0.0
@@ -222,13 +183,13 @@ def _nearest_weights(points: Floats, place: Floats, weights: Floats) -> int:
 
 @compiled
 def _signals(
-    weights: Floats,
-    directions: Floats,
-    lower: Floats,
-    upper: Floats,
+    weights: Array,
+    directions: Array,
+    lower: Array,
+    upper: Array,
     columns: Indices,
-    angles: Floats,
-    c: Floats,
+    angles: Array,
+    c: Array,
 ) -> None:
     for k in range(len(c)):
         above = width = 0.0

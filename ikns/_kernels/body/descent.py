@@ -12,9 +12,10 @@ from ikns._kernels.body.marker_errors import add_penalties, marker_errors, penal
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
 from ikns._kernels.body.normal_equations import linearize
 from ikns._kernels.body.step import integrate
-from ikns._kernels.body.tree import Floats, Indices, joint_axes
+from ikns._kernels.body.tree import joint_axes
 from ikns._kernels.body.tree_cholesky import factor, solve
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
 __all__ = ["copy", "descend", "errors_at"]
 
@@ -25,14 +26,14 @@ _NEWTON = 0.03
 
 
 @compiled
-def copy(source: Floats, into: Floats) -> None:
+def copy(source: Array, into: Array) -> None:
     """Copy an array (n,) into another."""
     for i in range(len(into)):
         into[i] = source[i]
 
 
 @compiled
-def errors_at(problem: MarkerProblem, s: Scratch, q: Floats) -> tuple[float, float]:
+def errors_at(problem: MarkerProblem, s: Scratch, q: Array) -> tuple[float, float]:
     """Write joints, markers and errors at `q` into `s`; return their squared sums.
 
     The sums are weighted and not.
@@ -167,13 +168,13 @@ def _linearize(problem: MarkerProblem, s: Scratch, pull: float) -> None:
 def _step(
     path: Indices,
     depth: Indices,
-    gradient: Floats,
-    hessian: Floats,
-    curvature: Floats,
+    gradient: Array,
+    hessian: Array,
+    curvature: Array,
     share: float,
     damping: float,
-    factored: Floats,
-    step: Floats,
+    factored: Array,
+    step: Array,
 ) -> bool:
     """Write the damped step; False where its matrix is not positive definite.
 
@@ -194,7 +195,7 @@ def _step(
 
 
 @compiled
-def _largest(step: Floats) -> float:
+def _largest(step: Array) -> float:
     """Limit a step to one radian or meter, beyond which the model is not valid."""
     largest = 0.0
     for d in range(len(step)):

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ikns._kernels.body.step import displacement
-from ikns._kernels.body.tree import Floats, Indices, Tree, place_joints
+from ikns._kernels.body.tree import Tree, place_joints
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
 __all__ = ["add_penalties", "marker_errors", "penalties", "take_markers"]
 
 
 @compiled
 def take_markers(
-    given: Floats, seen: Floats, weight: Floats, target: Floats
+    given: Array, seen: Array, weight: Array, target: Array
 ) -> tuple[int, bool]:
     """Copy the seen markers, which are those that are finite.
 
@@ -37,15 +38,15 @@ def take_markers(
 def marker_errors(
     tree: Tree,
     joint: Indices,
-    position: Floats,
-    weight: Floats,
-    target: Floats,
-    q: Floats,
-    origin: Floats,
-    rotation: Floats,
-    translation: Floats,
-    x: Floats,
-    error: Floats,
+    position: Array,
+    weight: Array,
+    target: Array,
+    q: Array,
+    origin: Array,
+    rotation: Array,
+    translation: Array,
+    x: Array,
+    error: Array,
 ) -> tuple[float, float]:
     """Write joints and markers relative to the first joint, and the markers' errors.
 
@@ -79,14 +80,14 @@ def marker_errors(
 def penalties(
     tree: Tree,
     angle: Indices,
-    lower: Floats,
-    upper: Floats,
-    start: Floats,
+    lower: Array,
+    upper: Array,
+    start: Array,
     pull: float,
     limit: float,
-    q: Floats,
-    moved: Floats,
-    beyond: Floats,
+    q: Array,
+    moved: Array,
+    beyond: Array,
 ) -> float:
     """Write distances (n,) from the start and beyond the limits; return the cost."""
     displacement(tree, start, q, moved)
@@ -104,14 +105,14 @@ def penalties(
 def add_penalties(
     path: Indices,
     depth: Indices,
-    free: Floats,
+    free: Array,
     pull: float,
     limit: float,
-    moved: Floats,
-    beyond: Floats,
-    gradient: Floats,
-    hessian: Floats,
-    curvature: Floats,
+    moved: Array,
+    beyond: Array,
+    gradient: Array,
+    hessian: Array,
+    curvature: Array,
 ) -> None:
     """Add the penalties to gradient and Hessian, and remove held joints from both."""
     for d in range(len(depth)):

@@ -4,23 +4,23 @@ Minimizes over the configuration q
 
     sum_m weight_m |x_m(q) - seen_m|^2 + (pull |q - before|)^2 + (limit |beyond|)^2
 
-by Levenberg-Marquardt (More 1978) as :mod:`ikns.motion.marker_ik.reference` does, but
-with the true Hessian where that is positive definite: the curvature term is cheap here
-(see :mod:`ikns._kernels.body.normal_equations`), and where markers deviate from the
-body by centimeters Gauss-Newton needs many times as many steps.
+by Levenberg-Marquardt (More 1978), with the true Hessian where that is positive
+definite: the curvature term is cheap here (see
+:mod:`ikns._kernels.body.normal_equations`), and where markers deviate from the body by
+centimeters Gauss-Newton needs many times as many steps.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.body.descent import copy, descend, errors_at
 from ikns._kernels.body.marker_errors import take_markers
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
 from ikns._kernels.body.rigid import rigid_pose
-from ikns._kernels.body.tree import FREE_FLYER, Floats, Indices
+from ikns._kernels.body.tree import FREE_FLYER
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices, Mask
 
 __all__ = ["INFINITE", "solve_frame", "solve_frames"]
 
@@ -31,41 +31,32 @@ INFINITE = -1
 @compiled
 def solve_frames(
     whole: Indices,
-    real: Floats,
-    markers: Floats,
+    real: Array,
+    markers: Array,
     first: int,
     last: int,
     way: int,
-    before: Floats,
+    before: Array,
     from_scratch: bool,
-    work: Floats,
-    q: Floats,
-    residual: Floats,
+    work: Array,
+    q: Array,
+    residual: Array,
     iterations: Indices,
-    converged: NDArray[np.bool_],
+    converged: Mask,
 ) -> None:
     """Solve frames from `first` to before `last`, `way` (1 or -1) one after the other.
 
-    Parameters
-    ----------
-    whole, real : arrays
-        A packed :class:`ikns._kernels.body.marker_problem.MarkerProblem`.
-    markers : (T, M, 3) array
-        Markers in the world, m; NaN where not seen.
-    first, last, way : int
-    before : (nq,) array
-        The pose before the first frame; later frames start from the previous one.
-    from_scratch : bool
-        Whether there is no such pose.
-    work : array
-        Scratch of :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
-    q : (T, nq) array
-        The solutions; the previous pose where no marker is seen.
-    residual : (T,) array
-        Root mean square distance of the seen markers, m; NaN without any, infinite
-        where the previous pose is not finite.
-    iterations, converged : (T,) arrays
-        Iterations are `INFINITE` where a marker is infinite, not seen and not NaN.
+    `whole` and `real` are a packed
+    :class:`ikns._kernels.body.marker_problem.MarkerProblem`, `markers` (T, M, 3) in the
+    world, m, NaN where not seen; `before` (nq,) is the pose before the first frame,
+    unless it is solved `from_scratch`, and later frames start from the previous one.
+    `work` is scratch of :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
+
+    Written are the solutions `q` (T, nq), the previous pose where no marker is seen,
+    and by frame (T,) the `residual`, the root mean square distance of the seen markers
+    (m; NaN without any, infinite where the previous pose is not finite), whether it
+    `converged`, and `iterations`: `INFINITE` where a marker is infinite, not seen and
+    not NaN.
     """
     problem = unpack(whole, real)
     s = cut(problem, work)
@@ -77,7 +68,7 @@ def solve_frames(
 
 
 @compiled
-def _finite(q: Floats) -> bool:
+def _finite(q: Array) -> bool:
     total = 0.0
     for i in range(len(q)):
         total += q[i] - q[i]
@@ -88,10 +79,10 @@ def _finite(q: Floats) -> bool:
 def solve_frame(
     problem: MarkerProblem,
     s: Scratch,
-    seen: Floats,
-    before: Floats,
+    seen: Array,
+    before: Array,
     from_scratch: bool,
-    q: Floats,
+    q: Array,
 ) -> tuple[float, int, bool]:
     """Write the solution of one frame, (nq,); return residual, iterations, converged.
 
@@ -136,7 +127,7 @@ def solve_frame(
 
 @compiled
 def _sum_by_limb(
-    branch: Indices, weight: Floats, error: Floats, residuals: Floats
+    branch: Indices, weight: Array, error: Array, residuals: Array
 ) -> None:
     """Write each limb's squared errors after the first entry."""
     for b in range(1, len(residuals)):
@@ -148,9 +139,7 @@ def _sum_by_limb(
 
 
 @compiled
-def _join_limbs(
-    branch: Indices, solved: Floats, residuals: Floats, start: Floats
-) -> None:
+def _join_limbs(branch: Indices, solved: Array, residuals: Array, start: Array) -> None:
     """Write the best solution, with each limb from the solution that fits it best."""
     best = 0
     for k in range(len(solved)):

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ikns._kernels.body.normal_equations import MOMENTS
-from ikns._kernels.body.tree import Floats, Indices, Tree
+from ikns._kernels.body.tree import Tree
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
 __all__ = ["MarkerProblem", "Scratch", "cut", "pack", "scratch_size", "unpack"]
 
@@ -20,92 +21,63 @@ __all__ = ["MarkerProblem", "Scratch", "cut", "pack", "scratch_size", "unpack"]
 class MarkerProblem(NamedTuple):
     """What does not change between frames: n rates, M markers, S starts.
 
-    Parameters
-    ----------
-    tree : Tree
-    marker_joint : (M,) integer array
-        Joint of the tree that carries the marker.
-    marker_position : (M, 3) array
-        Position in that joint's frame, m.
-    marker_weight : (M,) array
-        Zero for markers that are not used.
-    path : (n, D) integer array
-    depth : (n,) integer array
-        The degrees of freedom from the root to each one, and how many precede it; see
-        :mod:`ikns._kernels.body.tree_cholesky`.
-    free : (n,) array
-        1 for degrees of freedom to solve for, 0 for those that are held.
-    angle : (n,) integer array
-        Entry of q that `lower` and `upper` limit, or -1.
-    lower, upper : (n,) array
-        Joint limits, rad or m.
-    starts : (S, nq) array
-        Configurations to start from without a previous pose.
-    marker_branch, q_branch : (M,), (nq,) integer arrays
-        Limb of each marker and of each entry of q, from 0 to ``n_branches - 1``, or -1;
-        the best start is chosen by limb.
-    n_branches : int
-    max_iterations : int
-    pull, pull_from_scratch, limit : float
-        Weights of the terms of the cost, m/rad.
-    tolerance : float
-        A frame has converged when the next step moves every joint less, rad and m.
-    lost : float
-        Residual above which a frame is also tried from scratch, m.
+    `path` and `depth` are the degrees of freedom from the root to each one, and how
+    many precede it; see :mod:`ikns._kernels.body.tree_cholesky`. The best start is
+    chosen by limb, from 0 to ``n_branches - 1``.
     """
 
     tree: Tree
-    marker_joint: Indices
-    marker_position: Floats
-    marker_weight: Floats
-    path: Indices
-    depth: Indices
-    free: Floats
-    angle: Indices
-    lower: Floats
-    upper: Floats
-    starts: Floats
-    marker_branch: Indices
-    q_branch: Indices
+    marker_joint: Indices  # (M,) joint of the tree that carries the marker
+    marker_position: Array  # (M, 3) in that joint's frame, m
+    marker_weight: Array  # (M,) zero for markers that are not used
+    path: Indices  # (n, D)
+    depth: Indices  # (n,)
+    free: Array  # (n,) 1 for degrees of freedom to solve for, 0 for held ones
+    angle: Indices  # (n,) entry of q that `lower` and `upper` limit, or -1
+    lower: Array  # (n,) joint limit, rad or m
+    upper: Array  # (n,)
+    starts: Array  # (S, nq) configurations to start from without a previous pose
+    marker_branch: Indices  # (M,) limb of each marker, or -1
+    q_branch: Indices  # (nq,) limb of each entry of q, or -1
     n_branches: int
     max_iterations: int
-    pull: float
+    pull: float  # weights of the terms of the cost, m/rad
     pull_from_scratch: float
     limit: float
-    tolerance: float
-    lost: float
+    tolerance: float  # converged when the next step moves every joint less, rad and m
+    lost: float  # residual above which a frame is also tried from scratch, m
 
 
 class Scratch(NamedTuple):
     """Scratch memory of a frame."""
 
-    origin: Floats
-    rotation: Floats
-    translation: Floats
-    axes: Floats
-    weight: Floats
-    target: Floats
-    x: Floats
-    error: Floats
-    moments: Floats
-    forces: Floats
-    gradient: Floats
-    hessian: Floats
-    curvature: Floats
-    factored: Floats
-    step: Floats
-    moved: Floats
-    beyond: Floats
-    start: Floats
-    q: Floats
-    trial: Floats
-    solved: Floats
-    residuals: Floats
-    N: Floats
-    V: Floats
+    origin: Array
+    rotation: Array
+    translation: Array
+    axes: Array
+    weight: Array
+    target: Array
+    x: Array
+    error: Array
+    moments: Array
+    forces: Array
+    gradient: Array
+    hessian: Array
+    curvature: Array
+    factored: Array
+    step: Array
+    moved: Array
+    beyond: Array
+    start: Array
+    q: Array
+    trial: Array
+    solved: Array
+    residuals: Array
+    N: Array
+    V: Array
 
 
-def pack(problem: MarkerProblem) -> tuple[Indices, Floats]:
+def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
     """Pack a problem into integers and reals, in the order of `unpack`."""
     p, tree = problem, problem.tree
     J, n, M = len(tree.kind), len(p.free), len(p.marker_joint)
@@ -144,7 +116,7 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Floats]:
 
 
 @compiled
-def unpack(whole: Indices, real: Floats) -> MarkerProblem:
+def unpack(whole: Indices, real: Array) -> MarkerProblem:
     """Unpack a problem."""
     J, n, M, S, nq, D = whole[0], whole[1], whole[2], whole[3], whole[4], whole[5]
     i = 8
@@ -210,7 +182,7 @@ def scratch_size(problem: MarkerProblem) -> int:
 
 
 @compiled
-def cut(problem: MarkerProblem, work: Floats) -> Scratch:
+def cut(problem: MarkerProblem, work: Array) -> Scratch:
     """Divide memory of :func:`scratch_size` reals into arrays."""
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
     S, nq = problem.starts.shape
@@ -254,5 +226,5 @@ def cut(problem: MarkerProblem, work: Floats) -> Scratch:
 
 
 @compiled
-def _table(flat: Floats, at: int, rows: int, columns: int) -> Floats:
+def _table(flat: Array, at: int, rows: int, columns: int) -> Array:
     return flat[at : at + rows * columns].reshape(rows, columns)

@@ -21,8 +21,9 @@ carries the other: there the curvature is the mean of both orders.
 
 from __future__ import annotations
 
-from ikns._kernels.body.tree import FREE_FLYER, Floats, Indices, Tree
+from ikns._kernels.body.tree import FREE_FLYER, Tree
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
 __all__ = ["MOMENTS", "linearize"]
 
@@ -35,16 +36,16 @@ def linearize(
     tree: Tree,
     path: Indices,
     depth: Indices,
-    axes: Floats,
+    axes: Array,
     marker_joint: Indices,
-    weight: Floats,
-    x: Floats,
-    r: Floats,
-    moments: Floats,
-    forces: Floats,
-    gradient: Floats,
-    hessian: Floats,
-    curvature: Floats,
+    weight: Array,
+    x: Array,
+    r: Array,
+    moments: Array,
+    forces: Array,
+    gradient: Array,
+    hessian: Array,
+    curvature: Array,
 ) -> None:
     """Write gradient (n,), Gauss-Newton Hessian and curvature (n, D).
 
@@ -82,12 +83,7 @@ def linearize(
 
 @compiled
 def _sum_moments(
-    tree: Tree,
-    marker_joint: Indices,
-    weight: Floats,
-    x: Floats,
-    r: Floats,
-    moments: Floats,
+    tree: Tree, marker_joint: Indices, weight: Array, x: Array, r: Array, moments: Array
 ) -> None:
     for j in range(len(moments)):
         for k in range(MOMENTS):
@@ -128,7 +124,7 @@ def _sum_moments(
 
 
 @compiled
-def _forces(moments: Floats, j: int, axes: Floats, forces: Floats, d: int) -> float:
+def _forces(moments: Array, j: int, axes: Array, forces: Array, d: int) -> float:
     """Write the forces of degree of freedom d of joint j; return its gradient.
 
     Forces are sum weight u (3) and sum weight x x u (3) for the velocity u = v + w x x,

@@ -12,42 +12,31 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.body.tree import PRISMATIC
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
 __all__ = ["Paths", "follow_path", "path_jacobian", "place_frames", "write_jacobians"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class Paths(NamedTuple):
     """Paths from one base to E frames, concatenated; K joints in total.
 
-    Parameters
-    ----------
-    ends : (E,) integer array
-        End of each path among the K joints.
-    joint : (K, 3) integer array
-        Kind (:data:`ikns._kernels.body.tree.REVOLUTE` or ``PRISMATIC``), column of the
-        angles, column of the Jacobian (-1 for none).
-    rotation : (K + E, 3, 3) array
-    translation : (K + E, 3) array
-        Placement of each joint on the one before it, m, then that of each frame on the
-        last joint of its path.
+    A joint is its kind (:data:`ikns._kernels.body.tree.REVOLUTE` or ``PRISMATIC``), its
+    column of the angles and its column of the Jacobian (-1 for none). Placements are of
+    each joint on the one before it, then of each frame on the last joint of its path.
     """
 
-    ends: Indices
-    joint: Indices
-    rotation: Floats
-    translation: Floats
+    ends: Indices  # (E,) end of each path among the K joints
+    joint: Indices  # (K, 3)
+    rotation: Array  # (K + E, 3, 3)
+    translation: Array  # (K + E, 3) m
 
 
 @compiled
 def follow_path(
-    paths: Paths, e: int, angles: Floats, R: Floats, p: Floats, axes: Floats
+    paths: Paths, e: int, angles: Array, R: Array, p: Array, axes: Array
 ) -> None:
     """Write pose e in the base, (3, 3) and (3,) m, and its joints' z and origin.
 
@@ -77,7 +66,7 @@ def follow_path(
 
 @compiled
 def path_jacobian(
-    paths: Paths, e: int, p: Floats, axes: Floats, rows: int, jacobian: Floats
+    paths: Paths, e: int, p: Array, axes: Array, rows: int, jacobian: Array
 ) -> None:
     """Write rows ``e * rows`` and on (3 or 6 of them), in the base's axes.
 
@@ -108,7 +97,7 @@ def path_jacobian(
 
 @compiled
 def place_frames(
-    paths: Paths, angles: Floats, rotation: Floats, translation: Floats
+    paths: Paths, angles: Array, rotation: Array, translation: Array
 ) -> None:
     """Write the poses for angles (N, n), (N, E, 3, 3) and (N, E, 3) m."""
     axes = np.empty((len(paths.joint), 6))
@@ -118,7 +107,7 @@ def place_frames(
 
 
 @compiled
-def write_jacobians(paths: Paths, angles: Floats, rows: int, jacobian: Floats) -> None:
+def write_jacobians(paths: Paths, angles: Array, rows: int, jacobian: Array) -> None:
     """Write the Jacobians, (N, E * rows, n); columns without a joint stay as given."""
     axes = np.empty((len(paths.joint), 6))
     R, p = np.empty((3, 3)), np.empty(3)
@@ -129,7 +118,7 @@ def write_jacobians(paths: Paths, angles: Floats, rows: int, jacobian: Floats) -
 
 
 @compiled
-def _carry(paths: Paths, k: int, R: Floats, p: Floats) -> None:
+def _carry(paths: Paths, k: int, R: Array, p: Array) -> None:
     """Move the frame by placement k."""
     own, shift = paths.rotation[k], paths.translation[k]
     for a in range(3):

@@ -10,20 +10,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.body.tree import Floats
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array
 
 __all__ = ["rigid_pose"]
 
 
 @compiled
 def rigid_pose(
-    source: Floats,
-    target: Floats,
-    weight: Floats,
-    N: Floats,
-    V: Floats,
-    pose: Floats,
+    source: Array, target: Array, weight: Array, N: Array, V: Array, pose: Array
 ) -> None:
     """Write the pose (7,) that carries `source` onto `target`, both (M, 3).
 
@@ -79,7 +74,7 @@ def rigid_pose(
 
 
 @compiled
-def _diagonalize(A: Floats, V: Floats) -> None:
+def _diagonalize(A: Array, V: Array) -> None:
     """Diagonalize a symmetric A (k, k) in place; write its eigenvectors as columns."""
     k = len(A)
     for i in range(k):

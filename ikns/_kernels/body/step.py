@@ -16,8 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.body.tree import FREE_FLYER, Floats, Tree
+from ikns._kernels.body.tree import FREE_FLYER, Tree
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array
 
 __all__ = ["displacement", "integrate"]
 
@@ -26,7 +27,7 @@ _SMALL = 1e-2
 
 
 @compiled
-def integrate(tree: Tree, q: Floats, step: Floats, moved: Floats) -> None:
+def integrate(tree: Tree, q: Array, step: Array, moved: Array) -> None:
     """Write the configuration after `step` (n,) from `q` into `moved`."""
     for j in range(len(tree.kind)):
         at, first = tree.first_q[j], tree.first_v[j]
@@ -37,7 +38,7 @@ def integrate(tree: Tree, q: Floats, step: Floats, moved: Floats) -> None:
 
 
 @compiled
-def displacement(tree: Tree, q0: Floats, q: Floats, moved: Floats) -> None:
+def displacement(tree: Tree, q0: Array, q: Array, moved: Array) -> None:
     """Write the displacement from `q0` to `q`, (n,)."""
     for j in range(len(tree.kind)):
         at, first = tree.first_q[j], tree.first_v[j]
@@ -48,7 +49,7 @@ def displacement(tree: Tree, q0: Floats, q: Floats, moved: Floats) -> None:
 
 
 @compiled
-def _integrate_pose(q: Floats, at: int, step: Floats, i: int, moved: Floats) -> None:
+def _integrate_pose(q: Array, at: int, step: Array, i: int, moved: Array) -> None:
     vx, vy, vz = step[i], step[i + 1], step[i + 2]
     wx, wy, wz = step[i + 3], step[i + 4], step[i + 5]
     square = wx * wx + wy * wy + wz * wz
@@ -79,7 +80,7 @@ def _integrate_pose(q: Floats, at: int, step: Floats, i: int, moved: Floats) -> 
 
 
 @compiled
-def _pose_displacement(q0: Floats, q: Floats, at: int, moved: Floats, i: int) -> None:
+def _pose_displacement(q0: Array, q: Array, at: int, moved: Array, i: int) -> None:
     x, y, z, w = q0[at + 3], q0[at + 4], q0[at + 5], q0[at + 6]
     u1, u2, u3, u0 = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
     rx = w * u1 - x * u0 - y * u3 + z * u2

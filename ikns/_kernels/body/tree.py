@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
 __all__ = [
     "FREE_FLYER",
@@ -25,43 +25,25 @@ __all__ = [
     "place_joints",
 ]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 REVOLUTE, PRISMATIC, FREE_FLYER = 0, 1, 2
 #: Not a plain 2, for which numba would compile another version of its callees.
 _Z = np.int64(2)
 
 
 class Tree(NamedTuple):
-    """J joints with n degrees of freedom, parents before children.
+    """J joints with n degrees of freedom, parents before children."""
 
-    Parameters
-    ----------
-    kind : (J,) integer array
-        REVOLUTE, PRISMATIC or FREE_FLYER.
-    parent : (J,) integer array
-        Joint that carries this one; -1 is the world.
-    first_q, first_v : (J,) integer arrays
-        First entry of the joint in q and in v.
-    rotation : (J, 3, 3) array
-    translation : (J, 3) array
-        The joint's placement in its parent's frame, m.
-    dof_parent : (n,) integer array
-        The next degree of freedom towards the root, or -1.
-    """
-
-    kind: Indices
-    parent: Indices
-    first_q: Indices
-    first_v: Indices
-    rotation: Floats
-    translation: Floats
-    dof_parent: Indices
+    kind: Indices  # (J,) REVOLUTE, PRISMATIC or FREE_FLYER
+    parent: Indices  # (J,) joint that carries this one; -1 is the world
+    first_q: Indices  # (J,) first entry of the joint in q
+    first_v: Indices  # (J,) and in v
+    rotation: Array  # (J, 3, 3) the joint's placement in its parent's frame
+    translation: Array  # (J, 3) m
+    dof_parent: Indices  # (n,) next degree of freedom towards the root, or -1
 
 
 @compiled
-def place_joints(tree: Tree, q: Floats, rotation: Floats, translation: Floats) -> None:
+def place_joints(tree: Tree, q: Array, rotation: Array, translation: Array) -> None:
     """Write the joints' poses in the world, (J, 3, 3) and (J, 3) m."""
     for j in range(len(tree.kind)):
         place_joint(tree, j, q, rotation, translation)
@@ -69,7 +51,7 @@ def place_joints(tree: Tree, q: Floats, rotation: Floats, translation: Floats) -
 
 @compiled
 def place_joint(
-    tree: Tree, j: int, q: Floats, rotation: Floats, translation: Floats
+    tree: Tree, j: int, q: Array, rotation: Array, translation: Array
 ) -> None:
     """Write the pose of joint `j` from that of its parent."""
     parent, at, kind = tree.parent[j], tree.first_q[j], tree.kind[j]
@@ -121,7 +103,7 @@ def place_joint(
 
 
 @compiled
-def joint_axes(tree: Tree, rotation: Floats, translation: Floats, axes: Floats) -> None:
+def joint_axes(tree: Tree, rotation: Array, translation: Array, axes: Array) -> None:
     """Write the twist of each degree of freedom at unit rate, (n, 6), in world axes.
 
     Linear velocity of the point at the world's origin (m per unit), then angular
@@ -140,13 +122,7 @@ def joint_axes(tree: Tree, rotation: Floats, translation: Floats, axes: Floats) 
 
 @compiled
 def _axis(
-    rotation: Floats,
-    translation: Floats,
-    j: int,
-    k: int,
-    kind: int,
-    axes: Floats,
-    d: int,
+    rotation: Array, translation: Array, j: int, k: int, kind: int, axes: Array, d: int
 ) -> None:
     """Write the twist along (prismatic) or about axis k of joint j in row d."""
     x, y, z = rotation[j, 0, k], rotation[j, 1, k], rotation[j, 2, k]

@@ -14,23 +14,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.body.tree import Floats, Indices
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
 __all__ = ["factor", "solve"]
 
 
 @compiled
-def factor(H: Floats, path: Indices, depth: Indices) -> bool:
-    """Turn H into L in place; False when H is not positive definite.
-
-    Parameters
-    ----------
-    H : (n, D) array
-        Rows as described above.
-    path : (n, D) integer array
-    depth : (n,) integer array
-    """
+def factor(H: Array, path: Indices, depth: Indices) -> bool:
+    """Turn H (n, D), rows as above, into L in place; False if not positive definite."""
     for k in range(len(depth) - 1, -1, -1):
         last = depth[k]
         # A NaN is not greater than zero either.
@@ -48,7 +40,7 @@ def factor(H: Floats, path: Indices, depth: Indices) -> bool:
 
 
 @compiled
-def solve(L: Floats, path: Indices, depth: Indices, x: Floats) -> None:
+def solve(L: Array, path: Indices, depth: Indices, x: Array) -> None:
     """Solve L' L x = b in place, (n,)."""
     for i in range(len(depth) - 1, -1, -1):
         x[i] /= L[i, depth[i]]

@@ -13,7 +13,6 @@ interpolation, 1981):
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import (
@@ -27,16 +26,14 @@ from ikns._kernels.voronoi.diagram import (
     VOLUME,
     place,
 )
+from ikns.arrays import Array, Indices
 
 __all__ = ["write_answer"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @compiled
 def _smooth_coefficients(
-    indices: Indices, count: int, work: Floats
+    indices: Indices, count: int, work: Array
 ) -> tuple[float, float]:
     """Return a, b in Z1 = sum_i a w_i z_i + b w_i / |p_i| (z_i - gradient_i . p_i)."""
     volume, offset = indices[VOLUME], indices[OFFSET]
@@ -56,13 +53,13 @@ def _smooth_coefficients(
 
 @compiled
 def write_answer(
-    numbers: Floats,
+    numbers: Array,
     indices: Indices,
     status: int,
     count: int,
-    work: Floats,
+    work: Array,
     weigh: int,
-    out: Floats,
+    out: Array,
 ) -> None:
     """Move weights from scratch to an (N,) array, or add up the sites' values (M,)."""
     volume, offset, m = indices[VOLUME], indices[OFFSET], indices[VALUES]

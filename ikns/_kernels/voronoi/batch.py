@@ -8,7 +8,6 @@ the hull, and where no product cancels. The others are left for `query`.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.cavity import kept_length
@@ -38,11 +37,9 @@ from ikns._kernels.voronoi.diagram import (
 )
 from ikns._kernels.voronoi.hull import CANCELED
 from ikns._kernels.voronoi.query import NEGATIVE
+from ikns.arrays import Array, Indices
 
 __all__ = ["answer_batch", "batch_scratch_rows"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 def batch_scratch_rows(indices: Indices) -> int:
@@ -53,12 +50,12 @@ def batch_scratch_rows(indices: Indices) -> int:
 
 @compiled
 def answer_batch(
-    numbers: Floats,
+    numbers: Array,
     indices: Indices,
-    x: Floats,
-    work: Floats,
+    x: Array,
+    work: Array,
     weigh: int,
-    out: Floats,
+    out: Array,
     status: Indices,
 ) -> None:
     """Write weights (Q, N) or values (Q, M) and the status (Q,) of queries (Q, 3).
@@ -102,7 +99,7 @@ def answer_batch(
 
 @compiled
 def _depths(
-    numbers: Floats, indices: Indices, x: Floats, plain: Floats, depth: Floats
+    numbers: Array, indices: Indices, x: Array, plain: Array, depth: Array
 ) -> None:
     """Write depths behind the hull's facets; a small one is not plain."""
     plane = indices[PLANE] + 10 * (indices[FACETS] - indices[HULL])
@@ -118,7 +115,7 @@ def _depths(
 
 @compiled
 def _powers(
-    numbers: Floats, indices: Indices, x: Floats, plain: Floats, power: Floats
+    numbers: Array, indices: Indices, x: Array, plain: Array, power: Array
 ) -> None:
     """Write the powers of all circumspheres; a small one is not plain."""
     x0, x1, x2 = x[0], x[1], x[2]
@@ -135,7 +132,7 @@ def _powers(
 
 @compiled
 def _kept_lengths(
-    numbers: Floats, indices: Indices, power: Floats, depth: Floats, kept: Floats
+    numbers: Array, indices: Indices, power: Array, depth: Array, kept: Array
 ) -> None:
     """Write the kept lengths of all facets."""
     hull = indices[FACETS] - indices[HULL]
@@ -154,14 +151,14 @@ def _kept_lengths(
 
 @compiled
 def _areas(
-    numbers: Floats,
+    numbers: Array,
     indices: Indices,
     edge: int,
-    power: Floats,
-    kept: Floats,
-    ring: Floats,
-    turn: Floats,
-    area: Floats,
+    power: Array,
+    kept: Array,
+    ring: Array,
+    turn: Array,
+    area: Array,
 ) -> None:
     """Write twice the area on the query's side of the face of an edge.
 
@@ -189,12 +186,12 @@ def _areas(
 
 @compiled
 def _add_face(
-    numbers: Floats,
+    numbers: Array,
     indices: Indices,
     edge: int,
-    toward: Floats,
-    area: Floats,
-    volume: Floats,
+    toward: Array,
+    area: Array,
+    volume: Array,
 ) -> None:
     """Add what a face contributes to its two sites."""
     angle = indices[ANGLE] + indices[place(edge + 3)]
@@ -216,11 +213,11 @@ def _add_face(
 @compiled
 def _normalize(
     indices: Indices,
-    toward: Floats,
-    volume: Floats,
-    plain: Floats,
-    total: Floats,
-    least: Floats,
+    toward: Array,
+    volume: Array,
+    plain: Array,
+    total: Array,
+    least: Array,
 ) -> None:
     """Clip coordinates and write one over their sum; a negative one is not plain."""
     total[:] = 0.0
@@ -242,12 +239,12 @@ def _normalize(
 
 @compiled
 def _write_answer(
-    numbers: Floats,
+    numbers: Array,
     indices: Indices,
-    volume: Floats,
+    volume: Array,
     weigh: int,
-    share: Floats,
-    out: Floats,
+    share: Array,
+    out: Array,
 ) -> None:
     """Write weights, or add up values."""
     if weigh != 0:

@@ -16,7 +16,6 @@ query's cell. "Kept" of a Voronoi edge is the part in that cell.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import (
@@ -41,6 +40,7 @@ from ikns._kernels.voronoi.diagram import (
 )
 from ikns._kernels.voronoi.double_double import Triple, difference, double_double_dot
 from ikns._kernels.voronoi.hull import CANCELED, depth_behind, exact_depth
+from ikns.arrays import Array, Indices
 
 __all__ = [
     "check_all_spheres",
@@ -50,15 +50,12 @@ __all__ = [
     "power_to",
 ]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 #: Keeps a share of nothing, 0 / 0, at nothing; powers are zero or more than 1e-40.
 _NOTHING = 1e-300
 
 
 @compiled
-def power_to(numbers: Floats, center: int, x: Triple) -> float:
+def power_to(numbers: Array, center: int, x: Triple) -> float:
     """Power of the circumsphere packed at a place."""
     at = place(center)
     p = x[0] - numbers[at + place(6)]
@@ -72,7 +69,7 @@ def power_to(numbers: Floats, center: int, x: Triple) -> float:
 
 
 @compiled
-def _exact_power(numbers: Floats, center: int, x: Triple, rest: Triple) -> float:
+def _exact_power(numbers: Array, center: int, x: Triple, rest: Triple) -> float:
     """Power for a double-double query, to 1e-30 of its terms."""
     c = numbers[center : center + 9]
     p, p_rest = difference(x[0], c[6])
@@ -107,14 +104,11 @@ def kept_length(length: float, behind: float, ahead: float) -> float:
 
 @compiled
 def check_all_spheres(
-    numbers: Floats, indices: Indices, x: Triple, rest: Triple, work: Floats
+    numbers: Array, indices: Indices, x: Triple, rest: Triple, work: Array
 ) -> tuple[int, int]:
     """Write the powers of all tetrahedra and the kept lengths of all facets.
 
-    Returns
-    -------
-    tetrahedra, sites : int
-        How many are listed: the cavity, and all sites.
+    Returns how many are listed: tetrahedra of the cavity, and all sites.
     """
     centers, powers = indices[CIRCUMCENTER], indices[POWER]
     unsure = False
@@ -152,7 +146,7 @@ def check_all_spheres(
 
 @compiled
 def _walk(
-    numbers: Floats, indices: Indices, x: Triple, rest: Triple, start: int
+    numbers: Array, indices: Indices, x: Triple, rest: Triple, start: int
 ) -> tuple[int, float]:
     """Walk to a tetrahedron of the cavity; also its power. -1 where the walk fails."""
     rows, centers, planes = indices[TETRAHEDRON], indices[CIRCUMCENTER], indices[PLANE]
@@ -182,19 +176,11 @@ def _walk(
 
 @compiled
 def find_cavity(
-    numbers: Floats,
-    indices: Indices,
-    x: Triple,
-    rest: Triple,
-    start: int,
-    work: Floats,
+    numbers: Array, indices: Indices, x: Triple, rest: Triple, start: int, work: Array
 ) -> tuple[int, int]:
     """Write the powers in and around the cavity, and the kept lengths of its facets.
 
-    Returns
-    -------
-    tetrahedra, sites : int
-        How many are listed; no tetrahedra when the walk failed.
+    Returns how many tetrahedra and sites are listed; none when the walk failed.
     """
     t, height = _walk(numbers, indices, x, rest, start)
     if t < 0:
@@ -243,7 +229,7 @@ def find_cavity(
 
 
 @compiled
-def clear_cavity(indices: Indices, tetrahedra: int, sites: int, work: Floats) -> None:
+def clear_cavity(indices: Indices, tetrahedra: int, sites: int, work: Array) -> None:
     """Leave the scratch memory as it was found."""
     rows, powers = indices[TETRAHEDRON], indices[POWER]
     lists = work[indices[START] :].view(np.int64)

@@ -15,15 +15,13 @@ only in place 0, and four links across the facets that leave out each vertex,
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.exact import SCRATCH, Sites
 from ikns._kernels.voronoi.predicates import in_sphere, orientation
+from ikns.arrays import Indices
 
 __all__ = ["OUTWARD", "triangulate"]
-
-Integers = NDArray[np.int64]
 
 _INFINITY = -1
 _FREE = -2  # in place 0 of a row that holds no cell
@@ -34,14 +32,8 @@ OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 _SEEN, _CAVITY, _FREE_ROWS = 0, 1, 2
 
 
-def triangulate(sites: Sites, order: Integers) -> tuple[Integers, Integers]:
-    """Triangulate sites that are all different.
-
-    Parameters
-    ----------
-    sites : Sites
-    order : (N,) integer array
-        In which to insert them, the first three not on one line.
+def triangulate(sites: Sites, order: Indices) -> tuple[Indices, Indices]:
+    """Triangulate different sites, the first three in order not on one line.
 
     Returns
     -------
@@ -67,7 +59,7 @@ def triangulate(sites: Sites, order: Integers) -> tuple[Integers, Integers]:
     return cells[:, :4].copy(), number[cells[:, 4:] >> 2].copy()
 
 
-def _first_cells(sites: Sites, order: Integers) -> Integers:
+def _first_cells(sites: Sites, order: Indices) -> Indices:
     """One tetrahedron and the four infinite ones around it, if there are any."""
     R = np.empty(SCRATCH, dtype=np.int64)
     a, b, c = order[:3]
@@ -93,7 +85,7 @@ def _first_cells(sites: Sites, order: Integers) -> Integers:
 
 
 @compiled
-def insert(sites: Sites, order: Integers, cells: Integers, scratch: Integers) -> int:
+def insert(sites: Sites, order: Indices, cells: Indices, scratch: Indices) -> int:
     """Insert sites one by one; return the rows used, or 0 if there are too few."""
     R = np.empty(SCRATCH, dtype=np.int64)
     used, spare, last = np.int64(5), np.int64(0), np.int64(0)
@@ -108,7 +100,7 @@ def insert(sites: Sites, order: Integers, cells: Integers, scratch: Integers) ->
 
 
 @compiled
-def _locate(sites: Sites, R: Integers, cells: Integers, cell: int, site: int) -> int:
+def _locate(sites: Sites, R: Indices, cells: Indices, cell: int, site: int) -> int:
     """Walk from a finite cell to one that holds a site, facet by facet."""
     before = -1
     while cells[cell, 0] != _INFINITY:
@@ -134,9 +126,9 @@ def _locate(sites: Sites, R: Integers, cells: Integers, cell: int, site: int) ->
 @compiled
 def _find_cavity(
     sites: Sites,
-    R: Integers,
-    cells: Integers,
-    scratch: Integers,
+    R: Indices,
+    cells: Indices,
+    scratch: Indices,
     cell: int,
     site: int,
     mark: int,
@@ -171,8 +163,8 @@ def _find_cavity(
 
 @compiled
 def _fill_cavity(
-    cells: Integers,
-    scratch: Integers,
+    cells: Indices,
+    scratch: Indices,
     size: int,
     used: int,
     spare: int,
@@ -223,7 +215,7 @@ def _fill_cavity(
 
 
 @compiled
-def _around_edge(cells: Integers, cell: int, k: int, j: int) -> tuple[int, int]:
+def _around_edge(cells: Indices, cell: int, k: int, j: int) -> tuple[int, int]:
     """Rotate around the edge of a cell opposite to k and j, within the cavity.
 
     Returns the new cell on the facet where this ends, and the place in that cell of the

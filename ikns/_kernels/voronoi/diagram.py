@@ -17,12 +17,10 @@ to it, and from which tetrahedron.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ikns.arrays import Array, Indices
 
 __all__ = ["new_work", "place"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # Places are unsigned: of signed ones numba checks whether they count from the end,
 # which costs as much as what is done there.
@@ -70,14 +68,8 @@ NEAREST, PROJECT, NOWHERE = 0, 1, 2
 OUTSIDE_HULL, INSIDE_HULL, NOT_FINITE, UNSURE = 0, 1, -1, -2
 
 
-def new_work(indices: Indices) -> Floats:
-    """Scratch memory for queries, one for each thread.
-
-    Parameters
-    ----------
-    indices : integer array
-        The packed diagram.
-    """
+def new_work(indices: Indices) -> Array:
+    """Scratch memory for queries of a packed diagram, one for each thread."""
     work = np.zeros(indices[TETRAHEDRON])  # the first block after all scratch
     work[indices[POWER] : indices[KEPT]] = UNKNOWN
     return work

@@ -15,10 +15,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.double_double import difference
+from ikns.arrays import Array, Indices
 
 __all__ = [
     "CENTER",
@@ -36,9 +36,6 @@ __all__ = [
     "sign_of",
     "values",
 ]
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Sites are cut off to steps of this size.
 _FINEST = 2.0**-100
@@ -104,27 +101,14 @@ _TERM = np.array([term for stage in _STAGES for _, terms in stage for term in te
 
 
 class Sites(NamedTuple):
-    """N sites, as the predicates want them.
+    """N sites, as the predicates want them."""
 
-    Parameters
-    ----------
-    x : (N, 3) array
-    grain : (N,) array
-        Powers of two: all three coordinates of a site are multiples of its grain.
-    """
-
-    x: Floats
-    grain: Floats
+    x: Array  # (N, 3)
+    grain: Array  # (N,) powers of two that a site's coordinates are multiples of
 
 
-def on_lattice(points: Floats) -> Sites:
-    """Sites cut off to steps of 2**-100.
-
-    Parameters
-    ----------
-    points : (N, 3) array
-        At most 2**10 wide.
-    """
+def on_lattice(points: Array) -> Sites:
+    """Sites (N, 3), at most 2**10 wide, cut off to steps of 2**-100."""
     x = np.trunc(points / _FINEST) * _FINEST
     fraction, exponent = np.frexp(x)
     digits = (fraction * 2.0**53).astype(np.int64)
@@ -135,18 +119,13 @@ def on_lattice(points: Floats) -> Sites:
 
 @compiled
 def determinants(
-    sites: Sites, R: Integers, a: int, b: int, c: int, d: int, e: int, last: int
+    sites: Sites, R: Indices, a: int, b: int, c: int, d: int, e: int, last: int
 ) -> tuple[float, int]:
     """Compute the rows of all stages up to the last one, for five sites.
 
-    Sites that the stages do not use should repeat some of the others.
-
-    Returns
-    -------
-    step : float
-        What the lowest digits of vectors count.
-    n : int
-        Their number of digits: two if two hold them, four hold all.
+    Sites that the stages do not use should repeat some of the others. Returns what the
+    lowest digits of vectors count, and their number of digits: two if two hold them,
+    four hold all.
     """
     x, others = sites.x, (b, c, d, e)
     step, far = sites.grain[a], 0.0
@@ -165,7 +144,7 @@ def determinants(
 
 
 @compiled
-def _load(R: Integers, row: int, a: float, b: float, step: float, n: int) -> None:
+def _load(R: Indices, row: int, a: float, b: float, step: float, n: int) -> None:
     """Write b - a in n digits."""
     high, rest = difference(b, a)
     high, rest = high / step, rest / step
@@ -178,7 +157,7 @@ def _load(R: Integers, row: int, a: float, b: float, step: float, n: int) -> Non
 
 
 @compiled
-def _carry(R: Integers, row: int, n: int) -> None:
+def _carry(R: Indices, row: int, n: int) -> None:
     """Bring the digits of a row back into their range."""
     carry = 0
     for i in range(n - 1):
@@ -189,7 +168,7 @@ def _carry(R: Integers, row: int, n: int) -> None:
 
 
 @compiled
-def _compute(R: Integers, last: int, n: int) -> None:
+def _compute(R: Indices, last: int, n: int) -> None:
     """Compute the rows of all stages up to the last from vectors of n digits."""
     for r in range(_STAGE_BEGIN[last + 1]):
         row = _ROW[r]
@@ -207,7 +186,7 @@ def _compute(R: Integers, last: int, n: int) -> None:
 
 
 @compiled
-def sign_of(R: Integers, row: int, n: int) -> int:
+def sign_of(R: Indices, row: int, n: int) -> int:
     """Sign of a row computed for vectors of n digits."""
     for i in range(_DEGREE[row] * n - 1, -1, -1):
         if R[row, i] != 0:
@@ -217,22 +196,12 @@ def sign_of(R: Integers, row: int, n: int) -> int:
 
 @compiled
 def values(
-    sites: Sites, fives: Integers, last: int, row: int, value: Floats, rest: Floats
+    sites: Sites, fives: Indices, last: int, row: int, value: Array, rest: Array
 ) -> None:
-    """Write some rows of K sets of five sites: floats, and what they round off.
+    """Write M rows, from `row` on, of K sets of five sites, by the stages up to `last`.
 
-    Together they are off by less than 2**-100 of the value.
-
-    Parameters
-    ----------
-    sites : Sites
-    fives : (K, 5) integer array
-    last : int
-        The last stage to compute.
-    row : int
-        The first row to write.
-    value, rest : (K, M) array
-        Of M rows.
+    `value` and `rest` (K, M) are floats, and what they round off; together they are off
+    by less than 2**-100 of the value.
     """
     R = np.empty(SCRATCH, dtype=np.int64)
     for i in range(len(fives)):
@@ -243,7 +212,7 @@ def values(
 
 
 @compiled
-def _value(R: Integers, row: int, step: float, n: int) -> tuple[float, float]:
+def _value(R: Indices, row: int, step: float, n: int) -> tuple[float, float]:
     top = _DEGREE[row] * n - 1
     while top > 0 and R[row, top] == 0:
         top -= 1

@@ -13,38 +13,31 @@ from __future__ import annotations
 from math import atan2, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
 
 __all__ = ["solid_angles"]
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Vector = tuple[float, float, float]
 
 
 @compiled
 def solid_angles(
-    points: Floats,
-    place: Floats,
-    normal: Floats,
-    edges: Integers,
-    axis: Floats,
-    side_facet: Integers,
-    side_edge: Integers,
-    entering: Integers,
-    leaving: Integers,
-) -> Floats:
+    points: Array,
+    place: Array,
+    normal: Array,
+    edges: Indices,
+    axis: Array,
+    side_facet: Indices,
+    side_edge: Indices,
+    entering: Indices,
+    leaving: Indices,
+) -> Array:
     """Solid angles of faces from the first sites of their edges, (E,) steradian.
 
-    Parameters
-    ----------
-    points : (N, 3) array
-    place : (T, 3) array
-        Of the circumcenters.
-    normal, edges, axis, side_facet, side_edge, entering, leaving
-        As in a Voronoi diagram.
+    Of sites (N, 3) with circumcenters at `place` (T, 3); the rest as in a Voronoi
+    diagram.
     """
     angle = np.zeros(len(edges))
     first = (0.0, 0.0, 0.0)
@@ -64,7 +57,7 @@ def solid_angles(
 
 @compiled
 def _toward(
-    points: Floats, place: Floats, normal: Floats, site: int, center: int, f: int
+    points: Array, place: Array, normal: Array, site: int, center: int, f: int
 ) -> Vector:
     """Return the unit vector from a site to a circumcenter, or along f's ray."""
     if center == len(place):

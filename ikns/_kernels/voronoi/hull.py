@@ -6,7 +6,6 @@ A plane is packed as its unit normal, what that rounds off, and a point in it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import (
@@ -20,6 +19,7 @@ from ikns._kernels.voronoi.diagram import (
     place,
 )
 from ikns._kernels.voronoi.double_double import Triple, difference, double_double_dot
+from ikns.arrays import Array, Indices, Mask
 
 __all__ = [
     "CANCELED",
@@ -30,9 +30,6 @@ __all__ = [
     "scaled",
 ]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 #: Where a product of floats is below this part of its terms, it is formed again with
 #: twice the digits; above, rounding costs at most 1e-16 / 1e-3.
 CANCELED = 1e-3
@@ -41,7 +38,7 @@ _FAR = 1e9
 
 
 @compiled
-def depth_behind(numbers: Floats, plane: int, x: Triple) -> float:
+def depth_behind(numbers: Array, plane: int, x: Triple) -> float:
     """How far a point lies behind the plane packed at a place."""
     at = place(plane)
     return (
@@ -52,7 +49,7 @@ def depth_behind(numbers: Floats, plane: int, x: Triple) -> float:
 
 
 @compiled
-def exact_depth(numbers: Floats, plane: int, x: Triple, rest: Triple) -> float:
+def exact_depth(numbers: Array, plane: int, x: Triple, rest: Triple) -> float:
     """How far a double-double point lies behind a plane, to 1e-30."""
     n = numbers[plane : plane + 9]
     p, p_rest = difference(n[6], x[0])
@@ -68,19 +65,13 @@ def exact_depth(numbers: Floats, plane: int, x: Triple, rest: Triple) -> float:
 
 @compiled
 def hull_depths(
-    numbers: Floats, indices: Indices, x: Triple, rest: Triple, work: Floats
+    numbers: Array, indices: Indices, x: Triple, rest: Triple, work: Array
 ) -> tuple[float, float]:
     """Write how far a point lies behind each facet of the hull.
 
-    Its planes end with one over the depth of the middle.
-
-    Returns
-    -------
-    depth : float
-        The least; positive inside.
-    part : float
-        The least part of the way from a facet to the middle of the sites, where that
-        may be less than CANCELED.
+    Its planes end with one over the depth of the middle. Returns the least depth,
+    positive inside, and the least part of the way from a facet to the middle of the
+    sites, where that may be less than CANCELED.
     """
     depths, facets = indices[DEPTH], indices[HULL]
     planes = indices[PLANE] + 10 * (indices[FACETS] - facets)
@@ -102,7 +93,7 @@ def hull_depths(
 
 
 @compiled
-def scaled(numbers: Floats, x: Triple) -> Triple:
+def scaled(numbers: Array, x: Triple) -> Triple:
     """Scale a query, m, and bring it near; NaN where it overflows."""
     scale = numbers[SCALE]
     y = (x[0] * scale, x[1] * scale, x[2] * scale)
@@ -120,7 +111,7 @@ def scaled(numbers: Floats, x: Triple) -> Triple:
 
 
 @compiled
-def inside_many(diagram: Floats, x: Floats, within: NDArray[np.bool_]) -> None:
+def inside_many(diagram: Array, x: Array, within: Mask) -> None:
     """Write whether queries (Q, 3), m, are in the hull or, but for rounding, on it."""
     indices, rest = diagram.view(np.int64), (0.0, 0.0, 0.0)
     for q in range(len(x)):

@@ -9,23 +9,20 @@ x on the facets' planes, where they are in the facet, and on their edges.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import HULL, HULL_SITES, SITE, place
 from ikns._kernels.voronoi.double_double import Triple
+from ikns.arrays import Array, Indices
 
 __all__ = ["nearest_on_hull"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Distances that differ by less are compared by where the sites lie.
 _TIE = 1e-12
 
 
 @compiled
-def _site(numbers: Floats, indices: Indices, facet: int, k: int) -> Triple:
+def _site(numbers: Array, indices: Indices, facet: int, k: int) -> Triple:
     at = indices[SITE] + 3 * indices[place(indices[HULL_SITES] + 3 * facet + k)]
     return numbers[place(at)], numbers[place(at + 1)], numbers[place(at + 2)]
 
@@ -60,7 +57,7 @@ def _along(a: Triple, s: float, u: Triple, t: float, v: Triple) -> Triple:
 
 @compiled
 def _candidate(
-    numbers: Floats, indices: Indices, facet: int, kind: int, x: Triple
+    numbers: Array, indices: Indices, facet: int, kind: int, x: Triple
 ) -> Triple:
     """Foot of x on a facet's plane (kind 3) or on one of its edges (0, 1, 2)."""
     if kind < 3:
@@ -82,7 +79,7 @@ def _candidate(
 
 
 @compiled
-def nearest_on_hull(numbers: Floats, indices: Indices, x: Triple) -> Triple:
+def nearest_on_hull(numbers: Array, indices: Indices, x: Triple) -> Triple:
     """Project a query outside the hull onto it."""
     least = np.inf
     for facet in range(indices[HULL]):

@@ -14,9 +14,6 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.exact import (
     DETERMINANT,
@@ -27,10 +24,9 @@ from ikns._kernels.voronoi.exact import (
     determinants,
     sign_of,
 )
+from ikns.arrays import Indices
 
 __all__ = ["in_sphere", "orientation"]
-
-Integers = NDArray[np.int64]
 
 _ULP = 2.0**-53
 # Shewchuk's o3derrboundA and isperrboundA times sqrt(3), 1.74 with its own rounding.
@@ -39,7 +35,7 @@ _SPHERE_BOUND = 1.74 * (16 + 224 * _ULP) * _ULP
 
 
 @compiled
-def orientation(sites: Sites, R: Integers, a: int, b: int, c: int, d: int) -> int:
+def orientation(sites: Sites, R: Indices, a: int, b: int, c: int, d: int) -> int:
     """Sign of a tetrahedron's volume: 1 if a, b, c turn left, seen from d."""
     x = sites.x
     ax, ay, az = x[a, 0] - x[d, 0], x[a, 1] - x[d, 1], x[a, 2] - x[d, 2]
@@ -58,9 +54,7 @@ def orientation(sites: Sites, R: Integers, a: int, b: int, c: int, d: int) -> in
 
 
 @compiled
-def in_sphere(
-    sites: Sites, R: Integers, a: int, b: int, c: int, d: int, e: int
-) -> bool:
+def in_sphere(sites: Sites, R: Indices, a: int, b: int, c: int, d: int, e: int) -> bool:
     """Whether site e lies inside the sphere of a positive tetrahedron; never a tie.
 
     On the sphere itself a symbolic perturbation decides: vanishing lifts of the sites'
@@ -94,7 +88,7 @@ def in_sphere(
 
 @compiled
 def _perturbed_in_sphere(
-    sites: Sites, R: Integers, simplex: tuple[int, int, int, int], e: int
+    sites: Sites, R: Indices, simplex: tuple[int, int, int, int], e: int
 ) -> bool:
     a, b, c, d = simplex
     before = -1

@@ -9,7 +9,6 @@ weight came out negative, is `UNSURE` and has NaN for weights and value.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.answer import write_answer
@@ -39,11 +38,9 @@ from ikns._kernels.voronoi.double_double import Triple, difference
 from ikns._kernels.voronoi.hull import hull_depths, scaled
 from ikns._kernels.voronoi.hull_projection import nearest_on_hull
 from ikns._kernels.voronoi.sibson import add_faces
+from ikns.arrays import Array, Indices
 
 __all__ = ["NEGATIVE", "answer_many", "answer_one", "natural_weights"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Queries closer to the hull than this part of the way to the middle are moved in to
 #: there. The hull of a box whose corners are rounded is uneven by 1e-16, and closer to
@@ -56,7 +53,7 @@ NEGATIVE = -1e-9
 
 
 @compiled
-def _nearest(numbers: Floats, indices: Indices, x: Triple) -> tuple[int, float]:
+def _nearest(numbers: Array, indices: Indices, x: Triple) -> tuple[int, float]:
     """Return the nearest site and the square of its distance."""
     nearest, least = 0, np.inf
     for i in range(indices[SITES]):
@@ -71,7 +68,7 @@ def _nearest(numbers: Floats, indices: Indices, x: Triple) -> tuple[int, float]:
 
 
 @compiled
-def _one_site(indices: Indices, site: int, work: Floats) -> int:
+def _one_site(indices: Indices, site: int, work: Array) -> int:
     """Give a site all the weight."""
     work[place(indices[VOLUME] + site)] = 1.0
     work[indices[NEIGHBORS] :].view(np.int64)[0] = site
@@ -80,12 +77,7 @@ def _one_site(indices: Indices, site: int, work: Floats) -> int:
 
 @compiled
 def _inside_weights(
-    numbers: Floats,
-    indices: Indices,
-    x: Triple,
-    rest: Triple,
-    start: int,
-    work: Floats,
+    numbers: Array, indices: Indices, x: Triple, rest: Triple, start: int, work: Array
 ) -> tuple[bool, int]:
     """Write the weights of a point inside; return whether they are, and how many."""
     if start < 0:
@@ -134,7 +126,7 @@ def _inside_weights(
 
 @compiled
 def _weights(
-    numbers: Floats, indices: Indices, x: Triple, start: int, work: Floats
+    numbers: Array, indices: Indices, x: Triple, start: int, work: Array
 ) -> tuple[int, int]:
     """Write the weights of any query; return its status and how many there are."""
     y = scaled(numbers, x)
@@ -167,7 +159,7 @@ def _weights(
 
 
 @compiled
-def answer_one(diagram: Floats, x: Floats, out: Floats) -> bool:
+def answer_one(diagram: Array, x: Array, out: Array) -> bool:
     """Write the value (M,) at a query (3,), m; return whether it has three numbers."""
     if len(x) != 3:
         return False
@@ -179,12 +171,7 @@ def answer_one(diagram: Floats, x: Floats, out: Floats) -> bool:
 
 @compiled
 def answer_many(
-    diagram: Floats,
-    x: Floats,
-    order: Indices,
-    weigh: int,
-    out: Floats,
-    status: Indices,
+    diagram: Array, x: Array, order: Indices, weigh: int, out: Array, status: Indices
 ) -> None:
     """Write weights (Q, N) or values (Q, M) and the status (Q,) of queries (Q, 3).
 
@@ -200,25 +187,13 @@ def answer_many(
 
 @compiled
 def natural_weights(
-    numbers: Floats, indices: Indices, x: Floats, work: Floats, weights: Floats
+    numbers: Array, indices: Indices, x: Array, work: Array, weights: Array
 ) -> int:
-    """Weights of the sites at one query.
+    """Write the weights (N,) of the sites at a query (3,), m; NaN where there are none.
 
-    Parameters
-    ----------
-    numbers, indices : arrays
-        The packed diagram, as floats and as integers.
-    x : (3,) array
-        Query, m.
-    work : array
-        Scratch memory of this thread, from `new_work`.
-    weights : (N,) array
-        Where the weights go; NaN where there are none.
-
-    Returns
-    -------
-    int
-        INSIDE_HULL, OUTSIDE_HULL, NOT_FINITE or UNSURE.
+    The packed diagram is read as floats and as integers; `work` is this thread's
+    scratch memory, from `new_work`. Returns INSIDE_HULL, OUTSIDE_HULL, NOT_FINITE or
+    UNSURE.
     """
     at = (x[0], x[1], x[2])
     status, count = _weights(numbers, indices, at, indices[MIDDLE], work)

@@ -6,27 +6,21 @@ The Voronoi face of an edge has the Voronoi edges of these facets as its sides.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.delaunay import OUTWARD
+from ikns.arrays import Indices
 
 __all__ = ["list_facets", "list_sides"]
 
-Integers = NDArray[np.int64]
-
 
 def list_facets(
-    simplices: Integers, neighbors: Integers
-) -> tuple[Integers, Integers, Integers]:
+    simplices: Indices, neighbors: Indices
+) -> tuple[Indices, Indices, Indices]:
     """Every facet once, turned away from the tetrahedron behind it.
 
-    Returns
-    -------
-    facets : (F, 3) integer array
-        Their sites, counterclockwise from ahead.
-    behind, ahead : (F,) integer array
-        Tetrahedra on the two sides; T outside the hull.
+    Returns their sites (F, 3), counterclockwise from ahead, and the tetrahedra behind
+    and ahead, (F,); T outside the hull.
     """
     outside = len(simplices)
     ahead = np.where(neighbors < 0, outside, neighbors)
@@ -37,19 +31,15 @@ def list_facets(
 
 
 def list_sides(
-    facets: Integers, behind: Integers, ahead: Integers, outside: int
-) -> tuple[Integers, Integers, Integers, Integers, Integers, Integers]:
+    facets: Indices, behind: Indices, ahead: Indices, outside: int
+) -> tuple[Indices, Indices, Indices, Indices, Indices, Indices]:
     """Sides of each edge's face, counterclockwise; from the ray, if there is one.
 
     Counterclockwise about an edge in the direction of the facet's turn, its Voronoi
     edge leads ahead; about the opposite edge it leads back.
 
-    Returns
-    -------
-    edges : (E, 2) integer array
-    begin : (E + 1,) integer array
-        Where the sides of an edge begin.
-    side_facet, side_edge, entering, leaving : (S,) integer array
+    Returns edges (E, 2), where the sides of each begin (E + 1,), and of the S sides the
+    facet, the edge, and the tetrahedra entering and leaving, (S,).
     """
     a, b = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
     low, high = np.minimum(a, b), np.maximum(a, b)
@@ -67,11 +57,11 @@ def list_sides(
 
 @compiled
 def sort_sides(
-    begin: Integers,
+    begin: Indices,
     outside: int,
-    side_facet: Integers,
-    entering: Integers,
-    leaving: Integers,
+    side_facet: Indices,
+    entering: Indices,
+    leaving: Indices,
 ) -> None:
     """Sort the sides of each face: each starts where the last one ends."""
     for e in range(len(begin) - 1):

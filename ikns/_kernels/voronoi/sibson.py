@@ -22,7 +22,6 @@ Positions do not appear, only lengths and angles, each accurate to its last digi
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import (
@@ -39,15 +38,13 @@ from ikns._kernels.voronoi.diagram import (
     VOLUME,
     place,
 )
+from ikns.arrays import Array, Indices
 
 __all__ = ["add_faces"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 
 @compiled
-def add_faces(numbers: Floats, indices: Indices, tetrahedra: int, work: Floats) -> None:
+def add_faces(numbers: Array, indices: Indices, tetrahedra: int, work: Array) -> None:
     """Add up V, or F times 12 |p|, of the sites around a cavity of so many tetrahedra.
 
     The tetrahedra of a cavity around an edge follow each other. So each edge is met

@@ -13,50 +13,37 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.double_double import difference, double_double_dot
+from ikns.arrays import Array, Indices
 
 __all__ = ["sines"]
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @compiled
 def sines(
-    x: Floats,
-    facets: Integers,
-    behind: Integers,
-    normal: Floats,
-    normal_rest: Floats,
-    area: Floats,
-    edges: Integers,
-    begin: Integers,
-    side_facet: Integers,
-    entering: Integers,
+    x: Array,
+    facets: Indices,
+    behind: Indices,
+    normal: Array,
+    normal_rest: Array,
+    area: Array,
+    edges: Indices,
+    begin: Indices,
+    side_facet: Indices,
+    entering: Indices,
     canceled: float,
-    first: Integers,
-    second: Integers,
-    sine: Floats,
+    first: Indices,
+    second: Indices,
+    sine: Array,
 ) -> None:
     """Write the pairs of sides of each face, edge by edge, and their sines.
 
-    A height below the part `canceled` of |y|_1 is left out: the sine is NaN.
-
-    Parameters
-    ----------
-    x : (N, 3) array
-        Sites.
-    facets : (F, 3) integer array
-        Seen from where their normals point, their sites turn left.
-    area : (F,) array
-        Twice the facets' areas.
-    begin : (E + 1,) integer array
-        Where the sides of an edge begin.
-    behind, normal, normal_rest, edges, side_facet, entering, first, second, sine
-        As in a Voronoi diagram.
+    A height below the part `canceled` of |y|_1 is left out: the sine is NaN. Of facets
+    (F, 3), seen from where their normals point, the sites turn left; `area` (F,) is
+    twice theirs, and the sides of edge e begin at ``begin[e]``. The rest is as in a
+    Voronoi diagram.
     """
     p = 0
     for e in range(len(edges)):

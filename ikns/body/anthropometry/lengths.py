@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import hypot
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ikns.body.anthropometry.measures import check_stature, expected_measure
+from ikns.arrays import Array
+from ikns.body.anthropometry.measures import checked_measure, expected_measure
 from ikns.body.anthropometry.shoulder import clavicle_length, shoulder_joints
 from ikns.body.anthropometry.tables import row, subjects
 
@@ -54,7 +55,7 @@ def expected_lengths(stature: float, sex: str) -> dict[str, float]:
     >>> {k: round(v, 3) for k, v in expected_lengths(1.741, "male").items()}
     {'clavicle': 0.158, 'upper_arm': 0.282, 'forearm': 0.269, 'hand': 0.086}
     """
-    height = check_stature(stature)
+    height = checked_measure("stature", stature)
     arm = {
         name: float(stature_fraction(name, sex) * height)
         for name in LIMB_SEGMENTS
@@ -106,23 +107,13 @@ def length_uncertainty(sex: str) -> dict[str, float]:
     return spread
 
 
-def person_length(
-    name: str, stature: ArrayLike, surface: ArrayLike, sex: str
-) -> NDArray[np.float64]:
-    """Length of a segment of a person whose surface measure is known, meters.
+def person_length(name: str, stature: ArrayLike, surface: ArrayLike, sex: str) -> Array:
+    """Length of a limb segment of a person whose surface measure is known, meters.
 
     ``expected length(stature) * surface / expected surface(stature)``: the ratio to the
-    mean of people of the same stature is that of the surface measure. The clavicle
-    follows from the biacromial breadth directly.
-
-    Parameters
-    ----------
-    name : str
-        One of :data:`LIMB_SEGMENTS`.
-    stature, surface : float or (N,) array
-        Meters; `surface` is the measure that :data:`SURFACE_MEASURES` names.
-    sex : str
-        "female" or "male".
+    mean of people of the same stature is that of the measure which
+    :data:`SURFACE_MEASURES` names. The clavicle follows from the biacromial breadth
+    directly. Arguments are numbers or (N,) arrays.
     """
     if name == "clavicle":
         return clavicle_length(stature, sex, biacromial=surface)

@@ -3,85 +3,34 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.anthropometry.tables import row
 from ikns.errors import InvalidInput
 
-__all__ = [
-    "MASS_LIMITS",
-    "STATURE_LIMITS",
-    "check_biacromial",
-    "check_mass",
-    "check_stature",
-    "expected_measure",
-]
+__all__ = ["checked_measure", "expected_measure"]
 
-#: Plausible statures of adults, meters: wide enough for short and tall people, narrow
-#: enough to detect centimeters and feet.
-STATURE_LIMITS = (1.2, 2.3)
-
-#: Plausible masses of adults, kilograms.
-MASS_LIMITS = (25.0, 250.0)
-
-#: Plausible biacromial breadths of adults, meters.
-BIACROMIAL_LIMITS = (0.2, 0.6)
-
-
-def check_stature(stature: ArrayLike) -> NDArray[np.float64]:
-    """Return stature as an array, meters, or refuse it.
-
-    Raises
-    ------
-    InvalidInput
-        When it is not a number or outside :data:`STATURE_LIMITS`.
-    """
-    return _within(
-        stature, STATURE_LIMITS, "stature", "m", "did you give centimeters or feet?"
-    )
-
-
-def check_mass(mass: ArrayLike) -> NDArray[np.float64]:
-    """Return mass as an array, kilograms, or refuse it.
-
-    Raises
-    ------
-    InvalidInput
-        When it is not a number or outside :data:`MASS_LIMITS`.
-    """
-    return _within(mass, MASS_LIMITS, "mass", "kg", "did you give grams or pounds?")
-
-
-def check_biacromial(breadth: ArrayLike) -> NDArray[np.float64]:
-    """Return biacromial breadth as an array, meters, or refuse it.
-
-    Raises
-    ------
-    InvalidInput
-        When it is not a number or outside :data:`BIACROMIAL_LIMITS`.
-    """
-    return _within(
-        breadth,
-        BIACROMIAL_LIMITS,
-        "biacromial breadth",
+#: What is plausible for adults, with the unit and what may have been given instead.
+#: Statures: wide enough for short and tall people, narrow enough to detect centimeters
+#: and feet.
+_PLAUSIBLE = {
+    "stature": (1.2, 2.3, "m", "did you give centimeters or feet?"),
+    "mass": (25.0, 250.0, "kg", "did you give grams or pounds?"),
+    "biacromial breadth": (
+        0.2,
+        0.6,
         "m",
         "did you give millimeters, or half the breadth?",
-    )
+    ),
+}
 
 
-def expected_measure(name: str, stature: ArrayLike, sex: str) -> NDArray[np.float64]:
+def expected_measure(name: str, stature: ArrayLike, sex: str) -> Array:
     """Mean of an ANSUR II measure among people of a stature, meters.
 
-    The regression line ``mean + r * sd / sd_stature * (stature - mean_stature)``.
-
-    Parameters
-    ----------
-    name : str
-        A row of ``ansur2`` that has a correlation with stature.
-    stature : float or (N,) array
-        Meters.
-    sex : str
-        "female" or "male".
+    The regression line ``mean + r * sd / sd_stature * (stature - mean_stature)`` of a
+    row of ``ansur2`` that has a correlation with stature.
     """
     measure = row("ansur2", name, sex=sex)
     height = row("ansur2", "stature", sex=sex)
@@ -90,10 +39,15 @@ def expected_measure(name: str, stature: ArrayLike, sex: str) -> NDArray[np.floa
     return np.asarray(measure["mean_mm"] / 1000 + slope * above)
 
 
-def _within(
-    value: ArrayLike, limits: tuple[float, float], what: str, unit: str, hint: str
-) -> NDArray[np.float64]:
-    low, high = limits
+def checked_measure(what: str, value: ArrayLike) -> Array:
+    """Return a stature, mass or biacromial breadth as an array, m or kg, or refuse it.
+
+    Raises
+    ------
+    InvalidInput
+        When it is not a number or not an adult's.
+    """
+    low, high, unit, hint = _PLAUSIBLE[what]
     try:
         number = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):

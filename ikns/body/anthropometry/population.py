@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from operator import index
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.anthropometry.lengths import SURFACE_MEASURES, person_length
 from ikns.body.anthropometry.measures import expected_measure
 from ikns.body.anthropometry.tables import normalize_sex, row, table
@@ -116,7 +116,7 @@ def _generator(seed: int | np.random.Generator) -> np.random.Generator:
         ) from None
 
 
-def _deviates(count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+def _deviates(count: int, generator: np.random.Generator) -> Array:
     """Standardized stature, mass residual and measure residuals, (count, 6)."""
     size = 2 + len(_MEASURES)
     correlation = np.eye(size)
@@ -134,7 +134,7 @@ def _deviates(count: int, generator: np.random.Generator) -> NDArray[np.float64]
     return deviates
 
 
-def _adults(deviates: NDArray[np.float64], sex: str) -> list[Adult]:
+def _adults(deviates: Array, sex: str) -> list[Adult]:
     """People of one sex from their (N, 6) deviates."""
     height = row("ansur2", "stature", sex=sex)
     stature = (height["mean_mm"] + height["sd_mm"] * deviates[:, 0]) / 1000
@@ -159,9 +159,7 @@ def _adults(deviates: NDArray[np.float64], sex: str) -> list[Adult]:
     ]
 
 
-def _mass(
-    stature_deviate: NDArray[np.float64], residual: NDArray[np.float64], sex: str
-) -> NDArray[np.float64]:
+def _mass(stature_deviate: Array, residual: Array, sex: str) -> Array:
     """Log-normal mass, kg: mass is skewed, and a normal one could be too low."""
     body = row("ansur2", "body_mass", sex=sex)
     variation = (body["sd_kg"] / body["mean_kg"]) ** 2

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.anthropometry.lengths import (
     LIMB_SEGMENTS,
     expected_lengths,
     stature_fraction,
 )
-from ikns.body.anthropometry.measures import check_mass, check_stature
+from ikns.body.anthropometry.measures import checked_measure
 from ikns.body.anthropometry.shoulder import shoulder_joints
 from ikns.body.anthropometry.tables import normalize_sex, row
 from ikns.errors import InvalidInput
@@ -105,7 +105,8 @@ def segments(
     >>> round(arm.length_m, 4), round(arm.mass_kg, 2), round(arm.com_m, 4)
     (0.2817, 1.98, 0.1626)
     """
-    height, weight = check_stature(stature).item(), check_mass(mass).item()
+    height = checked_measure("stature", stature).item()
+    weight = checked_measure("mass", mass).item()
     sex = normalize_sex(sex)
     length = _limb_lengths(height, sex, lengths or {})
     girdle = _segment("clavicle", "shoulder", "girdle", length["clavicle"], weight, sex)
@@ -198,9 +199,7 @@ def _trunk_head(stature: float, mass: float, sex: str, girdle: Segment) -> Segme
     )
 
 
-def _combine(
-    parts: list[tuple[float, float, NDArray[np.float64]]],
-) -> tuple[float, float, NDArray[np.float64]]:
+def _combine(parts: list[tuple[float, float, Array]]) -> tuple[float, float, Array]:
     """Combine bodies with centers on one vertical; a negative mass is subtracted."""
     total = sum(mass for mass, _, _ in parts)
     up = sum(mass * height for mass, height, _ in parts) / total

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ikns.body.anthropometry.measures import (
-    check_biacromial,
-    check_stature,
-    expected_measure,
-)
+from ikns.arrays import Array
+from ikns.body.anthropometry.measures import checked_measure, expected_measure
 from ikns.body.anthropometry.tables import row
 
 __all__ = ["clavicle_length", "shoulder_joints"]
@@ -17,7 +14,7 @@ __all__ = ["clavicle_length", "shoulder_joints"]
 
 def shoulder_joints(
     stature: ArrayLike, sex: str, *, biacromial: ArrayLike | None = None
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Array]:
     """Joints and acromion of the right shoulder girdle of a person who stands upright.
 
     No table gives the glenohumeral center's distance from the midline, so it is half
@@ -53,13 +50,13 @@ def shoulder_joints(
     >>> shoulder_joints(1.75, "male")["glenohumeral"].round(3).tolist()
     [-0.018, -0.016, 0.181]
     """
-    height = check_stature(stature)
+    height = checked_measure("stature", stature)
     if biacromial is None:
         breadth = expected_measure("biacromial_breadth", height, sex)
     else:
-        breadth = check_biacromial(biacromial)
+        breadth = checked_measure("biacromial breadth", biacromial)
 
-    def offset(name: str) -> NDArray[np.float64]:
+    def offset(name: str) -> Array:
         return np.asarray(row("shoulder", name, sex=sex)["offset"])
 
     lateral = breadth / 2 - offset("acromion_to_glenohumeral") * height
@@ -75,7 +72,7 @@ def shoulder_joints(
 
 def clavicle_length(
     stature: ArrayLike, sex: str, *, biacromial: ArrayLike | None = None
-) -> NDArray[np.float64]:
+) -> Array:
     """Distance from the sternoclavicular to the glenohumeral joint center, meters.
 
     Parameters and errors as in :func:`shoulder_joints`; () or (N,) array.

@@ -118,10 +118,6 @@ def row(table_name: str, row_name: str, *, sex: str) -> dict[str, Any]:
 def subjects(table_name: str, *, sex: str) -> dict[str, Any]:
     """Subjects of a table: ``n`` and, where stated, mean stature and mass.
 
-    Parameters and errors as in :func:`row`.
-
-    Examples
-    --------
     >>> subjects("de_leva", sex="male")["stature_mm"]
     1741.0
     """

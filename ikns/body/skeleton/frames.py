@@ -6,27 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.body.paths import Paths, place_frames, write_jacobians
 from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints, chain_sides
-from ikns.body.skeleton.tree import joint_tree
+from ikns.body.skeleton.model import joint_tree
 from ikns.errors import FileError, InvalidInput
 
 __all__ = ["LinkFrames"]
 
-Array = NDArray[np.float64]
-
 
 class LinkFrames:
-    """The links of a model whose joint 0 carries the thorax.
-
-    Parameters
-    ----------
-    model : pin.Model
-        As :func:`ikns.body.skeleton.tree.joint_tree` takes it.
-    """
+    """The links of a model, as in :func:`joint_tree`; joint 0 carries the thorax."""
 
     def __init__(self, model: pin.Model) -> None:
         self._model = model

@@ -6,31 +6,17 @@ from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS, segment_ends
 from ikns.errors import MarkerMismatch
 
 __all__ = ["Markers", "grown_positions", "part_along"]
 
-Array = NDArray[np.float64]
-
 
 class Markers:
-    """M markers fixed to the joints of a model.
-
-    Parameters
-    ----------
-    model : pin.Model
-    marker_set : MarkerSet
-        Markers in link frames.
-
-    Raises
-    ------
-    MarkerMismatch
-        When a marker sits on a link that the model does not have.
-    """
+    """M markers, given in link frames, fixed to the joints of a model."""
 
     def __init__(self, model: pin.Model, marker_set: MarkerSet) -> None:
         links = {f.name: f for f in model.frames if f.type == pin.FrameType.BODY}

@@ -11,17 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array, Indices
 from ikns.body.skeleton.frames import LinkFrames
 from ikns.body.skeleton.model import build_model, read_urdf
 from ikns.errors import FileError, InvalidInput
 from ikns.numerics.subspace import null_spaces
 
 __all__ = ["Robot"]
-
-Array = NDArray[np.float64]
 
 #: How many of a robot's links an error names.
 _NAMED = 12
@@ -99,14 +98,7 @@ class Robot:
 
     @classmethod
     def load(cls, path: str | Path, frame: str) -> Robot:
-        """Read a URDF file.
-
-        Parameters
-        ----------
-        path : str or Path
-        frame : str
-            The link that does the task.
-        """
+        """Read a URDF file; `frame` is the link that does the task."""
         return cls(read_urdf(Path(path)), frame)
 
     @property
@@ -115,18 +107,9 @@ class Robot:
         return self._frames.tree
 
     def pose(self, q: ArrayLike) -> tuple[Array, Array]:
-        """Frame seen from the base.
+        """Frame seen from the base at joint positions (..., n), rad or m.
 
-        Parameters
-        ----------
-        q : (..., n) array
-            Joint positions, rad or m.
-
-        Returns
-        -------
-        position : (..., 3) array
-            Meters.
-        rotation : (..., 3, 3) array
+        Returns its position (..., 3), m, and rotation (..., 3, 3).
         """
         position, rotation = self._frames.place(self._all(q), (self.frame,))
         return position[..., 0, :], rotation[..., 0, :, :]
@@ -147,7 +130,7 @@ class Robot:
 
     def null_spaces(
         self, q: ArrayLike, *, task: str = "pose", rtol: float = 1e-9
-    ) -> tuple[Array, NDArray[np.int64]]:
+    ) -> tuple[Array, Indices]:
         """Joint motions that leave the frame where it is.
 
         Returns

@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array, Indices
 from ikns.body.anthropometry import Segment, segments
 from ikns.body.chains import SIDES
 from ikns.body.marker_set import MarkerSet
@@ -40,8 +41,6 @@ from ikns.errors import InvalidInput
 from ikns.numerics.subspace import null_spaces
 
 __all__ = ["Skeleton"]
-
-Array = NDArray[np.float64]
 
 
 class Skeleton:
@@ -98,16 +97,8 @@ class Skeleton:
     ) -> Skeleton:
         """Return the body of an average adult of this stature, mass and sex.
 
-        Parameters
-        ----------
-        stature : float
-            Meters.
-        mass : float
-            Kilograms.
-        sex : str
-            "female" or "male".
-        marker_set : str or path
-            What the person wears.
+        Stature in m, mass in kg, "female" or "male"; the marker set is what the person
+        wears.
 
         Examples
         --------
@@ -120,14 +111,9 @@ class Skeleton:
         )
 
     def proportioned(self, parts: Mapping[str, Segment], *, stature: float) -> Skeleton:
-        """Return a skeleton with a person's segments.
+        """Return a skeleton with a person's segments and, for the thorax, stature (m).
 
-        Parameters
-        ----------
-        parts : mapping
-            As from :func:`ikns.body.anthropometry.segments`.
-        stature : float
-            Meters; sizes the thorax.
+        Parts are as from :func:`ikns.body.anthropometry.segments`.
         """
         lengths = self.segment_lengths
         factors = {"thorax": stature / GENERIC_STATURE}
@@ -143,10 +129,7 @@ class Skeleton:
     ) -> Skeleton:
         """Return a skeleton with segments resized; markers keep their place along them.
 
-        Parameters
-        ----------
-        factors, inertials
-            As :func:`ikns.body.model_file.resize_urdf` takes them.
+        Arguments are those of :func:`ikns.body.model_file.resize_urdf`.
         """
         urdf = resize_urdf(self.urdf, factors, inertials=inertials)
         positions = grown_positions(self.urdf, self.marker_set, factors)
@@ -198,7 +181,7 @@ class Skeleton:
         """Return the tangent step that leads from `q0` to `q1`."""
         return np.array(pin.difference(self._model, q0, q1))
 
-    def columns(self, joints: tuple[str, ...]) -> NDArray[np.int64]:
+    def columns(self, joints: tuple[str, ...]) -> Indices:
         """Columns of the tangent space that belong to these joints."""
         unknown = [joint for joint in joints if joint not in self.joint_names]
         if unknown:
@@ -211,7 +194,7 @@ class Skeleton:
         return self._frames.tree
 
     @cached_property
-    def tree_markers(self) -> tuple[NDArray[np.int64], Array]:
+    def tree_markers(self) -> tuple[Indices, Array]:
         """Each marker's joint in the tree, (M,), and place in its frame, (M, 3) m."""
         joint = self._markers.joint - 1
         turned = self._frames.turned[joint]
@@ -235,27 +218,15 @@ class Skeleton:
         return self._markers.place(q)
 
     def marker_jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Marker positions and their derivative by the tangent of `q`.
-
-        Returns
-        -------
-        positions : (M, 3) array
-            Meters in the world.
-        jacobian : (M, 3, nv) array
-            d position / d v.
-        """
+        """Marker positions in the world, (M, 3) m, and d position / d v, (M, 3, nv)."""
         return self._markers.jacobian(q)
 
     def size_jacobian(self, q: Array) -> tuple[Array, Array]:
         """Differentiate the marker positions by the body's sizes.
 
-        Returns
-        -------
-        by_size : (M, 3, S) array
-            d position / d log(factor) of each segment of
-            :data:`ikns.body.model_file.SEGMENTS`, m.
-        by_position : (M, 3, 3) array
-            d position / d (marker position in its link): the link's orientation.
+        Returns d position / d log(factor) of each segment of
+        :data:`ikns.body.model_file.SEGMENTS`, (M, 3, S) m, and d position / d (marker
+        position in its link), which is the link's orientation, (M, 3, 3).
         """
         along = part_along(self.urdf, self.marker_set, self._markers.in_joint)
         return self._markers.by_size(q, along)
@@ -291,7 +262,7 @@ class Skeleton:
 
     def null_spaces(
         self, q: ArrayLike, chain: str, *, task: str = "pose", rtol: float = 1e-9
-    ) -> tuple[Array, NDArray[np.int64]]:
+    ) -> tuple[Array, Indices]:
         """Joint motions of a chain that leave its hands where they are.
 
         Parameters

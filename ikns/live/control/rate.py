@@ -23,7 +23,7 @@ from math import isfinite, isnan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns._kernels.null_space import write_bases
+from ikns._kernels.row_space import write_bases
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput

@@ -1,6 +1,6 @@
 """Marker inverse kinematics: the joint angles that put markers where they were seen.
 
-The formula is in `solver`; `reference` solves it plainly, `kernel` compiled.
+The formula is in `solver`; `kernel` hands it to compiled code.
 """
 
 from ikns.motion.marker_ik.pose import LIMIT, PRIOR, Pose

@@ -5,11 +5,11 @@ from __future__ import annotations
 import threading
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.body.marker_ik import solve_frames
 from ikns._kernels.body.marker_problem import MarkerProblem, pack, scratch_size
 from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array, Indices
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.pose import (
@@ -19,14 +19,11 @@ from ikns.motion.marker_ik.pose import (
     PRIOR,
     PRIOR_FROM_SCRATCH,
     STEP_TOLERANCE,
-    Pose,
     SolvedFrames,
     starting_poses,
 )
 
 __all__ = ["KernelSolver", "marker_problem", "tree_paths"]
-
-Array = NDArray[np.float64]
 
 
 def marker_problem(
@@ -97,41 +94,26 @@ class KernelSolver:
         work: Array = self._of_thread.work
         return work
 
-    def solve(self, markers: Array, q: Array | None) -> Pose:
-        """Solve one frame of markers (M, 3); NaN where not seen.
-
-        Iterations of -1 stand for an infinite marker, an infinite residual for a pose
-        before that is not finite.
-        """
-        frames = SolvedFrames.empty(1, len(self._neutral))
-        self._solve(markers[None], 0, 1, 1, q, frames)
-        return frames.pose(0)
-
-    def solve_many(
-        self, markers: Array, first: int, last: int, way: int, frames: SolvedFrames
-    ) -> None:
-        """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
-
-        Markers are (T, M, 3); each frame starts from the one next to it.
-        """
-        self._solve(markers, first, last, way, frames.q[first - way], frames)
-
-    def _solve(
+    def solve(
         self,
         markers: Array,
-        first: int,
-        last: int,
-        way: int,
+        span: tuple[int, int, int],
         before: Array | None,
         frames: SolvedFrames,
     ) -> None:
-        start = self._neutral if before is None else before
-        span = (first, last, way)
+        """Solve the first frame of a span to before its last, in steps of 1 or -1.
+
+        Markers are (T, M, 3), NaN where not seen. The first frame starts from the pose
+        before, or from scratch; others from the one next to them. Iterations of -1
+        stand for an infinite marker, an infinite residual for a pose before that is not
+        finite.
+        """
         scratch = before is None
+        start = self._neutral if before is None else before
         solve_frames(*self.packed, markers, *span, start, scratch, self.work, *frames)
 
 
-def tree_paths(tree: Tree) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def tree_paths(tree: Tree) -> tuple[Indices, Indices]:
     """Each degree of freedom's way from the root; see the kernels' `tree_cholesky`."""
     ways: list[list[int]] = []
     for d, parent in enumerate(tree.dof_parent.tolist()):

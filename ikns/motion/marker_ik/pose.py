@@ -1,4 +1,4 @@
-"""A solved frame, and what solvers agree on: weights of the cost, where to start."""
+"""A solved frame, the weights of the cost, and where to start."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 
@@ -22,8 +22,6 @@ __all__ = [
     "SolvedFrames",
     "starting_poses",
 ]
-
-Array = NDArray[np.float64]
 
 #: Pull towards the pose before, m/rad and m/m: the ratio of marker noise (1 mm) to
 #: what a joint typically turns within a frame (5 rad/s at 100 Hz is 0.05 rad). A joint
@@ -80,8 +78,8 @@ class SolvedFrames(NamedTuple):
 
     q: Array
     residual: Array
-    iterations: NDArray[np.int64]
-    converged: NDArray[np.bool_]
+    iterations: Indices
+    converged: Mask
 
     @classmethod
     def empty(cls, n: int, nq: int) -> Self:
@@ -101,11 +99,6 @@ class SolvedFrames(NamedTuple):
             int(self.iterations[i]),
             bool(self.converged[i]),
         )
-
-    def put(self, i: int, pose: Pose) -> None:
-        """Write one of them."""
-        self.q[i], self.residual[i] = pose.q, pose.residual
-        self.iterations[i], self.converged[i] = pose.iterations, pose.converged
 
 
 def starting_poses(skeleton: Skeleton) -> Array:

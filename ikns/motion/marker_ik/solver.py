@@ -15,8 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
@@ -27,7 +28,6 @@ from ikns.motion.marker_ik.pose import (
     Pose,
     SolvedFrames,
 )
-from ikns.motion.marker_ik.reference import ReferenceSolver
 from ikns.motion.marker_ik.visibility import (
     Visibility,
     require_sight,
@@ -40,9 +40,7 @@ from ikns.recording.recording import Recording
 
 __all__ = ["MarkerIK"]
 
-Array = NDArray[np.float64]
-
-#: Frames between two reports of progress: milliseconds when compiled.
+#: Frames between two reports of progress: milliseconds.
 _CHUNK = 500
 
 
@@ -57,9 +55,6 @@ class MarkerIK:
         Steps per frame.
     tolerance : float
         A frame has converged when no joint moves more than this in a step, rad and m.
-    compiled : bool
-        The plain solver finds the same minimum a hundred times as slowly; it is what
-        the compiled one is checked against.
     """
 
     def __init__(
@@ -68,7 +63,6 @@ class MarkerIK:
         *,
         max_iterations: int = MAX_ITERATIONS,
         tolerance: float = STEP_TOLERANCE,
-        compiled: bool = True,
     ) -> None:
         if max_iterations < 1 or not tolerance > 0:
             raise InvalidInput(
@@ -83,7 +77,7 @@ class MarkerIK:
         self._tracked = np.array([not marker.static_only for marker in worn])
         self._markers_shape = (len(worn), 3)
         self._pose_shape = (7 + len(skeleton.joint_names),)
-        self.solver = (KernelSolver if compiled else ReferenceSolver)(
+        self.solver = KernelSolver(
             skeleton, max_iterations=max_iterations, tolerance=tolerance
         )
 
@@ -114,7 +108,9 @@ class MarkerIK:
                 raise InvalidInput(
                     f"expected a pose {self._pose_shape}, found {q.shape}."
                 )
-        pose = self.solver.solve(seen, q)
+        frames = SolvedFrames.empty(1, *self._pose_shape)
+        self.solver.solve(seen[None], (0, 1, 1), q, frames)
+        pose = frames.pose(0)
         if pose.iterations < 0:
             raise InvalidInput(
                 "marker positions must be finite or NaN, found infinity."
@@ -174,31 +170,26 @@ class MarkerIK:
         visibility = visible_segments(self.skeleton, markers)
         if chain is not None:
             with naming(recording.source):
-                self._require(chain, visibility)
+                if n < 2:
+                    raise NotEnoughData(
+                        f"expected at least 2 frames, as one shows no speed, found {n}."
+                    )
+                require_sight(self.skeleton, visibility, chain)
         # Start where most markers are seen, then go both ways.
         visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
         start = int(np.argmax(visible))
-        first = self.solve(markers[start])
-        frames = SolvedFrames.empty(n, len(first.q))
-        frames.put(start, first)
+        frames = SolvedFrames.empty(n, *self._pose_shape)
+        self.solver.solve(markers, (start, start + 1, 1), None, frames)
         done = 1
         for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
             for at in range(begin, end, way * _CHUNK):
                 stop = min(at + _CHUNK, n) if way == 1 else max(at - _CHUNK, -1)
-                self.solver.solve_many(markers, at, stop, way, frames)
+                before = frames.q[at - way]
+                self.solver.solve(markers, (at, stop, way), before, frames)
                 done += abs(stop - at)
                 if progress is not None:
                     progress(done, n)
         return self._motion(recording.time, frames, visibility)
-
-    def _require(self, chain: str, visibility: Visibility) -> None:
-        """Refuse what does not show a chain."""
-        if len(visibility.seen) < 2:
-            raise NotEnoughData(
-                "expected at least 2 frames, as one shows no speed, found "
-                f"{len(visibility.seen)}."
-            )
-        require_sight(self.skeleton, visibility, chain)
 
     def _motion(
         self, time: Array, frames: SolvedFrames, visibility: Visibility

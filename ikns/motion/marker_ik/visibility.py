@@ -12,8 +12,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import SIDES, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import MarkerMismatch
@@ -33,45 +33,21 @@ _ENOUGH = 3
 
 
 class Visibility(NamedTuple):
-    """What the markers of T frames show.
+    """What the markers of T frames show."""
 
-    Parameters
-    ----------
-    segments : tuple of S str
-        Links that carry markers, and the thorax.
-    seen : (T, S) boolean array
-        Whether each is in sight.
-    known : (T, J) boolean array
-        Whether each joint angle is known.
-    """
-
-    segments: tuple[str, ...]
-    seen: NDArray[np.bool_]
-    known: NDArray[np.bool_]
+    segments: tuple[str, ...]  # S links that carry markers, and the thorax
+    seen: Mask  # (T, S) whether each is in sight
+    known: Mask  # (T, J) whether each joint angle is known
 
 
 class _Segment(NamedTuple):
-    """A segment with markers, and what lies between it and the one before.
+    """A segment with markers, and what lies between it and the one before."""
 
-    Parameters
-    ----------
-    columns : list of int
-        Its markers, without those that weigh nothing.
-    need : int
-        How many must be seen.
-    before : str
-        The next such segment on the way to the thorax; empty for the thorax.
-    joints : list of int
-        Joints between the two.
-    free : int
-        How many of these are not held.
-    """
-
-    columns: list[int]
-    need: int
-    before: str
-    joints: list[int]
-    free: int
+    columns: list[int]  # its markers, without those that weigh nothing
+    need: int  # how many must be seen
+    before: str  # next such segment on the way to the thorax; empty for the thorax
+    joints: list[int]  # joints between the two
+    free: int  # how many of these are not held
 
 
 def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], int]]:
@@ -83,8 +59,8 @@ def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], in
     }
 
 
-def visible_segments(skeleton: Skeleton, markers: NDArray[np.float64]) -> Visibility:
-    """Say which segments are in sight, and which joints are known.
+def visible_segments(skeleton: Skeleton, markers: Array) -> Visibility:
+    """Say which segments markers (T, M, 3) show, and which joints are known.
 
     While an arm is in sight from the thorax to the hand, all its joints are known.
     While it is not, a joint is known when the segments on both its sides are in sight
@@ -95,12 +71,6 @@ def visible_segments(skeleton: Skeleton, markers: NDArray[np.float64]) -> Visibi
 
     A held joint is known by the same rule: its angle is the one at which it is held,
     and unknown while a segment next to it is out of sight.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-    markers : (T, M, 3) array
-        Positions (m) in the order of the skeleton's marker set; NaN where not seen.
     """
     finite = np.asarray(np.isfinite(markers).all(axis=2))
     segments, n = _segments(skeleton), len(markers)
@@ -110,7 +80,7 @@ def visible_segments(skeleton: Skeleton, markers: NDArray[np.float64]) -> Visibi
     }
     seen = {link: count[link] >= segment.need for link, segment in segments.items()}
     determined = {"thorax": seen["thorax"]}
-    known: NDArray[np.bool_] = np.zeros((n, len(skeleton.joint_names)), dtype=bool)
+    known: Mask = np.zeros((n, len(skeleton.joint_names)), dtype=bool)
     for link, (_, _, before, joints, free) in segments.items():
         if link == "thorax":
             continue
@@ -130,13 +100,7 @@ def visible_segments(skeleton: Skeleton, markers: NDArray[np.float64]) -> Visibi
 
 
 def require_sight(skeleton: Skeleton, visibility: Visibility, chain: str) -> None:
-    """Refuse a recording that never shows a segment of a chain, or the thorax.
-
-    Raises
-    ------
-    MarkerMismatch
-        With the markers that would show it.
-    """
+    """Refuse a recording that never shows a segment of a chain, or the thorax."""
     worn = skeleton.marker_set
     for link, (own, need) in sight_needs(skeleton, chain).items():
         if not own:
@@ -150,9 +114,7 @@ def require_sight(skeleton: Skeleton, visibility: Visibility, chain: str) -> Non
             )
 
 
-def segment_pairs(
-    skeleton: Skeleton, chain: str
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def segment_pairs(skeleton: Skeleton, chain: str) -> tuple[Indices, Array]:
     """Markers of the same segment of a chain, or of the thorax, two and two.
 
     Segments hardly stretch: where a distance differs, a marker has moved, or is taken
@@ -173,7 +135,7 @@ def segment_pairs(
     return pairs, np.linalg.norm(first - second, axis=1)
 
 
-def say_apart(skeleton: Skeleton, pair: NDArray[np.int64], change: float) -> str:
+def say_apart(skeleton: Skeleton, pair: Indices, change: float) -> str:
     """Say that two markers are nearer or farther than on the person, by so many m."""
     first, second = (skeleton.marker_set.labels[column] for column in pair)
     side = "farther apart" if change > 0 else "closer"

@@ -6,10 +6,11 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 from scipy.spatial.distance import cdist
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 
 __all__ = ["BoundingBox", "box_surface_points", "minimum_bounding_box"]
@@ -24,25 +25,24 @@ _FACES, _FRAMES, _FINALISTS, _GAIN = 12, 6, 10, 1e-6
 
 
 class BoundingBox(NamedTuple):
-    """An oriented box.
+    """An oriented box; lengths are in the unit of the points (m).
 
     Parameters
     ----------
     center : (d,) array
-        Middle of the box, in the unit of the points (m).
     axes : (d, d) array
         Orthonormal rows, right-handed, the longest side first.
     half_lengths : (d,) array
         Half the side along each axis; zero where the points are flat.
     """
 
-    center: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    half_lengths: NDArray[np.float64]
+    center: Array
+    axes: Array
+    half_lengths: Array
 
 
 def minimum_bounding_box(points: ArrayLike) -> BoundingBox:
-    """Oriented box of minimum volume around points.
+    """Oriented box of minimum volume around points (N, d).
 
     The exact minimum (O'Rourke 1985) takes time cubic in the hull's size. Here a box is
     rotated about one of its axes to the smallest rectangle in the projection along that
@@ -53,23 +53,12 @@ def minimum_bounding_box(points: ArrayLike) -> BoundingBox:
     is returned.
 
     Guaranteed: it holds all points and is never larger than the principal-axes box or
-    the coordinate-axes box. Not guaranteed: the global minimum.
-    (Compared with descents from 240 frames it was 0.4 % larger on average and 3 % at
-    worst on 4 random points; less on more points; 0.001 % on clusters at the corners of
-    a box.)
+    the coordinate-axes box. Not guaranteed: the global minimum. (Compared with descents
+    from 240 frames it was 0.4 % larger on average and 3 % at worst on 4 random points;
+    less on more points; 0.001 % on clusters at the corners of a box.)
 
-    Flat points get the smallest rectangle, exactly. Points that fill more than three
-    dimensions get the box along their principal axes.
-
-    Parameters
-    ----------
-    points : (N, d) array
-        Any unit; flat or coinciding points give half lengths of zero.
-
-    Returns
-    -------
-    BoundingBox
-        Center (d,), axes (d, d) as rows, half lengths (d,), the longest side first.
+    Flat points get the smallest rectangle, exactly, and coinciding ones a point. Points
+    that fill more than three dimensions get the box along their principal axes.
 
     Raises
     ------
@@ -104,7 +93,7 @@ def minimum_bounding_box(points: ArrayLike) -> BoundingBox:
 
 def box_surface_points(
     box: BoundingBox, n: int, *, up: ArrayLike | None = None
-) -> NDArray[np.float64]:
+) -> Array:
     """Points on the surface of a box where `n` centroids start.
 
     In this order: vertices; centers of the upper and the lower face; centers of the
@@ -157,9 +146,7 @@ def box_surface_points(
     return box.center + chosen @ box.axes[sides]
 
 
-def _spread(
-    places: NDArray[np.float64], half: NDArray[np.float64], n: int
-) -> NDArray[np.float64]:
+def _spread(places: Array, half: Array, n: int) -> Array:
     """Add places of a grid on the surface, farthest first, until there are `n`."""
     if n <= len(places):
         return places
@@ -180,9 +167,7 @@ def _spread(
     return np.array(chosen)
 
 
-def _smallest_axes(
-    x: NDArray[np.float64], coordinate_axes: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _smallest_axes(x: Array, coordinate_axes: Array) -> Array:
     """Axes (rows) of the smallest box found around points (N, 2 or 3) that fill it.
 
     `x` is in principal axes, whose signs are arbitrary; starting frames that differ by
@@ -208,9 +193,7 @@ def _smallest_axes(
     return _shrunk(x, min(found, key=lambda axes: _volume(x, axes)))
 
 
-def _shrunk(
-    x: NDArray[np.float64], axes: NDArray[np.float64], *, rounds: int = 30
-) -> NDArray[np.float64]:
+def _shrunk(x: Array, axes: Array, *, rounds: int = 30) -> Array:
     """Rotate about one axis after the other until no rotation shrinks the box."""
     volume = _volume(x, axes)
     for _ in range(rounds):
@@ -224,13 +207,11 @@ def _shrunk(
     return axes
 
 
-def _volume(x: NDArray[np.float64], axes: NDArray[np.float64]) -> float:
+def _volume(x: Array, axes: Array) -> float:
     return float(np.ptp(x @ axes.T, axis=0).prod())
 
 
-def _turned(
-    x: NDArray[np.float64], axes: NDArray[np.float64], i: int, j: int
-) -> NDArray[np.float64]:
+def _turned(x: Array, axes: Array, i: int, j: int) -> Array:
     """Axes with `i` and `j` rotated to the smallest rectangle around the points."""
     seen = x @ axes[[i, j]].T
     outline = seen[ConvexHull(seen).vertices]

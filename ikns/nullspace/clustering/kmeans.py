@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from ikns.arrays import Indices
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.clustering.bounding_box import (
     box_surface_points,
@@ -33,7 +34,7 @@ _ROUNDING = 1e-12  # of the coordinates, when distances are compared
 
 def nearest_center(
     points: ArrayLike, centers: ArrayLike, *, radius: float | None = None
-) -> tuple[NDArray[np.int64], float]:
+) -> tuple[Indices, float]:
     """Assign every point to its nearest center, or to none when that is too far.
 
     Parameters
@@ -132,19 +133,7 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         self.up = up
 
     def fit(self, X: ArrayLike, y: Any = None) -> Self:
-        """Find the clusters.
-
-        Parameters
-        ----------
-        X : (n_samples, n_features) array
-            Positions, m.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        BoundingBoxKMeans
-            This estimator.
+        """Find the clusters of positions (n_samples, n_features), m; `y` is ignored.
 
         Raises
         ------
@@ -183,7 +172,7 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         )
         return self
 
-    def predict(self, X: ArrayLike) -> NDArray[np.int64]:
+    def predict(self, X: ArrayLike) -> Indices:
         """Cluster of each position, -1 beyond the radius, (n_samples,)."""
         check_is_fitted(self)
         x = validate_data(self, X, dtype=np.float64, reset=False)

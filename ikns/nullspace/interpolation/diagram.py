@@ -20,14 +20,13 @@ cancels keeps its digits and ties are 0.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.voronoi import exact
 from ikns._kernels.voronoi.delaunay import triangulate
 from ikns._kernels.voronoi.exact import Sites, on_lattice
-from ikns._kernels.voronoi.insertion_order import insertion_order
 from ikns._kernels.voronoi.rings import list_facets, list_sides
 from ikns._kernels.voronoi.sines import sines
+from ikns.arrays import Array, Indices
 from ikns.nullspace.interpolation.double_double import (
     difference,
     double_double_dot,
@@ -35,10 +34,8 @@ from ikns.nullspace.interpolation.double_double import (
 )
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["diagram"]
+__all__ = ["diagram", "insertion_order"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Stage = np.signedinteger
 
 #: Where a sum known to 2**-97 of the size of its terms is below this part of that, it
@@ -46,13 +43,10 @@ Stage = np.signedinteger
 _CANCELED = 2.0**-40
 
 
-def diagram(points: Floats) -> Voronoi:
-    """Build the diagram of sites that span space and are all different.
+def diagram(points: Array) -> Voronoi:
+    """Build the diagram of sites (N, 3) that span space and are all different.
 
-    Parameters
-    ----------
-    points : (N, 3) array
-        Sites, scaled so that the set is about 1 wide.
+    They are scaled so that the set is about 1 wide.
     """
     sites = on_lattice(points)
     simplices, neighbors = triangulate(sites, insertion_order(points))
@@ -103,18 +97,44 @@ def diagram(points: Floats) -> Voronoi:
     )
 
 
+def insertion_order(points: Array) -> Indices:
+    """Biased randomized insertion order: most sites are close to the one before.
+
+    First four far apart. Then random rounds, each of half of what is left, so that no
+    layout makes large cavities (N. Amenta, S. Choi and G. Rote, Incremental
+    constructions con BRIO, 2003); within a round along a space-filling curve
+    (G. M. Morton, 1966).
+    """
+    rounds = np.floor(np.log2(1 - np.random.default_rng(0).random(len(points))))
+    for rank, site in enumerate(_far_apart(points)):
+        rounds[site] = rank - 100.0  # 2**-53 is the least random number
+    fine = 1023 / np.ptp(points, axis=0).max()
+    place = ((points - points.min(axis=0)) * fine).astype(np.int64)
+    for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3)):
+        place = (place | place << shift) & mask
+    curve = ((place | place << 2) & 0x09249249) @ [4, 2, 1]  # bits of x, y, z in turn
+    return np.lexsort([curve, rounds])
+
+
+def _far_apart(points: Array) -> list[int]:
+    """Four sites that span space, as far as rounding can tell."""
+    u = points - points[0]
+    found = [0, int((u * u).sum(axis=1).argmax())]
+    across = np.cross(u[found[1]], u)
+    found.append(int((across * across).sum(axis=1).argmax()))
+    return [*found, int(np.abs(u @ across[found[2]]).argmax())]
+
+
 def _determinants(
     sites: Sites, fives: Indices, last: Stage, row: Stage, width: int
-) -> tuple[Floats, Floats]:
+) -> tuple[Array, Array]:
     """Rows of determinants of sets of five sites, and what these round off."""
     value, rest = np.empty((2, len(fives), width))
     exact.values(sites, fives, last, row, value, rest)
     return value, rest
 
 
-def _ratio(
-    a: Floats, a_rest: Floats, b: Floats, b_rest: Floats
-) -> tuple[Floats, Floats]:
+def _ratio(a: Array, a_rest: Array, b: Array, b_rest: Array) -> tuple[Array, Array]:
     """Return a / b as a float, and what that float rounds off."""
     value = a / b
     back, lost = product(value, b)
@@ -123,7 +143,7 @@ def _ratio(
     return total, rest - (total - value)
 
 
-def _circumcenters(sites: Sites, simplices: Indices) -> tuple[Floats, Floats, Floats]:
+def _circumcenters(sites: Sites, simplices: Indices) -> tuple[Array, Array, Array]:
     """Return circumcenters, what these round off, and six times the volumes."""
     fives = simplices.take([0, 1, 2, 3, 3], axis=1)
     value, rest = _determinants(sites, fives, exact.SPHERE, exact.DETERMINANT, 4)
@@ -131,7 +151,7 @@ def _circumcenters(sites: Sites, simplices: Indices) -> tuple[Floats, Floats, Fl
     return *_ratio(value[:, 1:], rest[:, 1:], below, below_rest), value[:, 0]
 
 
-def _normals(sites: Sites, facets: Indices) -> tuple[Floats, Floats, Floats]:
+def _normals(sites: Sites, facets: Indices) -> tuple[Array, Array, Array]:
     """Return unit normals, what these round off, and twice the areas."""
     fives = facets.take([0, 0, 1, 2, 0], axis=1)
     value, rest = _determinants(sites, fives, exact.NORMAL, exact.VW, 3)
@@ -140,8 +160,8 @@ def _normals(sites: Sites, facets: Indices) -> tuple[Floats, Floats, Floats]:
 
 
 def _powers(
-    sites: Sites, fives: Indices, c: Floats, c_rest: Floats, volume: Floats
-) -> Floats:
+    sites: Sites, fives: Indices, c: Array, c_rest: Array, volume: Array
+) -> Array:
     """Power of the last of five sites to the sphere of the others, about c."""
     p, p_rest = difference(sites.x[fives[:, 4]], sites.x[fives[:, 0]])
     reach, reach_rest = difference(p, 2 * c)
@@ -163,15 +183,15 @@ def _sines(
     sites: Sites,
     facets: Indices,
     behind: Indices,
-    normal: Floats,
-    normal_rest: Floats,
-    area: Floats,
+    normal: Array,
+    normal_rest: Array,
+    area: Array,
     edges: Indices,
     begin: Indices,
     side_facet: Indices,
     side_edge: Indices,
     entering: Indices,
-) -> tuple[Indices, Indices, Floats]:
+) -> tuple[Indices, Indices, Array]:
     """Pairs of sides of one face, and the sines of the angles between them."""
     count = _pairs_before(begin)[-1]
     first, second = np.empty((2, count), dtype=np.int64)

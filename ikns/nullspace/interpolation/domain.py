@@ -1,4 +1,4 @@
-"""Sites, scaled to about 1, with their Voronoi diagram and their hull's measures."""
+"""Sites, scaled to about 1: their Voronoi diagram, their hull, gradients at them."""
 
 from __future__ import annotations
 
@@ -6,47 +6,31 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.voronoi.hull import CANCELED
+from ikns.arrays import Array
+from ikns.errors import InvalidInput
 from ikns.nullspace.interpolation.diagram import diagram as voronoi
 from ikns.nullspace.interpolation.double_double import difference, double_double_dot
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["Domain", "domain"]
-
-Floats = NDArray[np.float64]
+__all__ = ["Domain", "domain", "scaled_gradients"]
 
 
 @dataclass(frozen=True)
 class Domain:
-    """Where natural neighbors interpolate.
+    """Where natural neighbors interpolate."""
 
-    Parameters
-    ----------
-    scale : float
-        A power of two: what points in m are multiplied with.
-    sites : (N, 3) array
-        Scaled.
-    diagram : Voronoi
-        Of the scaled sites.
-    center : (3,) array
-        The middle of the scaled sites.
-    center_depth : (H,) array
-        How far it lies behind each facet of the hull.
-    rounding : float
-        Scaled points that lie outside by less are on the hull.
-    """
-
-    scale: float
-    sites: Floats
-    diagram: Voronoi
-    center: Floats
-    center_depth: Floats
-    rounding: float
+    scale: float  # a power of two: what points in m are multiplied with
+    sites: Array  # (N, 3) scaled
+    diagram: Voronoi  # of the scaled sites
+    center: Array  # (3,) the middle of the scaled sites
+    center_depth: Array  # (H,) how far it lies behind each facet of the hull
+    rounding: float  # scaled points that lie outside by less are on the hull
 
 
-def domain(points: Floats) -> Domain:
+def domain(points: Array) -> Domain:
     """Prepare points (N, 3), m, that span space and are all different."""
     size = float(np.ptp(points, axis=0).max())
     # A power of two scales exactly.
@@ -64,7 +48,7 @@ def domain(points: Floats) -> Domain:
     )
 
 
-def _depths(diagram: Voronoi, sites: Floats, x: Floats) -> Floats:
+def _depths(diagram: Voronoi, sites: Array, x: Array) -> Array:
     """How far a point lies behind each facet of the hull, (H,); positive inside."""
     site = sites[diagram.hull_facets[:, 0]]
     normal, rest = diagram.normal[diagram.hull], diagram.normal_rest[diagram.hull]
@@ -73,3 +57,48 @@ def _depths(diagram: Voronoi, sites: Floats, x: Floats) -> Floats:
     p, p_rest = difference(site[near], x)
     depth[near] = double_double_dot(normal[near], rest[near], p, p_rest)
     return depth
+
+
+def scaled_gradients(
+    space: Domain, angle: Array, values: Array | None, gradients: ArrayLike | None
+) -> Array:
+    """Gradients for Sibson's smooth interpolant: given, or estimated from the values.
+
+    The solid angles of the edges' faces are (E,), values (N, ...), gradients (N, ...,
+    3) per m; the result (N, M, 3) is per scaled unit of length.
+    """
+    if values is None:
+        raise InvalidInput("method 'sibson_c1' needs values.")
+    if gradients is None:
+        return _estimated(space, angle, values.reshape(len(values), -1))
+    given = np.array(gradients, dtype=np.float64)
+    if given.shape != (*values.shape, 3):
+        raise InvalidInput(
+            f"expected gradients of shape {(*values.shape, 3)}, one for each value, "
+            f"found {given.shape}."
+        )
+    if not np.isfinite(given).all():
+        raise InvalidInput("all gradients must be finite, found NaN or infinity.")
+    return given.reshape(len(values), -1, 3) / space.scale
+
+
+def _estimated(space: Domain, angle: Array, values: Array) -> Array:
+    """Least-squares gradients: of the plane through a site's value that fits others.
+
+    Each neighbor is weighted with the solid angle of the face between over the squared
+    distance. Values that are linear in space have their own gradients.
+    """
+    edges = space.diagram.edges
+    mine = np.concatenate([edges[:, 0], edges[:, 1]])
+    other = np.concatenate([edges[:, 1], edges[:, 0]])
+    step = space.sites[other] - space.sites[mine]
+    weight = np.sqrt(np.tile(angle.clip(0, None), 2) / (step**2).sum(axis=1))[:, None]
+    step, rise = weight * step, weight * (values[other] - values[mine])
+    order, neighbors = np.argsort(mine, kind="stable"), np.bincount(mine)
+    first = np.cumsum(neighbors) - neighbors
+    found = np.empty((len(neighbors), values.shape[1], 3))
+    for count in np.unique(neighbors):
+        sites = np.flatnonzero(neighbors == count)
+        rows = order[first[sites, None] + np.arange(count)]
+        found[sites] = (np.linalg.pinv(step[rows]) @ rise[rows]).transpose(0, 2, 1)
+    return found

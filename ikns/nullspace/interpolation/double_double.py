@@ -5,22 +5,19 @@ The same as ikns._kernels.voronoi.double_double, where the sources are.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from ikns.arrays import Array
 
 __all__ = ["difference", "double_double_dot", "product"]
 
-Floats = NDArray[np.float64]
 
-
-def difference(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+def difference(a: Array, b: Array) -> tuple[Array, Array]:
     """Return a - b as a float, and what that float rounds off."""
     value = a - b
     back = value - a
     return value, (a - (value - back)) - (b + back)
 
 
-def product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+def product(a: Array, b: Array) -> tuple[Array, Array]:
     """Return a * b as a float, and what that float rounds off."""
     value = a * b
     high = []
@@ -32,7 +29,7 @@ def product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     return value, ((p * r - value) + p * s + q * r) + q * s
 
 
-def double_double_dot(a: Floats, a_rest: Floats, b: Floats, b_rest: Floats) -> Floats:
+def double_double_dot(a: Array, a_rest: Array, b: Array, b_rest: Array) -> Array:
     """Scalar products of rows of three, (K,), to about 1e-30 of their largest term."""
     value, rest = product(a, b)
     rest = rest + a * b_rest + a_rest * b

@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
 __all__ = ["checked_out", "checked_points", "checked_queries", "checked_values"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 # In sizes of the set: closer sites are taken for one, thinner sets for flat.
 _COINCIDENT = 1e-10
 _FLAT = 1e-9
 
 
-def checked_points(points: ArrayLike) -> Floats:
+def checked_points(points: ArrayLike) -> Array:
     """Return sites as an (N, 3) array, or say what is wrong with them."""
     found = np.array(points, dtype=np.float64)
     if found.ndim != 2 or found.shape[1] != 3:
@@ -54,7 +52,7 @@ def checked_points(points: ArrayLike) -> Floats:
     return found
 
 
-def _candidates(points: Floats, near: float) -> Iterator[tuple[int, Indices]]:
+def _candidates(points: Array, near: float) -> Iterator[tuple[int, Indices]]:
     """Points, each with later ones that may be near: in no coordinate is a gap between.
 
     Points are told apart along x, then y, then z.
@@ -71,7 +69,7 @@ def _candidates(points: Floats, near: float) -> Iterator[tuple[int, Indices]]:
             yield int(i), others[others > i]
 
 
-def checked_values(values: ArrayLike, points: Floats) -> Floats:
+def checked_values(values: ArrayLike, points: Array) -> Array:
     """Return values as a read-only (N, ...) array, or say what is wrong with them."""
     found = np.array(values, dtype=np.float64)
     if found.ndim == 0 or len(found) != len(points):
@@ -85,7 +83,7 @@ def checked_values(values: ArrayLike, points: Floats) -> Floats:
     return found
 
 
-def checked_queries(x: ArrayLike) -> tuple[Floats, tuple[int, ...]]:
+def checked_queries(x: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     """Return queries as (Q, 3), and the shape that they were given in."""
     queries = np.asarray(x, dtype=np.float64)
     if queries.ndim == 0 or queries.shape[-1] != 3:
@@ -97,7 +95,7 @@ def checked_queries(x: ArrayLike) -> tuple[Floats, tuple[int, ...]]:
     return flat, queries.shape[:-1]
 
 
-def checked_out(out: Floats | None, shape: tuple[int, ...]) -> Floats:
+def checked_out(out: Array | None, shape: tuple[int, ...]) -> Array:
     """Return the array to write to: a new one, where none is given."""
     if out is None:
         return np.empty(shape)

@@ -12,30 +12,27 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy import empty, ndarray
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.voronoi.batch import answer_batch, batch_scratch_rows
 from ikns._kernels.voronoi.diagram import TETRAHEDRA, UNSURE
 from ikns._kernels.voronoi.hull import inside_many
 from ikns._kernels.voronoi.query import answer_many, answer_one
+from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
-from ikns.nullspace.interpolation.domain import domain
-from ikns.nullspace.interpolation.faces import solid_angles
-from ikns.nullspace.interpolation.gradients import scaled_gradients
+from ikns.nullspace.interpolation.domain import domain, scaled_gradients
 from ikns.nullspace.interpolation.inputs import (
     checked_out,
     checked_points,
     checked_queries,
     checked_values,
 )
-from ikns.nullspace.interpolation.morton import morton_order
-from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT, packed
+from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT, morton_order, packed
 
 __all__ = ["Method", "NaturalNeighborInterpolator", "Outside"]
 
 Method = Literal["sibson", "laplace", "sibson_c1"]
 Outside = Literal["nearest", "project", "nan"]
-Floats = NDArray[np.float64]
 
 _FLOAT = np.dtype(np.float64)
 #: Sites whose face has a smaller solid angle are no neighbors, steradian.
@@ -155,7 +152,7 @@ class NaturalNeighborInterpolator:
         diagram, n = self._space.diagram, len(self.points)
         self.simplices = diagram.simplices
         self.hull_facets = diagram.hull_facets
-        angle = solid_angles(diagram, self._space.sites)
+        angle = diagram.solid_angles(self._space.sites)
         self.edges = diagram.edges[angle >= _MIN_SOLID_ANGLE]
 
         there = np.empty((n, 0)) if self.values is None else self.values
@@ -163,7 +160,7 @@ class NaturalNeighborInterpolator:
         self._each = there.shape[1:], (n,)  # shapes of a value and of weights
         self._width, self._is_row = self._flat.shape[1], there.ndim == 2
         self._gradients = np.empty((n, 0, 3))
-        self.gradients: Floats | None = None
+        self.gradients: Array | None = None
         if method == "sibson_c1":
             self._gradients = scaled_gradients(
                 self._space, angle, self.values, gradients
@@ -176,12 +173,12 @@ class NaturalNeighborInterpolator:
             self._space, self._flat, self._gradients, method, outside
         )
         # Copies that no thread is using: queries write to the one they take.
-        self._idle: list[Floats] = []
+        self._idle: list[Array] = []
         for array in (self.points, self.simplices, self.hull_facets, self.edges):
             array.flags.writeable = False
 
     @property
-    def packed(self) -> tuple[Floats, NDArray[np.int64]]:
+    def packed(self) -> tuple[Array, Indices]:
         """All that compiled code needs, one array read as floats and as integers.
 
         For :func:`ikns._kernels.voronoi.query.natural_weights`; not to be changed.
@@ -192,7 +189,7 @@ class NaturalNeighborInterpolator:
         """Leave out scratch memory."""
         return {**self.__dict__, "_idle": []}
 
-    def __call__(self, x: ArrayLike, *, out: Floats | None = None) -> Floats:
+    def __call__(self, x: ArrayLike, *, out: Array | None = None) -> Array:
         """Interpolate the values.
 
         Parameters
@@ -224,24 +221,10 @@ class NaturalNeighborInterpolator:
             )
         return self._answer(x, 0, out)
 
-    def weights(self, x: ArrayLike, *, out: Floats | None = None) -> Floats:
-        """Weights of the sites.
+    def weights(self, x: ArrayLike, *, out: Array | None = None) -> Array:
+        """Weights of the sites, (..., N); arguments as those of a call.
 
-        Parameters
-        ----------
-        x : (..., 3) array
-            Queries, m. A query that is not finite gives NaN.
-        out : (..., N) array, optional
-            Where to write them: float64, C-contiguous.
-
-        Returns
-        -------
-        (..., N) array
-
-        Raises
-        ------
-        InvalidInput
-            For "sibson_c1", whose values also depend on gradients.
+        For "sibson_c1", whose values also depend on gradients, they are refused.
         """
         if self.method == "sibson_c1":
             raise InvalidInput(
@@ -250,17 +233,10 @@ class NaturalNeighborInterpolator:
             )
         return self._answer(x, 1, out)
 
-    def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Whether queries are in the convex hull or, but for rounding, on it.
+    def inside(self, x: ArrayLike) -> Mask:
+        """Whether queries (..., 3) are in the convex hull or, but for rounding, on it.
 
-        Parameters
-        ----------
-        x : (..., 3) array
-            Queries, m. A query that is not finite is not inside.
-
-        Returns
-        -------
-        (...) boolean array
+        A query that is not finite is not inside.
         """
         queries, shape = checked_queries(x)
         within = np.empty(len(queries), dtype=bool)
@@ -269,7 +245,7 @@ class NaturalNeighborInterpolator:
         self._idle.append(diagram)
         return within.reshape(shape)
 
-    def _answer(self, x: ArrayLike, weigh: int, out: Floats | None) -> Floats:
+    def _answer(self, x: ArrayLike, weigh: int, out: Array | None) -> Array:
         """Answer queries with weights or with values."""
         each = self._each[weigh]
         queries, shape = checked_queries(x)
@@ -278,7 +254,7 @@ class NaturalNeighborInterpolator:
         self._answer_many(queries, weigh, answers)
         return found
 
-    def _answer_many(self, x: Floats, weigh: int, found: Floats) -> None:
+    def _answer_many(self, x: Array, weigh: int, found: Array) -> None:
         """Write the weights or values of (Q, 3) queries."""
         diagram, indices = self.packed
         state = np.full(len(x), UNSURE)
@@ -294,7 +270,7 @@ class NaturalNeighborInterpolator:
         answer_many(diagram, x, order, weigh, found, state)
         self._idle.append(diagram)
 
-    def _taken(self) -> Floats:
+    def _taken(self) -> Array:
         """Return a copy of the diagram that no other thread has."""
         try:
             return self._idle.pop()

@@ -7,43 +7,31 @@ are renumbered, so that those that are close in space are close in memory.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.voronoi import diagram as at
 from ikns._kernels.voronoi.hull import CANCELED
+from ikns.arrays import Array, Indices
 from ikns.nullspace.interpolation.domain import Domain
-from ikns.nullspace.interpolation.morton import morton_order
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["BRUTE_FORCE_LIMIT", "packed"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
+__all__ = ["BRUTE_FORCE_LIMIT", "morton_order", "packed"]
 
 #: Up to so many tetrahedra checking all is faster than walking (measured).
 BRUTE_FORCE_LIMIT = 60
+#: Bits for each axis: a cell for each of a billion sites.
+_BITS = 10
 
 _METHODS = {"sibson": at.SIBSON, "laplace": at.LAPLACE, "sibson_c1": at.SMOOTH}
 _RULES = {"nearest": at.NEAREST, "project": at.PROJECT, "nan": at.NOWHERE}
 
 
 def packed(
-    space: Domain, values: Floats, gradients: Floats, method: str, outside: str
-) -> Floats:
-    """Pack what queries need.
+    space: Domain, values: Array, gradients: Array, method: str, outside: str
+) -> Array:
+    """Pack what queries need: values (N, M), and gradients (N, M, 3) for "sibson_c1".
 
-    Parameters
-    ----------
-    space : Domain
-    values : (N, M) array
-    gradients : (N, M, 3) array
-        Of the values, per scaled unit of length, for "sibson_c1" only.
-    method : {"sibson", "laplace", "sibson_c1"}
-    outside : {"nearest", "project", "nan"}
-
-    Returns
-    -------
-    (K,) array
+    Gradients are per scaled unit of length. Method and rule outside the hull are those
+    of :class:`ikns.NaturalNeighborInterpolator`.
     """
     d = space.diagram
     n, t = len(space.sites), len(d.simplices)
@@ -115,6 +103,21 @@ def packed(
     )
 
 
+def morton_order(places: Array, low: Array, high: Array) -> Indices:
+    """Sort places (Q, 3) along the Z-shaped curve (G. M. Morton, IBM, 1966).
+
+    Neighbors are mostly close together. Those that are not finite may come anywhere;
+    places outside of the box from `low` to `high` are taken for the nearest in it.
+    """
+    share = (np.nan_to_num(places).clip(low, high) - low) / (high - low)
+    cell = (share * (2**_BITS - 1)).astype(np.int64)
+    code = np.zeros(len(places), dtype=np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
+
 def _inverse(order: Indices) -> Indices:
     """Return the inverse of a permutation."""
     rank = np.empty(len(order), dtype=np.int64)
@@ -130,7 +133,7 @@ def _by_tetrahedron(tetrahedron: Indices, *items: Indices) -> list[Indices]:
     return [item[order].reshape(count, -1) for item in items]
 
 
-def _planes(space: Domain) -> Floats:
+def _planes(space: Domain) -> Array:
     """Rows of the planes of facets."""
     d = space.diagram
     site = np.empty(len(d.length), dtype=np.int64)
@@ -143,7 +146,7 @@ def _planes(space: Domain) -> Floats:
 
 def _edges(
     d: Voronoi, number: Indices, facet: Indices
-) -> tuple[Indices, Indices, Floats]:
+) -> tuple[Indices, Indices, Array]:
     """Slots of the tetrahedra's edges, integers and floats of the edges."""
     e, sides = d.side_edge, np.bincount(d.side_edge)
     first = np.cumsum(sides) - sides

@@ -14,13 +14,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from ikns._kernels.voronoi import faces
+from ikns.arrays import Array, Indices
 
 __all__ = ["Voronoi"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -28,58 +25,48 @@ class Voronoi:
     """Delaunay triangulation and Voronoi diagram of N sites.
 
     T tetrahedra, F facets of which H are on the hull, E edges, S = 3 F sides, P pairs
-    of sides of one face. Arrays are contiguous, of float64 and int64.
-
-    Parameters
-    ----------
-    simplices : (T, 4) integer array
-    neighbors : (T, 4) integer array
-        The tetrahedron across the facet that leaves out each vertex; -1 on the hull.
-    circumcenter, circumcenter_rest : (T, 3) array
-        Seen from the tetrahedron's first site: floats, and what these round off.
-    behind, ahead : (F,) integer array
-        Tetrahedra on the two sides of a facet; `ahead` is T on the hull.
-    length : (F,) array
-        Of the facet's Voronoi edge; infinite on the hull.
-    normal, normal_rest : (F, 3) array
-        Unit vector from behind to ahead: floats, and what these round off.
-    hull : (H,) integer array
-        Which facets are on the hull.
-    hull_facets : (H, 3) integer array
-        Their sites, counterclockwise from outside.
-    edges : (E, 2) integer array
-    axis : (E, 3) array
-        Unit vector from site i to site j.
-    side_facet, side_edge : (S,) integer array
-        Facet and edge of a side.
-    entering, leaving : (S,) integer array
-        Tetrahedra at the start and at the end of the side; T at infinity.
-    first, second : (P,) integer array
-        The pair's sides, in the order of their places.
-    sine : (P,) array
-        Sine of the angle by which the second side turns from the first.
-    pairs : (E,) integer array
-        Where the pairs of an edge's face begin; they follow each other.
+    of sides of one face. Arrays are contiguous, of float64 and int64; a ``_rest`` is
+    what the floats round off.
     """
 
-    simplices: Indices
-    neighbors: Indices
-    circumcenter: Floats
-    circumcenter_rest: Floats
-    behind: Indices
-    ahead: Indices
-    length: Floats
-    normal: Floats
-    normal_rest: Floats
-    hull: Indices
-    hull_facets: Indices
-    edges: Indices
-    axis: Floats
-    side_facet: Indices
-    side_edge: Indices
-    entering: Indices
-    leaving: Indices
-    first: Indices
+    simplices: Indices  # (T, 4)
+    neighbors: Indices  # (T, 4) across the facet without each vertex; -1 on the hull
+    circumcenter: Array  # (T, 3) seen from the tetrahedron's first site
+    circumcenter_rest: Array
+    behind: Indices  # (F,) tetrahedron on one side of a facet
+    ahead: Indices  # (F,) on the other; T on the hull
+    length: Array  # (F,) of the facet's Voronoi edge; infinite on the hull
+    normal: Array  # (F, 3) unit vector from behind to ahead
+    normal_rest: Array
+    hull: Indices  # (H,) which facets are on the hull
+    hull_facets: Indices  # (H, 3) their sites, counterclockwise from outside
+    edges: Indices  # (E, 2)
+    axis: Array  # (E, 3) unit vector from site i to site j
+    side_facet: Indices  # (S,) facet of a side
+    side_edge: Indices  # (S,) and its edge
+    entering: Indices  # (S,) tetrahedron at the start of the side; T at infinity
+    leaving: Indices  # (S,) at its end
+    first: Indices  # (P,) the pair's sides, in the order of their places
     second: Indices
-    sine: Floats
-    pairs: Indices
+    sine: Array  # (P,) of the angle by which the second side turns from the first
+    pairs: Indices  # (E,) where the pairs of an edge's face begin, one after another
+
+    def solid_angles(self, points: Array) -> Array:
+        """Solid angles of the edges' faces, (E,) sr, seen from either of their sites.
+
+        Exact to about 1e-15; all faces of a cell add up to 4 pi. Diagonals of
+        co-spherical sites are chosen by chance or by rounding; their faces have no
+        area, or hardly any, or they are far away. Their solid angle is small on any
+        scale.
+        """
+        return faces.solid_angles(
+            points,
+            self.circumcenter + points[self.simplices[:, 0]],
+            self.normal,
+            self.edges,
+            self.axis,
+            self.side_facet,
+            self.side_edge,
+            self.entering,
+            self.leaving,
+        )

@@ -7,8 +7,11 @@ of still samples in `samples`, and the map without learning in `analytic`.
 from ikns.nullspace.map.analytic import analytic_map
 from ikns.nullspace.map.checks import MapWarning
 from ikns.nullspace.map.estimator import NullSpaceMap
-from ikns.nullspace.map.robot_samples import robot_null_space_samples
-from ikns.nullspace.map.samples import null_space_samples, still_mask
+from ikns.nullspace.map.samples import (
+    null_space_samples,
+    robot_null_space_samples,
+    still_mask,
+)
 
 __all__ = [
     "MapWarning",

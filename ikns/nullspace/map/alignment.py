@@ -5,33 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices
 from ikns.numerics.subspace import largest_entry_positive
 
 __all__ = ["align", "spanning_tree"]
 
-Floats = NDArray[np.float64]
 
-
-def spanning_tree(
-    strength: Floats, edges: NDArray[np.int64], root: int
-) -> list[tuple[int, int]]:
+def spanning_tree(strength: Array, edges: Indices, root: int) -> list[tuple[int, int]]:
     """Maximum spanning tree of a connected graph, grown from its root (Prim 1957).
 
-    Parameters
-    ----------
-    strength : (E,) array
-        Weight of each edge.
-    edges : (E, 2) integer array
-        Pairs of nodes.
-    root : int
-
-    Returns
-    -------
-    list of (parent, child)
-        In the order in which they are added; a parent is the root or an earlier
-        child.
+    Edges (E, 2) between nodes have strengths (E,). Returns (parent, child) in the order
+    in which they are added; a parent is the root or an earlier child.
     """
     tree: list[tuple[int, int]] = []
     reached = np.zeros(edges.max(initial=root) + 1, dtype=bool)
@@ -47,14 +32,14 @@ def spanning_tree(
 
 
 def align(
-    components: Sequence[Floats],
-    weights: Sequence[Floats],
+    components: Sequence[Array],
+    weights: Sequence[Array],
     *,
     n_dof: int,
-    edges: NDArray[np.int64],
+    edges: Indices,
     root: int,
-    reference: Floats | None = None,
-) -> tuple[Floats, list[tuple[int, int]]]:
+    reference: Array | None = None,
+) -> tuple[Array, list[tuple[int, int]]]:
     """Directions of all points with consistent signs.
 
     For one degree of freedom a direction is the normalized sum of the point's
@@ -65,22 +50,10 @@ def align(
     best agreement: the smallest cosine between the spans of the `n_dof` leading
     components at both ends.
 
-    Parameters
-    ----------
-    components : sequence of P (k_i, n) arrays
-        Orthonormal rows, leading one first; at least `n_dof`, or none where no joint
-        moves.
-    weights : sequence of P (k_i,) arrays
-        Used for one degree of freedom.
-    n_dof : int
-        Degrees of freedom d.
-    edges : (E, 2) integer array
-        Neighbors, as a connected graph.
-    root : int
-        Root of the tree.
-    reference : (d, n) array, optional
-        The sum of all directions has a positive dot product with it, row by row.
-        Without it the entry of largest magnitude of that sum is positive.
+    Components and weights (the latter for one degree of freedom) are those of
+    :func:`ikns.nullspace.map.assembly.assemble`, `edges` (E, 2) pairs of neighbors. The
+    sum of all directions has a positive dot product with the reference (d, n), row by
+    row; without it the entry of largest magnitude of that sum is positive.
 
     Returns
     -------
@@ -97,11 +70,11 @@ def align(
     strength = np.linalg.svd(overlap, compute_uv=False).min(axis=1, initial=1.0)
     tree = spanning_tree(strength, edges, root)
 
-    def toward(k: int, target: Floats) -> Floats:
+    def toward(k: int, target: Array) -> Array:
         if not known[k]:
             return target  # pass the sign on to the children
         if n_dof > 1:
-            return _procrustes(leading[k], target)
+            return _turn(leading[k], target) @ leading[k]
         sign = np.where(components[k] @ target[0] < 0, -1.0, 1.0)
         direction = (sign * weights[k]) @ components[k]
         return (direction / np.linalg.norm(direction))[None]
@@ -120,11 +93,7 @@ def align(
     return _turn(total, reference) @ directions, tree
 
 
-def _turn(rows: Floats, target: Floats) -> Floats:
+def _turn(rows: Array, target: Array) -> Array:
     """Orthogonal (d, d) matrix that rotates rows (d, n) to best match the target."""
     u, _, vt = np.linalg.svd(target @ rows.T)
     return u @ vt
-
-
-def _procrustes(rows: Floats, target: Floats) -> Floats:
-    return _turn(rows, target) @ rows

@@ -6,14 +6,12 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices
 from ikns.nullspace.map.alignment import align
 from ikns.nullspace.map.checks import MapSettings, MapWarning, format_point
 
 __all__ = ["assemble"]
-
-Floats = NDArray[np.float64]
 
 # Directions more than 60 degrees apart say little about each other's sign.
 _WEAK = 0.5
@@ -22,22 +20,22 @@ _INDIFFERENT = 0.1
 
 
 def assemble(
-    centers: Floats,
-    components: Sequence[Floats],
-    weights: Sequence[Floats],
-    samples: Sequence[Floats],
+    centers: Array,
+    components: Sequence[Array],
+    weights: Sequence[Array],
+    samples: Sequence[Array],
     *,
     settings: MapSettings,
-    edges: NDArray[np.int64],
-) -> tuple[Floats, Floats, Floats]:
-    """Directions and ranges of all points.
+    edges: Indices,
+) -> tuple[Array, Array, Array]:
+    """Directions and ranges of all points, with a MapWarning where these are uncertain.
 
     Parameters
     ----------
     centers : (P, 3) array
         Where the points are, m.
     components : sequence of P (k_i, n) arrays
-        Orthonormal rows, leading one first; none where no joint moves.
+        Orthonormal rows, leading one first, at least d; none where no joint moves.
     weights : sequence of P (k_i,) arrays
         Weight of each component in the sum, for one degree of freedom.
     samples : sequence of P (N_i, n) arrays
@@ -51,11 +49,6 @@ def assemble(
     directions : (P, d, n) array
     lower, upper : (P, d) arrays
         Quantiles of the projections of the uncentered samples, rad.
-
-    Warns
-    -----
-    MapWarning
-        When neighbors disagree or the reference decides nothing.
     """
     sizes = [
         len(q) * (len(rows) > 0) for q, rows in zip(samples, components, strict=True)
@@ -79,10 +72,7 @@ def assemble(
 
 
 def _warn_of_disagreement(
-    centers: Floats,
-    directions: Floats,
-    tree: Sequence[tuple[int, int]],
-    edges: NDArray[np.int64],
+    centers: Array, directions: Array, tree: Sequence[tuple[int, int]], edges: Indices
 ) -> None:
     """Name neighbors that are almost orthogonal, or opposed in spite of the tree."""
     weak = []
@@ -102,7 +92,7 @@ def _warn_of_disagreement(
         )
 
 
-def _warn_of_indifference(directions: Floats, reference: Floats) -> None:
+def _warn_of_indifference(directions: Array, reference: Array) -> None:
     """Warn when the reference is almost orthogonal to the sum of the directions."""
     total = directions.sum(axis=0)
     size = np.linalg.norm(total, axis=1) * np.linalg.norm(reference, axis=1)

@@ -6,8 +6,9 @@ import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.clustering import BoundingBoxKMeans
 
@@ -23,8 +24,6 @@ __all__ = [
     "warn_of_components",
 ]
 
-Floats = NDArray[np.float64]
-
 DOMAINS = ("position", "velocity")
 OUTSIDES = ("nearest", "project", "nan")
 # Points thinner than this share of their width are flat: 2 cm of 40 cm, about the drift
@@ -39,21 +38,12 @@ class MapWarning(UserWarning):
 
 
 class MapSettings(NamedTuple):
-    """Checked parameters of a map.
-
-    Parameters
-    ----------
-    n_dof : int
-    variance : float
-    quantiles : (float, float)
-    reference : (d, n) array or None
-    min_samples : int
-    """
+    """Checked parameters of a map."""
 
     n_dof: int
     variance: float
     quantiles: tuple[float, float]
-    reference: Floats | None
+    reference: Array | None  # (d, n)
     min_samples: int
 
 
@@ -99,7 +89,7 @@ def checked_settings(parameters: Any, shape: tuple[int, int]) -> MapSettings:
     return MapSettings(p.n_dof, p.variance, (low, high), reference, least)
 
 
-def checked_rows(rows: ArrayLike, width: int, what: str) -> Floats:
+def checked_rows(rows: ArrayLike, width: int, what: str) -> Array:
     """Return an array (..., width) with NaN for all that is not finite."""
     array = np.asarray(rows, dtype=np.float64)
     if array.ndim == 0 or array.shape[-1] != width:
@@ -111,7 +101,7 @@ def checked_rows(rows: ArrayLike, width: int, what: str) -> Floats:
 
 def checked_map(
     centers: ArrayLike, directions: ArrayLike, lower: ArrayLike, upper: ArrayLike
-) -> tuple[Floats, Floats, Floats, Floats]:
+) -> tuple[Array, Array, Array, Array]:
     """Return a map's arrays in full shape, or raise what is wrong with them."""
     places, z = np.array(centers, dtype=float), np.array(directions, dtype=float)
     m, M = np.array(lower, dtype=float), np.array(upper, dtype=float)
@@ -139,7 +129,7 @@ def checked_map(
     return places, z, m, M
 
 
-def checked_velocities(velocity: ArrayLike | None, q: Floats) -> Floats:
+def checked_velocities(velocity: ArrayLike | None, q: Array) -> Array:
     """Return joint velocities that match joint vectors (N, n)."""
     if velocity is None:
         raise InvalidInput(
@@ -155,18 +145,7 @@ def checked_velocities(velocity: ArrayLike | None, q: Floats) -> Floats:
 
 
 def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
-    """Points with enough samples; warn about the others.
-
-    Parameters
-    ----------
-    found : BoundingBoxKMeans
-        Fitted clusters of the hand positions.
-    need : int
-        Least number of samples.
-
-    Returns
-    -------
-    list of int
+    """Points of fitted clusters with at least so many samples; warn about the others.
 
     Raises
     ------
@@ -207,7 +186,7 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
     return used
 
 
-def _check_volume(width: Floats, what: str) -> None:
+def _check_volume(width: Array, what: str) -> None:
     """Refuse points in a plane, on a line or at a place; `width` (3,) m, decreasing."""
     full = np.count_nonzero(width > _FLAT * width[0])
     if full < 3:
@@ -218,13 +197,11 @@ def _check_volume(width: Floats, what: str) -> None:
         )
 
 
-def _by(width: Floats) -> str:
+def _by(width: Array) -> str:
     return " x ".join(f"{w:.2g}" for w in width)
 
 
-def warn_of_components(
-    centers: Floats, n_components: NDArray[np.int64], n_dof: int
-) -> None:
+def warn_of_components(centers: Array, n_components: Indices, n_dof: int) -> None:
     """Warn of points where no joint moves, and of those with too many components."""
     none = [
         format_point(centers, k) for k in np.flatnonzero(n_components == 0).tolist()
@@ -248,6 +225,6 @@ def warn_of_components(
         )
 
 
-def format_point(centers: Floats, k: int) -> str:
+def format_point(centers: Array, k: int) -> str:
     """Name a point by its position, as numbers change when points are left out."""
     return f"({', '.join(f'{x:.3f}' for x in centers[k])})"

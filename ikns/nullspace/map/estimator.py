@@ -17,10 +17,11 @@ from __future__ import annotations
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from ikns.arrays import Array, Mask
 from ikns.nullspace.clustering import BoundingBoxKMeans
 from ikns.nullspace.map.assembly import assemble
 from ikns.nullspace.map.checks import (
@@ -35,7 +36,6 @@ from ikns.nullspace.map.interpolator import Interpolation, make_interpolator
 from ikns.numerics.subspace import principal_components
 
 __all__ = ["NullSpaceMap"]
-Floats = NDArray[np.float64]
 
 
 class NullSpaceMap(BaseEstimator):
@@ -288,22 +288,22 @@ class NullSpaceMap(BaseEstimator):
         np.divide(above, width, out=c, where=width > 0)
         return c[..., 0] if self.directions_.shape[1] == 1 else c
 
-    def directions(self, x: ArrayLike) -> Floats:
+    def directions(self, x: ArrayLike) -> Array:
         """Interpolated directions Z^ at hand positions (..., 3), (..., d, n)."""
         return np.tensordot(self._weights(x), self.directions_, axes=1)
 
-    def range(self, x: ArrayLike) -> tuple[Floats, Floats]:
+    def range(self, x: ArrayLike) -> tuple[Array, Array]:
         """Interpolated ends m^ and M^ at hand positions (..., 3), each (..., d) rad."""
         weights = self._weights(x)
         return weights @ self.lower_, weights @ self.upper_
 
-    def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, x: ArrayLike) -> Mask:
         """Whether hand positions (..., 3) lie in the hull of the points, (...)."""
         check_is_fitted(self)
         places = checked_rows(x, self.n_features_in_, "hand positions")
         return self.interpolator_.inside(places)
 
-    def _weights(self, x: ArrayLike) -> Floats:
+    def _weights(self, x: ArrayLike) -> Array:
         check_is_fitted(self)
         places = checked_rows(x, self.n_features_in_, "hand positions")
         return self.interpolator_.weights(places)

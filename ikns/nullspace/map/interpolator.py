@@ -10,8 +10,9 @@ import itertools
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
@@ -27,24 +28,13 @@ _METHODS: dict[str, Literal["sibson", "laplace"]] = {
 
 
 def make_interpolator(
-    points: NDArray[np.float64],
+    points: Array,
     outside: Literal["nearest", "project", "nan"],
     interpolation: Interpolation = "natural",
 ) -> NaturalNeighborInterpolator | NearestPoint:
     """Interpolator between points (P, d): natural neighbors for 4 or more in space.
 
-    Parameters
-    ----------
-    points : (P, d) array
-    outside, interpolation : str
-        Of :class:`ikns.NullSpaceMap`.
-
-    Raises
-    ------
-    InvalidInput
-        For an unknown interpolation.
-    NotEnoughData
-        When 4 or more points in space lie in a plane.
+    Options and errors are those of :class:`ikns.NullSpaceMap`.
     """
     known = (*_METHODS, "nearest")
     if interpolation not in known:
@@ -58,31 +48,21 @@ def make_interpolator(
     )
 
 
-def _in_space(points: NDArray[np.float64]) -> bool:
+def _in_space(points: Array) -> bool:
     return points.shape[1] == 3 and len(points) >= 4
 
 
 class NearestPoint:
-    """Weights of 1 for the nearest point, in any dimension.
+    """Weights of 1 for the nearest of points (P, d), in any dimension.
 
-    Same methods as
-    :class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`.
-
-    Parameters
-    ----------
-    points : (P, d) array
-        Where values are known.
-
-    Attributes
-    ----------
-    points : (P, d) array
+    Same methods as :class:`ikns.nullspace.interpolation.NaturalNeighborInterpolator`.
     """
 
     def __init__(self, points: ArrayLike) -> None:
         self.points = np.asarray(points, dtype=np.float64)
 
     @property
-    def edges(self) -> NDArray[np.int64]:
+    def edges(self) -> Indices:
         """Pairs of neighbors, (E, 2): of 4 points and more in space natural ones.
 
         Of others all pairs.
@@ -92,7 +72,7 @@ class NearestPoint:
         pairs = list(itertools.combinations(range(len(self.points)), 2))
         return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
-    def weights(self, x: ArrayLike) -> NDArray[np.float64]:
+    def weights(self, x: ArrayLike) -> Array:
         """Weights at queries (..., d), (..., P); NaN where a query is not finite."""
         queries = np.asarray(x, dtype=np.float64)
         flat = queries.reshape(-1, queries.shape[-1])
@@ -102,6 +82,6 @@ class NearestPoint:
         weights[known] = np.eye(len(self.points))[nearest]
         return weights.reshape(*queries.shape[:-1], -1)
 
-    def inside(self, x: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, x: ArrayLike) -> Mask:
         """Return false for queries (..., d), (...): the points enclose no volume."""
         return np.zeros(np.shape(x)[:-1], dtype=bool)

@@ -1,14 +1,16 @@
-"""Selection of the samples of a motion that show the null space."""
+"""Selection of the samples of a motion, or of a robot, that show the null space."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array, Mask
+from ikns.body.skeleton import Robot
 from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
 
-__all__ = ["null_space_samples", "still_mask"]
+__all__ = ["null_space_samples", "robot_null_space_samples", "still_mask"]
 
 
 def still_mask(
@@ -17,7 +19,7 @@ def still_mask(
     *,
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Which samples have the chain's hands at rest and all joints known.
 
     Parameters
@@ -59,7 +61,7 @@ def null_space_samples(
     *,
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Hand positions and joint vectors of the samples with still hands.
 
     The matching velocities, for ``NullSpaceMap(domain="velocity")``, are
@@ -115,3 +117,44 @@ def null_space_samples(
             f"of {len(gate)} samples {found}."
         )
     return motion.task_position(chain)[gate], motion.chain_angles(chain)[gate]
+
+
+def robot_null_space_samples(
+    robot: Robot, time: ArrayLike, q: ArrayLike, *, max_hand_speed: float = 0.05
+) -> tuple[Array, Array]:
+    """Positions of a robot's frame and joint vectors while the frame is held.
+
+    As :func:`null_space_samples` for a person.
+
+    Parameters
+    ----------
+    robot : Robot
+    time : (T,) array
+        s, increasing.
+    q : (T, n) array
+        Joint positions, rad.
+    max_hand_speed : float
+        A frame slower than this counts as held, m/s.
+
+    Returns
+    -------
+    x : (N, 3) array
+        Positions of the frame in the base, m.
+    q : (N, n) array
+        Joint vectors there, rad.
+
+    Raises
+    ------
+    NotEnoughData
+        When the frame is never held.
+    """
+    angles = np.asarray(q, dtype=np.float64)
+    place, _ = robot.pose(angles)
+    velocity = np.gradient(place, np.asarray(time, dtype=np.float64), axis=0)
+    held = np.linalg.norm(velocity, axis=1) < max_hand_speed
+    if not held.any():
+        raise NotEnoughData(
+            f"expected samples with '{robot.frame}' slower than {max_hand_speed:g} "
+            "m/s, found none."
+        )
+    return place[held], angles[held]

@@ -43,11 +43,6 @@ def read_c3d(path: Path) -> Recording:
     Frame 1 is at 0 s; a part of a longer recording keeps its times. Positions without a
     unit are taken as mm, the usual unit of C3D files, and refused when that is not
     plausible. Analog channels are ignored.
-
-    Raises
-    ------
-    FileError
-        When the file is not C3D, is cut off or damaged, or holds no marker.
     """
     layout = read_layout(path)
     rate = checked_rate(path, layout.number("POINT:RATE", layout.rate) or layout.rate)
@@ -73,7 +68,8 @@ def read_c3d(path: Path) -> Recording:
     with np.errstate(invalid="ignore"):  # a damaged value may be a signaling NaN
         markers = points[..., :3].astype(np.float64) * meters
         markers[points[..., 3] < 0] = np.nan
-    time = (_first_frame(layout) - 1 + np.arange(len(points))) / rate
+    first = _long(layout, "TRIAL:ACTUAL_START_FIELD") or max(layout.header[2], 1)
+    time = (first - 1 + np.arange(len(points))) / rate
     return to_recording(path, time, markers, [labels[i] for i in columns], unit=unit)
 
 
@@ -143,11 +139,6 @@ def _frame_count(layout: C3dLayout, fitting: int) -> int:
         else:
             count = layout.number("POINT:LONG_FRAMES", max(fitting, _WORD))
     return int(count) if math.isfinite(count) and count > 0 else 0
-
-
-def _first_frame(layout: C3dLayout) -> int:
-    """Return the number of the first frame, counted from 1."""
-    return _long(layout, "TRIAL:ACTUAL_START_FIELD") or max(layout.header[2], 1)
 
 
 def _long(layout: C3dLayout, name: str) -> int:

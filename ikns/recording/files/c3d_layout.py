@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
 
@@ -27,35 +28,20 @@ _KEY = 0x50
 _INTEL, _DEC, _MIPS = 84, 85, 86
 _CHAR, _BYTE, _INT, _FLOAT = -1, 1, 2, 4
 
-Value = list[str] | NDArray[np.float64]
+Value = list[str] | Array
 
 
 @dataclass(frozen=True)
 class C3dLayout:
-    """Header and parameters of a C3D file.
+    """Header and parameters of a C3D file."""
 
-    Parameters
-    ----------
-    machine : int
-        84 Intel, 85 DEC, 86 MIPS: how numbers are stored.
-    header : tuple of int
-        Words 2 to 5 (points, analog samples per frame, first and last frame), each
-        0 to 65535.
-    scale, rate : float
-        Words 7 and 11 of the header; a negative scale means floating-point data.
-    data_start, size : int
-        Bytes: where the frames begin, and the size of the file.
-    parameters : dict
-        ``"GROUP:NAME"`` to texts or a flat array of numbers.
-    """
-
-    machine: int
-    header: tuple[int, int, int, int]
-    scale: float
+    machine: int  # 84 Intel, 85 DEC, 86 MIPS: how numbers are stored
+    header: tuple[int, int, int, int]  # points, analog a frame, first and last frame
+    scale: float  # negative for floating-point data
     rate: float
-    data_start: int
-    size: int
-    parameters: dict[str, Value]
+    data_start: int  # byte where the frames begin
+    size: int  # of the file, bytes
+    parameters: dict[str, Value]  # "GROUP:NAME" to texts or a flat array of numbers
 
     def number(self, name: str, default: float) -> float:
         """Return a parameter's first number, or the default when there is none."""
@@ -78,13 +64,7 @@ class C3dLayout:
 
 
 def read_layout(path: Path) -> C3dLayout:
-    """Read header and parameters of a C3D file.
-
-    Raises
-    ------
-    FileError
-        When the file is not C3D, is cut off before its data, or contradicts itself.
-    """
+    """Read header and parameters of a C3D file."""
     size = existing_file(path)
     with path.open("rb") as file:
         head = file.read(_BLOCK)
@@ -129,8 +109,6 @@ def read_layout(path: Path) -> C3dLayout:
 def floats(raw: bytes, machine: int) -> NDArray[np.float32]:
     """Return 4-byte floats of a machine.
 
-    Examples
-    --------
     >>> floats(bytes.fromhex("803f0000"), 85)  # DEC: words swapped, exponent off by 2
     array([0.25], dtype=float32)
     """

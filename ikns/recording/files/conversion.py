@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array, Mask
 from ikns.errors import FileError, InvalidInput
 from ikns.recording.recording import Recording
 
@@ -55,13 +55,7 @@ _EXTENT_FRAMES = 500
 
 
 def existing_file(path: Path) -> int:
-    """Return the size in bytes of a regular, readable, non-empty file.
-
-    Raises
-    ------
-    FileError
-        When there is no such file, it is a folder, or it is empty.
-    """
+    """Return the size in bytes of a regular, readable, non-empty file."""
     if "\0" in str(path):
         raise FileError(f"{shown(str(path))}: this is not a file name.")
     if path.is_dir():
@@ -87,8 +81,6 @@ def shown(text: str) -> str:
 def meters_per(path: Path, unit: str) -> float:
     """Return how many meters one unit is.
 
-    Examples
-    --------
     >>> meters_per(Path("walk.trc"), "MM")
     0.001
     """
@@ -113,15 +105,13 @@ def checked_rate(path: Path, rate: float) -> float:
 def is_unlabeled(label: str) -> bool:
     """Whether the software gave this trajectory a number instead of a name.
 
-    Examples
-    --------
     >>> is_unlabeled("*115"), is_unlabeled("ADL001:RSHO1")
     (True, False)
     """
     return not label or _UNLABELED.fullmatch(label) is not None
 
 
-def mark_gaps(markers: NDArray[np.float64]) -> NDArray[np.bool_]:
+def mark_gaps(markers: Array) -> Mask:
     """Make every point that was not seen NaN, in place, and return where that is.
 
     That is a point with a missing coordinate, and one at exactly zero: many systems
@@ -143,34 +133,13 @@ def mark_gaps(markers: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def to_recording(
-    path: Path,
-    time: NDArray[np.float64],
-    markers: NDArray[np.float64],
-    labels: Sequence[str],
-    *,
-    unit: str,
+    path: Path, time: Array, markers: Array, labels: Sequence[str], *, unit: str
 ) -> Recording:
-    """Return positions in meters as a recording, gaps as NaN.
+    """Return markers (T, M, 3) in meters as a recording, gaps as NaN; changed in place.
 
-    Parameters
-    ----------
-    path : Path
-        Named in every message.
-    time : (T,) array
-        Seconds.
-    markers : (T, M, 3) array
-        Meters, changed in place. A point with a missing coordinate becomes NaN, and so
-        does one at exactly zero, as many systems write "not seen".
-    labels : sequence of M str
-        Names as the file has them.
-    unit : str
-        Unit stated by the file, for the message when the extent is not plausible.
-
-    Raises
-    ------
-    FileError
-        When there are no frames or markers, nothing was ever seen, the extent is not
-        that of a person in a room, labels repeat, or time does not increase.
+    A point with a missing coordinate becomes NaN, and so does one at exactly zero, as
+    many systems write "not seen". The file's unit is named where the extent is not that
+    of a person in a room.
     """
     if not len(labels):
         raise FileError(f"{path}: expected at least one named marker, found none.")

@@ -7,40 +7,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 
 __all__ = ["read_joint_angles"]
-
-Array = NDArray[np.float64]
 
 #: Endings of a column's name, and the unit that each stands for, in rad or m.
 _UNITS = {"_rad": 1.0, "_m": 1.0, "_deg": 0.017453292519943295}
 
 
 def read_joint_angles(path: Path, joint_names: Sequence[str]) -> tuple[Array, Array]:
-    """Read the joint positions of a robot over time.
+    """Read time (T,), s, and joint positions (T, n), rad or m, of a robot.
 
-    Parameters
-    ----------
-    path : Path
-        CSV with a column ``time_s`` and one for each joint: ``<joint>_rad``,
-        ``<joint>_deg``, or ``<joint>_m`` of a sliding joint. Others are ignored.
-    joint_names : sequence of n str
-
-    Returns
-    -------
-    time : (T,) array
-        s, increasing.
-    q : (T, n) array
-        rad, or m; rows in which a value is missing are left out.
-
-    Raises
-    ------
-    FileError
-        When the file is no table of numbers, lacks a column or has fewer than two
-        rows, or the time does not increase.
+    A CSV with a column ``time_s`` and one for each joint: ``<joint>_rad``,
+    ``<joint>_deg``, or ``<joint>_m`` of a sliding joint. Others are ignored; rows in
+    which a value is missing are left out.
     """
     header, table = _number_table(path)
     columns = {"time_s": (header.index("time_s"), 1.0)} if "time_s" in header else {}

@@ -6,8 +6,8 @@ import codecs
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
 
@@ -25,29 +25,10 @@ def text_lines(path: Path) -> list[str]:
 
 def number_table(
     path: Path, rows: list[tuple[int, str]], n_columns: int, *, delimiter: str
-) -> NDArray[np.float64]:
-    """Return the rows' numbers; empty cells are NaN.
+) -> Array:
+    """Return the numbers of rows (line number, line); empty cells are NaN.
 
-    Parameters
-    ----------
-    path : Path
-        Named in every message.
-    rows : list of (int, str)
-        Line number in the file and the line itself, which may end early (the rest is
-        empty) or in empty cells beyond the last column.
-    n_columns : int
-        Columns that the file's header promises.
-    delimiter : str
-        Separator of cells.
-
-    Returns
-    -------
-    (len(rows), n_columns) array
-
-    Raises
-    ------
-    FileError
-        When a cell is not a number or a row is longer than the header.
+    A line may end early (the rest is empty) or in empty cells beyond the last column.
     """
     if not rows:
         return np.empty((0, n_columns))

@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import (
     checked_rate,
@@ -33,12 +33,6 @@ def read_trc(path: Path) -> Recording:
 
     Times are computed from frame number and rate where these agree with the printed
     times to half a frame, as printed times are rounded; else the printed ones are used.
-
-    Raises
-    ------
-    FileError
-        When the file is not a tab-separated TRC file, or its content does not match
-        its header.
     """
     lines = text_lines(path)
     if not lines[0].startswith("PathFileType"):
@@ -94,9 +88,7 @@ def read_trc(path: Path) -> Recording:
     return to_recording(path, time, markers, [labels[i] for i in named], unit=unit)
 
 
-def _time(
-    frame: NDArray[np.float64], printed: NDArray[np.float64], rate: float
-) -> NDArray[np.float64]:
+def _time(frame: Array, printed: Array, rate: float) -> Array:
     if not len(frame):
         return printed
     steps = (frame - frame[0]) / rate

@@ -28,11 +28,6 @@ def read_vicon_csv(path: Path) -> Recording:
 
     Frame 1 is at 0 s, as in the C3D and TRC files of the same trial. Other sections
     (devices, model outputs, joints) are ignored.
-
-    Raises
-    ------
-    FileError
-        When the file has no readable section of trajectories.
     """
     head, rows = _trajectories(path)
     rate = checked_rate(path, _number(head[0]))

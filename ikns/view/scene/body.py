@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.view.scene.commands import (
@@ -27,8 +27,6 @@ __all__ = [
     "marker_commands",
     "pose_commands",
 ]
-
-Array = NDArray[np.float64]
 
 #: Light, so that data are visible on it; the arms of the task are darker.
 _BODY, _ARM, _MARKER = "#D9DCE2", "#9FA9B8", "#4A4F57"

@@ -17,6 +17,8 @@ import numpy as np
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
+from ikns.arrays import Array, Indices
+
 __all__ = [
     "ROOT",
     "Command",
@@ -30,7 +32,6 @@ __all__ = [
     "transform_command",
 ]
 
-Array = NDArray[np.float64]
 Command = dict[str, Any]
 
 ROOT = "/ikns"
@@ -87,25 +88,12 @@ def object_command(
     shiny: bool = True,
     on_top: bool = False,
 ) -> Command:
-    """Draw a geometry.
+    """Draw a geometry as three.js has it, without uuid.
 
-    Parameters
-    ----------
-    path : str
-        Node that shows it.
-    geometry : dict
-        As three.js has it, without uuid.
-    color : color
-        Whatever matplotlib takes for one.
-    opacity : float
-        Below 1 it is translucent.
-    layer : int
-        Translucent objects are drawn in this order. Those that share a number above 0
-        are drawn as one body: where two overlap, only one is visible.
-    shiny : bool
-        Whether it is shaded and reflects light.
-    on_top : bool
-        Whether it is visible through objects in front of it.
+    Below an opacity of 1 it is translucent. Translucent objects are drawn in the order
+    of their layers. Those that share a number above 0 are drawn as one body: where two
+    overlap, only one is visible. A shiny object is shaded and reflects light, one on
+    top is visible through objects in front of it.
     """
     material: dict[str, Any] = {
         "uuid": f"{path}:material",
@@ -208,7 +196,7 @@ def line_mesh(points: Array, *, radius: float) -> dict[str, Any]:
     known = np.all(np.isfinite(points), axis=1)
     turns = np.arange(_SIDES) * 2 * np.pi / _SIDES
     vertices: list[Array] = []
-    faces: list[NDArray[np.int64]] = []
+    faces: list[Indices] = []
     first = 0
     for run in np.split(np.arange(len(points)), np.flatnonzero(np.diff(known)) + 1):
         if len(run) < 2 or not known[run[0]]:

@@ -15,15 +15,13 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import (  # type: ignore[import-untyped]
     Poly3DCollection,
 )
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.view.scene.commands import ROOT, Command
 from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
 from ikns.view.style import GREY, INK, figure_style
 
 __all__ = ["visible_nodes", "scene_drawing"]
-
-Array = NDArray[np.float64]
 
 #: Thorax frame (X forward, Y up, Z right) to matplotlib's axes, of which Z is up.
 _TO_DRAWING = [2, 0, 1]

@@ -12,8 +12,8 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.model_file import segment_lengths, urdf_folder
 from ikns.body.skeleton import Skeleton
 from ikns.finger.geometry import WIDEST, joint_angles
@@ -29,8 +29,6 @@ from ikns.view.scene.shapes import visual_shapes
 
 __all__ = ["finger_path", "flexion_commands", "with_finger"]
 
-Array = NDArray[np.float64]
-
 _COLOR, _TIP = "#40454C", "#D97340"
 #: Half the thickness of the hand of ``urdf/upper_body.urdf``, m.
 _HALF_HAND = 0.014
@@ -44,19 +42,7 @@ def finger_path(side: str) -> str:
 
 
 def with_finger(scene: Scene, skeleton: Skeleton, side: str) -> Scene:
-    """Add an open finger on a forearm to a scene with a body.
-
-    Parameters
-    ----------
-    scene : Scene
-    skeleton : Skeleton
-        Of the scene.
-    side : "right" or "left"
-
-    Returns
-    -------
-    Scene
-    """
+    """Add an open finger on the forearm of a side to a scene with a body."""
     base = finger_path(side)
     paths = _paths(base)
     last = max(paths.values(), key=len)

@@ -24,20 +24,13 @@ __all__ = ["body_view"]
 def body_view(
     subject: Subject, *, simulated: bool
 ) -> Iterator[tuple[LiveView, Callable[[LoopStatus], None]]]:
-    """Serve the 3-D view of a subject with a finger.
+    """Serve the 3-D view of a subject with a finger, on this machine only.
 
     A thread of its own draws the newest status and skips the others.
-
-    Parameters
-    ----------
-    subject : Subject
-    simulated : bool
-        Whether the subject is.
 
     Yields
     ------
     view : LiveView
-        On this machine only.
     take : callable
         Shows a status; returns at once.
     """

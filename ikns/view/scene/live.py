@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import threading
 import webbrowser
+from dataclasses import replace
 from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Self
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns.body.skeleton import Skeleton
 from ikns.errors import FileError, InvalidInput
@@ -87,7 +88,15 @@ class LiveView:
                 f"port {port} of {_LOOPBACK} cannot be opened: {error}."
             ) from None
         frames = f"{_FRAMES}?token={self._server.access.token}"
-        self._page = scene_html(_still(scene), live=frames).encode()
+        still = replace(
+            scene,
+            caption="Live, seen from the thorax.",
+            commands=[c for c in scene.commands if c["type"] != "set_animation"],
+            times=np.zeros(0),
+            c=np.zeros(0),
+            start=0.0,
+        )
+        self._page = scene_html(still, live=frames).encode()
         self._thread = threading.Thread(
             target=self._server.serve_forever,
             kwargs={"poll_interval": 0.05},
@@ -145,7 +154,8 @@ class LiveView:
             for path in self._fingers:
                 moves += flexion_commands(path, flexion)
         frame = {
-            "commands": [_lean(move) for move in moves],
+            # A micrometer cannot be seen.
+            "commands": [m | {"matrix": m["matrix"].round(6)} for m in moves],
             "time": time,
             "c": c if c is not None and np.isfinite(c) else None,
         }
@@ -263,25 +273,3 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing: stdout and stderr belong to the command."""
-
-
-def _still(scene: Scene) -> Scene:
-    """Return the scene without its animation."""
-    commands = [c for c in scene.commands if c["type"] != "set_animation"]
-    nothing: NDArray[np.float64] = np.zeros(0)
-    return Scene(
-        scene.title,
-        "Live, seen from the thorax.",
-        scene.simulated,
-        commands,
-        scene.layers,
-        scene.camera,
-        scene.target,
-        times=nothing,
-        c=nothing,
-    )
-
-
-def _lean(command: dict[str, Any]) -> dict[str, Any]:
-    """Return the command with fewer digits: a micrometer cannot be seen."""
-    return command | {"matrix": command["matrix"].round(6)}

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.colors import to_hex
-from numpy.typing import NDArray
 
+from ikns.arrays import Indices
 from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
@@ -55,10 +55,6 @@ def map_scene(
     point : int, optional
         Row of ``learned.centers_`` at which the body is drawn. Default: the point with
         the widest range.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------
@@ -147,7 +143,7 @@ def hidden(layers: Sequence[Layer]) -> list[Command]:
     ]
 
 
-def _facets(learned: NullSpaceMap) -> NDArray[np.int64]:
+def _facets(learned: NullSpaceMap) -> Indices:
     """Triangles of the volume as rows of the points, (F, 3); none around 1 to 3."""
     none = np.zeros((0, 3), dtype=np.int64)
     return np.asarray(getattr(learned.interpolator_, "hull_facets", none))

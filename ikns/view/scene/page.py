@@ -29,17 +29,8 @@ _KINDS = {"f": ("<f4", "f4"), "u": ("<u4", "u4"), "i": ("<u4", "u4")}
 def scene_html(scene: Scene, *, live: str | None = None) -> str:
     """Return the page; the same scene gives the same text.
 
-    Parameters
-    ----------
-    scene : Scene
-    live : str, optional
-        Address on the same server that sends poses
-        (:class:`ikns.view.scene.live.LiveView`).
-
-    Raises
-    ------
-    FileError
-        When MeshCat's viewer is not installed.
+    Poses may be sent from a live address on the same server
+    (:class:`ikns.view.scene.live.LiveView`). Without MeshCat's viewer, a FileError.
     """
     data = {
         "commands": scene.commands,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.view.arrays import outward
 from ikns.view.scene.commands import (
     ROOT,
@@ -21,8 +22,6 @@ from ikns.view.scene.commands import (
 from ikns.view.style import BLUE, VOLUME, point_color
 
 __all__ = ["point_commands", "trail_commands", "volume_commands"]
-
-Array = NDArray[np.float64]
 
 _POINT_RADIUS = 0.011  # m
 _NUMBER = 0.026  # height of a point's number, m

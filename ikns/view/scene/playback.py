@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.skeleton import Skeleton
 from ikns.view.scene.body import drawn_links
 from ikns.view.scene.commands import ROOT, Command
@@ -25,8 +25,6 @@ __all__ = [
     "pose_tracks",
 ]
 
-Array = NDArray[np.float64]
-
 #: Frames in one page at most: 15 MB of tracks for a body with 24 markers.
 MOST_FRAMES = 18_000
 
@@ -35,31 +33,21 @@ MOST_FRAMES = 18_000
 class Track:
     """How a node moves in its parent.
 
-    Parameters
-    ----------
-    path : str
-        The node.
-    position : (F, 3) array
-        m.
-    quaternion : (F, 4) array, optional
-        x, y, z, w; neighbors have one sign, as a player interpolates between them.
-    visible : (F,) boolean array, optional
-        Whether it is shown; a hidden node keeps its last place.
+    Neighboring quaternions have one sign, as a player interpolates between them. A
+    hidden node keeps its last place.
     """
 
     path: str
-    position: Array
-    quaternion: Array | None = None
-    visible: NDArray[np.bool_] | None = None
+    position: Array  # (F, 3) m
+    quaternion: Array | None = None  # (F, 4) x, y, z, w
+    visible: Mask | None = None  # (F,)
 
 
-def kept_frames(time: Array, *, rate: float = 30.0) -> NDArray[np.int64]:
+def kept_frames(time: Array, *, rate: float = 30.0) -> Indices:
     """Return the frames to play: every n-th, so that about `rate` per second remain.
 
     Never more than 18 000 (ten minutes at 30/s).
 
-    Examples
-    --------
     >>> kept_frames(np.arange(10) / 100.0)
     array([0, 3, 6, 9])
     """

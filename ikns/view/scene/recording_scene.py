@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Indices
 from ikns.body.chains import SIDES, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
@@ -34,8 +34,6 @@ from ikns.view.scene.swivel import Swivel, swivel_commands
 from ikns.view.style import BLUE
 
 __all__ = ["recording_scene"]
-
-Array = NDArray[np.float64]
 
 _SEEN = "#222222"
 _BALL = {
@@ -71,10 +69,6 @@ def recording_scene(
         The recording as tracked with `skeleton`.
     recording : Recording
         Gives the markers.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------
@@ -135,7 +129,7 @@ def recording_scene(
 
 
 def _seen_markers(
-    skeleton: Skeleton, motion: Motion, recording: Recording, kept: NDArray[np.int64]
+    skeleton: Skeleton, motion: Motion, recording: Recording, kept: Indices
 ) -> list[Track]:
     """Return tracks of the markers that were seen and belong to the marker set."""
     worn = skeleton.marker_set
@@ -144,7 +138,7 @@ def _seen_markers(
     return marker_tracks(places, worn.labels, f"{ROOT}/seen")
 
 
-def _trails(motion: Motion, chain: str, kept: NDArray[np.int64]) -> list[Command]:
+def _trails(motion: Motion, chain: str, kept: Indices) -> list[Command]:
     commands: list[Command] = []
     for side in chain_sides(chain):
         hand = motion.hand_in_thorax[kept, SIDES.index(side)]

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
 from ikns.view.scene.commands import Command
 
 __all__ = ["FIELD_OF_VIEW", "Layer", "Scene", "camera_and_target"]
-
-Array = NDArray[np.float64]
 
 #: Vertical angle of view, deg: small, so that near objects are not enlarged much.
 FIELD_OF_VIEW = 28.0
@@ -26,79 +24,40 @@ _TRUNK = ((-0.03, 0.32, 0.0), (-0.06, -0.23, 0.0))
 
 @dataclass(frozen=True)
 class Layer:
-    """A group of nodes that a viewer can switch on and off.
+    """A group of nodes that a viewer can switch on and off."""
 
-    Parameters
-    ----------
-    name : str
-        For people.
-    paths : tuple of str
-        Its nodes.
-    color : str
-        For the legend, as CSS has it.
-    shown : bool
-        At first.
-    """
-
-    name: str
+    name: str  # for people
     paths: tuple[str, ...]
-    color: str
-    shown: bool = True
+    color: str  # for the legend, as CSS has it
+    shown: bool = True  # at first
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
     """What is drawn, with title, legend, camera and animation.
 
-    Parameters
-    ----------
-    title, caption : str
-        For people.
-    simulated : bool
-        Whether any of it comes from a virtual subject.
-    commands : list of dict
-        MeshCat's, in order (see :mod:`ikns.view.scene.commands`).
-    layers : list of Layer
-    camera, target : (3,) array
-        Position of the camera and the point it looks at, m in the thorax frame.
-    times : (F,) array
-        Of the animation's frames, s; empty without one.
-    c : (F,) array
-        Control signal there, not clipped; NaN where unknown.
-    start : float
-        Time that is shown at first, s.
+    Commands are MeshCat's, in order (see :mod:`ikns.view.scene.commands`).
     """
 
     title: str
     caption: str
-    simulated: bool
+    simulated: bool  # whether any of it comes from a virtual subject
     commands: list[Command]
     layers: list[Layer]
-    camera: Array
-    target: Array
-    times: Array = field(default_factory=lambda: np.zeros(0))
-    c: Array = field(default_factory=lambda: np.zeros(0))
-    start: float = 0.0
+    camera: Array  # (3,) m in the thorax frame
+    target: Array  # (3,) m, what it looks at
+    times: Array = field(default_factory=lambda: np.zeros(0))  # (F,) s; may be empty
+    c: Array = field(default_factory=lambda: np.zeros(0))  # (F,) not clipped, or NaN
+    start: float = 0.0  # time that is shown at first, s
 
 
 def camera_and_target(
     skeleton: Skeleton, learned: NullSpaceMap, chain: str, q: Array
 ) -> tuple[Array, Array]:
-    """Return a camera that has trunk, acting arms and PCA points in view.
+    """Return a camera with trunk, acting arms and PCA points in view, and its target.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    learned : NullSpaceMap
-    chain : str
-        Joints of the map.
-    q : (..., 18 or 25) array
-        Every posture that is shown; unknown ones (NaN) are ignored.
-
-    Returns
-    -------
-    camera, target : (3,) array
-        m in the thorax frame.
+    Both are (3,) m in the thorax frame. Unknown postures (NaN) of `q` (..., 18 or 25)
+    are ignored.
     """
     sides = chain_sides(chain)
     shown = [learned.centers_, np.array(_TRUNK)]

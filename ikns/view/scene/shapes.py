@@ -8,45 +8,27 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 
 __all__ = ["Shape", "visual_shapes"]
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """One primitive on a link.
-
-    Parameters
-    ----------
-    link : str
-        Link that carries it.
-    geometry : dict
-        As three.js describes it, meters; a cylinder stands along Y.
-    in_link : (4, 4) array
-        Its pose in the link's frame, m.
-    """
+    """One primitive on a link."""
 
     link: str
-    geometry: dict[str, Any]
-    in_link: Array
+    geometry: dict[str, Any]  # as three.js describes it, m; a cylinder stands along Y
+    in_link: Array  # (4, 4) its pose in the link's frame, m
 
 
 def visual_shapes(urdf: str) -> list[Shape]:
     """Primitives of every ``<visual>`` of a URDF, in the order of the file.
 
-    Raises
-    ------
-    FileError
-        When a primitive lacks its size. Meshes are left out: their files may be
-        anywhere.
+    Meshes are left out: their files may be anywhere.
 
-    Examples
-    --------
     >>> from ikns.body.skeleton import Skeleton
     >>> shapes = visual_shapes(Skeleton.load().urdf)
     >>> [shape.geometry["type"] for shape in shapes if shape.link == "right_upper_arm"]

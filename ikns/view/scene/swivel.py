@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
@@ -22,8 +22,6 @@ from ikns.view.style import INK, point_color
 
 __all__ = ["Swivel", "swivel_commands", "swivel_tracks"]
 
-Array = NDArray[np.float64]
-
 #: Control signals of the ghosts; the body is in the middle.
 _STEPS = np.array([0.0, 0.25, 0.75, 1.0])
 #: Duration of a sweep and its return, s.
@@ -33,30 +31,14 @@ _LINE = 0.0025  # radius of the elbow's and the hand's paths, m
 
 @dataclass(frozen=True, eq=False)
 class Swivel:
-    """Postures with the hand (nearly) held at a PCA point.
+    """Postures with the hand (nearly) held at a PCA point."""
 
-    Parameters
-    ----------
-    point : int
-        Row of the map.
-    sweep : (N, 18) array
-        The hand held exactly, rad; from one end to the other.
-    c : (N,) array
-        The point's own control signal along the sweep.
-    ghosts : (4, 18) array
-        Straight along Z, c from 0 to 1.
-    along : (N, 18) array
-        Straight along Z, with the sweep's c.
-    middle : int
-        Row of the sweep that both pass through.
-    """
-
-    point: int
-    sweep: Array
-    c: Array
-    ghosts: Array
-    along: Array
-    middle: int
+    point: int  # row of the map
+    sweep: Array  # (N, 18) the hand held exactly, rad; from one end to the other
+    c: Array  # (N,) the point's own control signal along the sweep
+    ghosts: Array  # (4, 18) straight along Z, c from 0 to 1
+    along: Array  # (N, 18) straight along Z, with the sweep's c
+    middle: int  # row of the sweep that both pass through
 
     @classmethod
     def at(

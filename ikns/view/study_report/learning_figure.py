@@ -8,12 +8,11 @@ from matplotlib.figure import Figure
 from ikns.experiments.study.summary import TrackingSummary
 from ikns.experiments.study.summary.by_trial import rmse_by_trial
 from ikns.statistics import LearningCurves
-from ikns.view.study_report.drawing import (
+from ikns.view.study_report.comparisons import (
     condition_styles,
-    outside_legend,
     study_figure,
 )
-from ikns.view.style import GREEN, GREY, INK, PALE, PURPLE, figure_style
+from ikns.view.style import GREEN, GREY, INK, PALE, PURPLE, figure_style, outside_legend
 
 __all__ = ["learning_figure"]
 
@@ -41,14 +40,14 @@ def learning_figure(found: TrackingSummary) -> Figure:
             0
         ]
         for axes, condition in zip(panels, found.conditions, strict=True):
-            own = style[condition]
+            color, mark = style[condition]
             before = rmse_by_trial(training, condition, center=False)
             axes.plot(
                 before.trial - before.trial.max(initial=0),
                 before.mean,
-                own.mark,
+                mark,
                 mfc="white",
-                mec=own.color,
+                mec=color,
                 ms=4,
                 label="training",
             )
@@ -57,8 +56,8 @@ def learning_figure(found: TrackingSummary) -> Figure:
                 during.trial,
                 during.mean,
                 during.deviation,
-                fmt=own.mark,
-                color=own.color,
+                fmt=mark,
+                color=color,
                 ms=4,
                 capsize=2,
                 lw=0.8,

@@ -8,11 +8,15 @@ from ikns.experiments.study.summary import Group
 from ikns.experiments.study.summary.subjects import VisitSubject, first_subject
 from ikns.view.body import arm_points
 from ikns.view.parts import Section
-from ikns.view.study_report.report_figure import ReportFigure
-from ikns.view.study_report.texts import NO_MAP
+from ikns.view.study_report.comparisons import ReportFigure
 from ikns.view.workspace import workspace_figure
 
 __all__ = ["map_figure", "map_section"]
+
+_NO_MAP = (
+    "Left out: no visit has a recorded session, or a folder `subject` (as `ikns "
+    "calibrate` writes it) in it or next to it, to take a map from."
+)
 
 #: Most positions of the hand that are drawn.
 _MOST = 4000
@@ -28,7 +32,7 @@ def map_section(figure: ReportFigure | None) -> Section:
     """Picture, or a sentence that says why there is none."""
     title = "Clusters and interpolation volume"
     if figure is None:
-        return Section(title, [NO_MAP])
+        return Section(title, [_NO_MAP])
     return Section(title, [], [figure.picture])
 
 

@@ -22,6 +22,8 @@ __all__ = [
     "variation_section",
 ]
 
+#: Visits left out that are listed at most.
+_MOST = 50
 _OUTCOMES = {
     "tracking": ("done", "aborted", "skipped", "again"),
     "pick and place": (
@@ -57,7 +59,8 @@ def done_section(group: Group) -> Section:
                 f"because their person could not take part: "
                 f"{'; '.join(each.faults[:3])}{more}."
             )
-        empty = _without(each)
+        there = set(each.trials()["subject"].tolist())
+        empty = [who for who in each.participants if who not in there]
         if empty:
             text.append(
                 f"In {name}, {len(empty)} of "
@@ -66,12 +69,6 @@ def done_section(group: Group) -> Section:
                 f"{' and others' if len(empty) > 10 else ''}."
             )
     return Section("What was done", text, tables=tables)
-
-
-def _without(found: TrackingSummary | PickingSummary) -> list[str]:
-    """Participants without a trial in the study as planned."""
-    there = set(found.trials()["subject"].tolist())
-    return [who for who in found.participants if who not in there]
 
 
 def _attempts(name: str, found: TrackingSummary | PickingSummary) -> Table:
@@ -171,13 +168,13 @@ def methods_section(group: Group) -> Section:
     )
 
 
-def left_out_section(summary: StudySummary, *, most: int = 50) -> Section | None:
+def left_out_section(summary: StudySummary) -> Section | None:
     """Visits that could not be used, each with its reason; None without any."""
     if not summary.left_out:
         return None
-    reasons = [each.reason for each in summary.left_out[:most]]
-    if len(summary.left_out) > most:
-        reasons.append(f"And {len(summary.left_out) - most} more.")
+    reasons = [each.reason for each in summary.left_out[:_MOST]]
+    if len(summary.left_out) > _MOST:
+        reasons.append(f"And {len(summary.left_out) - _MOST} more.")
     count = len(summary.left_out)
     return Section(
         "Left out",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.resources import files
-from typing import NamedTuple
 
 from ikns.experiments.study.summary import Group, StudySummary
 from ikns.experiments.study.summary.answers import (
@@ -12,7 +11,6 @@ from ikns.experiments.study.summary.answers import (
     picking_answer,
     tracking_answer,
 )
-from ikns.view.document import html_document
 from ikns.view.parts import (
     Cell,
     NextStep,
@@ -22,16 +20,28 @@ from ikns.view.parts import (
     inline,
     steps_html,
 )
-from ikns.view.study_report.texts import BANNER, CANNOT
+from ikns.view.report import html_document
 
-__all__ = ["GroupPart", "study_html"]
+__all__ = ["study_html"]
 
+#: The people, or the simulated participants, with the sections on them.
+GroupPart = tuple[Group, Sequence[Section]]
 
-class GroupPart(NamedTuple):
-    """Part of a report on the people, or on the simulated participants."""
+_BANNER = "Simulated: no person took part"
 
-    group: Group
-    sections: Sequence[Section]
+#: What a simulation can and cannot show.
+_CANNOT = (
+    "What such a simulation can show: that design, recording, map, control signal and "
+    "statistics work together from end to end; how error, noise, delay and gaps pass "
+    "through that chain; how many participants a real study would need; which settings "
+    "matter to the method itself.",
+    "What it cannot show: how well people do. The operators follow a model of human "
+    "tracking whose free parameters were taken from the literature, and many settings "
+    "of them fit the paper's figures as well; the difference between two devices is "
+    "largely what was put into the model. Comfort, fatigue, attention, "
+    "embodiment and learning by understanding are not in it. A difference between "
+    "conditions here, or none, is no evidence about people.",
+)
 
 
 def study_html(
@@ -49,31 +59,33 @@ def study_html(
             ("ikns.view.study_report", "study.css"),
         )
     )
-    simulated = all(part.group.simulated for part in parts)
+    simulated = all(group.simulated for group, _ in parts)
     several = len(parts) > 1
     page = _StudyPage()
     title = f"Study {summary.name}"
     body = [
         "<header>",
-        f'<p class="banner">{BANNER}</p>' if simulated else "",
+        f'<p class="banner">{_BANNER}</p>' if simulated else "",
         f"<h1>{inline(title)}</h1>",
         f'<p class="lead">{inline(_lead(summary, parts))}</p>',
         facts_html(_facts(summary, parts)),
-        *(_answers(part.group, several=several) for part in parts),
+        *(_answers(group, several=several) for group, _ in parts),
         "</header><main>",
     ]
-    for part in parts:
-        page.of(simulated=part.group.simulated)
+    for group, sections in parts:
+        page.of(simulated=group.simulated)
         if several:
-            name = "Simulated participants" if part.group.simulated else "People"
+            name = "Simulated participants" if group.simulated else "People"
             body.append(f'<section class="part"><h1>{name}</h1>')
-            if part.group.simulated:
-                body.append(f'<p class="banner">{BANNER}</p>')
+            if group.simulated:
+                body.append(f'<p class="banner">{_BANNER}</p>')
             body.append("</section>")
-        if part.group.simulated:
-            cannot = Section("What such a simulation can and cannot show", list(CANNOT))
+        if group.simulated:
+            cannot = Section(
+                "What such a simulation can and cannot show", list(_CANNOT)
+            )
             body.append(page.section(cannot))
-        body += [page.section(section) for section in part.sections]
+        body += [page.section(section) for section in sections]
     page.of(simulated=False)
     if left_out is not None:
         body.append(page.section(left_out))
@@ -98,7 +110,7 @@ class _StudyPage(ReportPage):
 
 
 def _lead(summary: StudySummary, parts: Sequence[GroupPart]) -> str:
-    who = [people(_count(part.group), simulated=part.group.simulated) for part in parts]
+    who = [people(_count(group), simulated=group.simulated) for group, _ in parts]
     apart = (
         " People and simulated participants are analyzed apart, people first."
         if len(parts) > 1
@@ -106,9 +118,9 @@ def _lead(summary: StudySummary, parts: Sequence[GroupPart]) -> str:
     )
     planned = summary.plan.get("participants")
     came = sum(
-        _count(part.group)
-        for part in parts
-        if part.group.simulated == summary.plan.get("simulated")
+        _count(group)
+        for group, _ in parts
+        if group.simulated == summary.plan.get("simulated")
     )
     so_far = (
         f" The study file declares {planned}, so this is a part of them."
@@ -131,11 +143,11 @@ def _count(group: Group) -> int:
 
 def _facts(summary: StudySummary, parts: Sequence[GroupPart]) -> dict[str, Cell]:
     facts: dict[str, Cell] = {}
-    for part in parts:
-        kind = "simulated" if part.group.simulated else "people"
+    for group, _ in parts:
+        kind = "simulated" if group.simulated else "people"
         for name, each in (
-            ("tracking", part.group.tracking),
-            ("pick and place", part.group.picking),
+            ("tracking", group.tracking),
+            ("pick and place", group.picking),
         ):
             if each is None:
                 continue

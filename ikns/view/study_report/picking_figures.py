@@ -6,13 +6,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ikns.experiments.study.summary import PickingSummary
-from ikns.view.study_report.drawing import (
+from ikns.view.study_report.comparisons import (
     condition_styles,
-    outside_legend,
     scatter_places,
     study_figure,
 )
-from ikns.view.style import GREY, INK, PALE, figure_style
+from ikns.view.style import GREY, INK, PALE, figure_style, outside_legend
 
 __all__ = ["picking_figure"]
 
@@ -35,7 +34,7 @@ def picking_figure(found: PickingSummary) -> Figure:
         )
         upper, lower = figure.subplots(2, 1, sharex=True)
         for condition, offset in zip(found.conditions, offsets, strict=True):
-            own = style[condition]
+            color, mark = style[condition]
             for place, name in zip(places, objects, strict=True):
                 cell = cells[condition, name]
                 if not cell.trials:
@@ -45,8 +44,8 @@ def picking_figure(found: PickingSummary) -> Figure:
                     place + offset,
                     share,
                     [[share - 100 * cell.low], [100 * cell.high - share]],
-                    fmt=own.mark,
-                    color=own.color,
+                    fmt=mark,
+                    color=color,
                     ms=4.5,
                     capsize=2,
                     lw=0.9,
@@ -65,8 +64,8 @@ def picking_figure(found: PickingSummary) -> Figure:
                 good = trials["success"][rows]
                 time = np.where(good, trials["time"][rows], trials["limit"][rows])
                 x = place + offset + scatter_places(len(time), width=0.26)
-                dot = {"color": own.color, "ms": 3.2, "alpha": 0.75}
-                lower.plot(x[good], time[good], own.mark, mew=0, **dot)
+                dot = {"color": color, "ms": 3.2, "alpha": 0.75}
+                lower.plot(x[good], time[good], mark, mew=0, **dot)
                 lower.plot(x[~good], time[~good], "x", mew=1.0, **dot)
         upper.set_ylabel("trials that succeeded (%)")
         upper.set_ylim(-4, 104)

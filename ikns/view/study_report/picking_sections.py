@@ -13,14 +13,16 @@ from ikns.experiments.study.summary import (
 )
 from ikns.experiments.study.summary.answers import people, worded
 from ikns.view.parts import Cell, Picture, Section, Table
-from ikns.view.study_report.picking_figures import picking_figure
-from ikns.view.study_report.report_figure import (
+from ikns.view.study_report.comparisons import (
+    NO_MARGIN,
+    NO_TRIAL,
     ReportFigure,
     difference_figures,
     difference_name,
+    effects_table,
+    tests_table,
 )
-from ikns.view.study_report.tests_table import effects_table, tests_table
-from ikns.view.study_report.texts import NO_MARGIN, NO_TRIAL
+from ikns.view.study_report.picking_figures import picking_figure
 
 __all__ = ["picking_figures", "picking_sections"]
 

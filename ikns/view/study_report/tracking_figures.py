@@ -9,13 +9,12 @@ from matplotlib.figure import Figure
 
 from ikns.experiments.study.summary import TrackingSummary
 from ikns.experiments.study.summary.means import subject_means
-from ikns.view.study_report.drawing import (
+from ikns.view.study_report.comparisons import (
     condition_styles,
-    outside_legend,
     scatter_places,
     study_figure,
 )
-from ikns.view.style import GREY, INK, PALE, figure_style
+from ikns.view.style import GREY, INK, PALE, figure_style, outside_legend
 
 __all__ = ["error_figure", "rmse_figure", "trace_figure"]
 
@@ -37,7 +36,7 @@ def trace_figure(found: TrackingSummary) -> Figure:
             inside = record.time >= 0
             time = record.time[inside]
             axes.plot(time, record.target[inside], color=GREY, lw=2.6, alpha=0.55)
-            axes.plot(time, record.y[inside], color=style[condition].color, lw=1.1)
+            axes.plot(time, record.y[inside], color=style[condition][0], lw=1.1)
             axes.set_title(f"{trajectory}, {condition}: RMSE {rmse:.2f}")
             axes.set_ylim(0, 100)
             axes.set_xlim(0, record.profile.seconds)
@@ -45,7 +44,7 @@ def trace_figure(found: TrackingSummary) -> Figure:
         first = panels[0][2]
         first.plot([], [], color=GREY, lw=2.6, alpha=0.55, label="target")
         for condition in found.conditions:
-            first.plot([], [], color=style[condition].color, label=condition)
+            first.plot([], [], color=style[condition][0], label=condition)
         outside_legend(figure, first)
     return figure
 
@@ -61,7 +60,7 @@ def error_figure(found: TrackingSummary) -> Figure:
             if error is None:
                 axes.set_title(f"{trajectory}, {condition}: no trial")
                 continue
-            color = style[condition].color
+            color = style[condition][0]
             axes.fill_between(
                 error.time,
                 error.low,
@@ -83,17 +82,7 @@ def _grid(
 ) -> tuple[Figure, list[tuple[str, str, Any]]]:
     """Figure over time with one panel a condition (rows) and trajectory (columns).
 
-    Parameters
-    ----------
-    found : TrackingSummary
-    title : str
-    height : float
-        Of a row, inches.
-
-    Returns
-    -------
-    figure : Figure
-    panels : list of (condition, trajectory, axes)
+    The height is that of a row, inches.
     """
     conditions, trajectories = found.conditions, found.trajectories
     figure = study_figure(
@@ -136,13 +125,13 @@ def rmse_figure(found: TrackingSummary) -> Figure:
             for k, (condition, mean) in enumerate(
                 zip(found.conditions, means, strict=True)
             ):
-                own = style[condition]
+                color, mark = style[condition]
                 values = [mean.get(who, np.nan) for who in people]
                 axes.plot(
                     k + shift,
                     values,
-                    own.mark,
-                    color=own.color,
+                    mark,
+                    color=color,
                     ms=3.6,
                     mew=0,
                     alpha=faint,
@@ -154,7 +143,7 @@ def rmse_figure(found: TrackingSummary) -> Figure:
                     k + 0.3,
                     over.mean,
                     half,
-                    fmt=own.mark,
+                    fmt=mark,
                     color=INK,
                     ms=5,
                     capsize=3,

@@ -11,14 +11,16 @@ from ikns.experiments.study.summary.tracking import UNITS
 from ikns.statistics.paper import RMSE, TRAJECTORIES
 from ikns.statistics.wording import p_text
 from ikns.view.parts import Cell, Picture, Section, Table
-from ikns.view.study_report.learning_figure import learning_figure
-from ikns.view.study_report.report_figure import (
+from ikns.view.study_report.comparisons import (
+    NO_MARGIN,
+    NO_TRIAL,
     ReportFigure,
     difference_figures,
     difference_name,
+    effects_table,
+    tests_table,
 )
-from ikns.view.study_report.tests_table import effects_table, tests_table
-from ikns.view.study_report.texts import NO_MARGIN, NO_TRIAL
+from ikns.view.study_report.learning_figure import learning_figure
 from ikns.view.study_report.tracking_figures import (
     error_figure,
     rmse_figure,

@@ -12,6 +12,7 @@ from ikns.experiments.study.summary import Group, StudySummary
 from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_csv
 from ikns.view.parts import NextStep, Section
 from ikns.view.render import pdf, svg
+from ikns.view.study_report.comparisons import ReportFigure
 from ikns.view.study_report.map_section import map_figure, map_section
 from ikns.view.study_report.other_sections import (
     done_section,
@@ -19,9 +20,8 @@ from ikns.view.study_report.other_sections import (
     methods_section,
     variation_section,
 )
-from ikns.view.study_report.page import GroupPart, study_html
+from ikns.view.study_report.page import study_html
 from ikns.view.study_report.picking_sections import picking_figures, picking_sections
-from ikns.view.study_report.report_figure import ReportFigure
 from ikns.view.study_report.tracking_sections import (
     tracking_figures,
     tracking_sections,
@@ -69,7 +69,7 @@ def study_page(summary: StudySummary) -> tuple[str, list[tuple[str, ReportFigure
         figures, sections = _group_contents(group)
         prefix = "simulated_" if group.simulated else ""
         drawn += [(f"{prefix}{each.name}", each) for each in figures]
-        parts.append(GroupPart(group, sections))
+        parts.append((group, sections))
     page = study_html(
         summary,
         parts,
@@ -89,13 +89,7 @@ def write_study_report(
 
     ``report.html`` loads nothing from elsewhere; ``figures/`` has each figure as PDF
     and SVG; ``numbers.json`` and ``tables/*.csv`` have every number and trial.
-
-    Parameters
-    ----------
-    folder : Path
-    summary : StudySummary
-    progress : callable
-        Called with (step, done, total).
+    `progress` is called with (step, done, total).
     """
     progress("drawing", 0, 1)
     page, drawn = study_page(summary)

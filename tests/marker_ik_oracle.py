@@ -1,7 +1,6 @@
-"""The plain solver: Levenberg-Marquardt (More 1978) with Pinocchio's Jacobians.
+"""Marker inverse kinematics written plainly: what the compiled one is checked against.
 
-What the compiled one is checked against, and what solves bodies with joints that the
-compiled one does not know.
+Levenberg-Marquardt (More 1978) with Pinocchio's Jacobians.
 """
 
 from __future__ import annotations
@@ -16,24 +15,27 @@ from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.pose import (
     LIMIT,
     LOST,
+    MAX_ITERATIONS,
     PRIOR,
     PRIOR_FROM_SCRATCH,
+    STEP_TOLERANCE,
     Pose,
-    SolvedFrames,
     starting_poses,
 )
 from ikns.numerics.rigid import rigid_transform
 
-__all__ = ["ReferenceSolver"]
-
 Array = NDArray[np.float64]
 
 
-class ReferenceSolver:
+class PlainMarkerIK:
     """Solve frames for one skeleton; the arguments are those of `MarkerIK`."""
 
     def __init__(
-        self, skeleton: Skeleton, *, max_iterations: int, tolerance: float
+        self,
+        skeleton: Skeleton,
+        *,
+        max_iterations: int = MAX_ITERATIONS,
+        tolerance: float = STEP_TOLERANCE,
     ) -> None:
         self.skeleton = skeleton
         self.max_iterations = max_iterations
@@ -44,16 +46,8 @@ class ReferenceSolver:
         self._tracked = np.array([not marker.static_only for marker in worn])
         self._weight = np.sqrt([marker.weight for marker in worn])
 
-    def solve(self, markers: Array, q: Array | None) -> Pose:
-        """Solve one frame of markers (M, 3); NaN where not seen.
-
-        Iterations of -1 stand for an infinite marker, an infinite residual for a pose
-        before that is not finite.
-        """
-        if np.isinf(markers).any():
-            return Pose(self.skeleton.neutral(), np.nan, -1, False)
-        if q is not None and not np.isfinite(q).all():
-            return Pose(q, np.inf, 0, False)
+    def solve(self, markers: Array, q: Array | None = None) -> Pose:
+        """Solve one frame of markers (M, 3); NaN where not seen."""
         seen = markers.copy()
         seen[~self._tracked] = np.nan
         if not np.isfinite(seen).all(axis=1).any():
@@ -66,16 +60,6 @@ class ReferenceSolver:
             again = self._from_scratch(seen)
             pose = again if again.residual < pose.residual else pose
         return pose
-
-    def solve_many(
-        self, markers: Array, first: int, last: int, way: int, frames: SolvedFrames
-    ) -> None:
-        """Solve frames `first` to before `last` in steps of `way`, 1 or -1.
-
-        Markers are (T, M, 3); each frame starts from the one next to it.
-        """
-        for i in range(first, last, way):
-            frames.put(i, self.solve(markers[i], frames.q[i - way]))
 
     def _from_scratch(self, seen: Array) -> Pose:
         """Try several arm poses, then join each side's best."""
