@@ -29,6 +29,7 @@ ONLY_IN = {
     "sklearn": {"nullspace"},
     "matplotlib": {"view"},
     "meshcat": {"view"},
+    "llvmlite": {"_kernels"},
     "numba": {"_kernels"},
     "casadi": {"symbolic"},
     "dynamixel_sdk": {"finger"},

@@ -89,3 +89,19 @@ def test_what_cannot_be_a_folder_is_refused(
     with pytest.raises(InvalidInput):
         check_output_folder(name, FILES, force=True)
     assert (tmp_path / "file").read_text() == "x"
+
+
+def test_a_disk_that_cannot_keep_the_new_folder_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(descriptor: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    with output_folder(tmp_path / "new") as part:
+        fill(part, "first")
+    monkeypatch.setattr("ikns.output.file.os.fsync", refuse)
+    with pytest.raises(FileError, match="new: cannot be written: Input/output"):
+        with output_folder(tmp_path / "new") as part:
+            fill(part, "second")
+    assert (tmp_path / "new" / "a.txt").read_text() == "first"
+    assert [path.name for path in tmp_path.iterdir()] == ["new"]

@@ -3,6 +3,7 @@
 Numba keys its cache by the file of a function and ignores the files of what it calls.
 So the cache is in a folder named after a hash of the sources of a kernel and of all
 kernels that it imports, and machine code of another version is never loaded.
+`machine_code` has the files in it.
 """
 
 from __future__ import annotations
@@ -11,15 +12,21 @@ import functools
 import hashlib
 import os
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import llvmlite
 import numba
+
+from ikns._kernels.machine_code import SUFFIX, KernelCache, is_private, say_once
 
 __all__ = ["compiled", "on_disk"]
 
 config: Any = numba.config
+#: Version of the files.
+_FORMAT = 1
 _HERE = Path(__file__).parent
 _IMPORT = re.compile(r"^from ikns\._kernels\.([\w.]+) import", re.MULTILINE)
 
@@ -31,26 +38,23 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     no wrapper for Python, which takes a fifth of the time to compile.
     """
     folder = _cache_folder(function.__module__.removeprefix("ikns._kernels."))
-    asked = config.CACHE_DIR
-    config.CACHE_DIR = str(folder or "")
-    try:
-        options: dict[str, Any] = {
-            "nogil": True,
-            "error_model": "numpy",
-            "cache": folder is not None,
-            "no_cpython_wrapper": function.__name__.startswith("_"),
-            "no_cfunc_wrapper": True,
-        }
-        kernel: Callable[..., Any] = numba.njit(**options)(function)
-        return kernel
-    finally:
-        config.CACHE_DIR = asked
+    options: dict[str, Any] = {
+        "nogil": True,
+        "error_model": "numpy",
+        "no_cpython_wrapper": function.__name__.startswith("_"),
+        "no_cfunc_wrapper": True,
+    }
+    kernel: Any = numba.njit(**options)(function)
+    if folder is not None:
+        # As `cache=True` does, with numba's own cache.
+        kernel._cache = KernelCache(function, folder)
+    return cast("Callable[..., Any]", kernel)
 
 
 def on_disk(module: str) -> bool:
     """Whether machine code of a kernel file, such as "body.step", is cached on disk."""
     folder = _cache_folder(module)
-    return folder is not None and any(folder.rglob("*.nbc"))
+    return folder is not None and any(folder.glob(f"*{SUFFIX}"))
 
 
 @functools.cache
@@ -63,7 +67,8 @@ def _cache_folder(module: str) -> Path | None:
         path = _HERE.joinpath(*name.split(".")).with_suffix(".py")
         texts[name] = path.read_text(encoding="utf-8")
         pending += set(_IMPORT.findall(texts[name])) - set(texts)
-    sources = "".join(texts[name] for name in sorted(texts)) + numba.__version__
+    sources = "".join(texts[name] for name in sorted(texts))
+    sources += f"{numba.__version__} {llvmlite.__version__} {sys.version} {_FORMAT}"
     name = f"{module}-{hashlib.sha256(sources.encode()).hexdigest()[:16]}"
     home = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
     asked = config.CACHE_DIR
@@ -71,9 +76,16 @@ def _cache_folder(module: str) -> Path | None:
     for place in places:
         folder = Path(place) / name
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            private = is_private(folder)
         except OSError:
             continue
-        if os.access(folder, os.W_OK):
+        if not private:
+            say_once(
+                "not private",
+                f"{folder}: expected a folder that no one else can write to, found "
+                "another; machine code is not kept there.",
+            )
+        elif os.access(folder, os.W_OK):
             return folder
     return None

@@ -16,7 +16,7 @@ from ikns.output.inputs import refuse_input
 __all__ = [
     "create_bytes",
     "refuse_overwriting",
-    "sync_folder",
+    "sync",
     "write_bytes",
     "write_csv",
     "write_text",
@@ -92,7 +92,7 @@ def write_bytes(path: Path, content: bytes, *, force: bool = True) -> None:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-    sync_folder(path.parent)
+    sync(path.parent)
 
 
 def create_bytes(path: Path, content: bytes) -> bool:
@@ -119,7 +119,7 @@ def create_bytes(path: Path, content: bytes) -> bool:
         return _claim(path, part)
     finally:
         part.unlink(missing_ok=True)
-    sync_folder(path.parent)
+    sync(path.parent)
     return True
 
 
@@ -139,9 +139,9 @@ def write_csv(
     write_text(path, text.getvalue(), force=force)
 
 
-def sync_folder(folder: Path) -> None:
-    """Flush the names in a folder to the disk."""
-    descriptor = os.open(folder, os.O_RDONLY)
+def sync(path: Path) -> None:
+    """Flush a file, or the names in a folder, to the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:
@@ -179,5 +179,5 @@ def _claim(path: Path, part: Path) -> bool:
     except OSError:
         path.unlink(missing_ok=True)
         raise
-    sync_folder(path.parent)
+    sync(path.parent)
     return True

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ikns.errors import FileError, InvalidInput
+from ikns.output.file import sync
 from ikns.output.inputs import refuse_input_folder
 
 __all__ = ["check_output_folder", "output_folder"]
@@ -86,6 +87,9 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
     try:
         part.mkdir()
         yield part
+        # On the disk before the earlier folder goes.
+        for path in (*part.rglob("*"), part):
+            sync(path)
         if target.exists():
             target.rename(old)
         try:

@@ -12,7 +12,7 @@ from ikns.errors import FileError, InvalidInput
 from ikns.experiments.visits.header import FORMAT, HEADER, header_fault, read_header
 from ikns.experiments.visits.lock import LOCK
 from ikns.experiments.visits.parquet import table_bytes
-from ikns.output.file import create_bytes, sync_folder
+from ikns.output.file import create_bytes, sync
 
 __all__ = ["append_attempt", "create_visit", "write_attempts", "write_visit"]
 
@@ -143,7 +143,7 @@ def write_visit(
         _write(part / name, content)
     try:
         part.rename(path)
-        sync_folder(path.parent)
+        sync(path.parent)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
     return path

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ikns.errors import FileError, InvalidInput
+from ikns.output.file import sync
 from ikns.recording.files.c3d_layout import read_layout
 from ikns.recording.recording import Recording
 
@@ -77,6 +78,7 @@ def write_c3d(path: str | Path, recording: Recording, *, force: bool = False) ->
             draft = Path(folder) / "draft.c3d"
             _write(draft, recording, first, rate)
             _check_complete(draft, recording)
+            sync(draft)
             draft.replace(path)
     except (OSError, RuntimeError, ValueError, TypeError) as error:
         raise FileError(f"{path}: the file cannot be written ({error}).") from None

@@ -1,0 +1,126 @@
+"""A visit and its session: one program at a time, and nothing lost in silence."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import check_refused
+from visit_page import Page, play
+
+from ikns.cli import main
+from ikns.experiments.visits import read_visit
+from ikns.live.session import read_run
+from ikns.live.session.row_file import RowFile
+
+PROGRAM = "import sys; from ikns.cli import main; sys.exit(main(sys.argv[1:]))"
+SHORT = ["--profiles", "T1", "--repeats", "1", "--training", "0", "--seconds", "12"]
+
+
+def track(folder: Path, *more: str) -> list[str]:
+    return ["track", str(folder), *SHORT, "--align", "0.5", *more]
+
+
+def run(
+    argv: list[str], script: Any, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    pages = play(script)
+    monkeypatch.setattr("webbrowser.open", pages)
+    assert main(argv) == code
+    pages.done()
+
+
+def test_a_second_program_at_a_visit_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "v"
+    argv = track(folder, "--conditions", "mouse")  # it waits for a person
+    refused = []
+
+    async def another(address: str) -> None:
+        panel = Page("panel")
+        await panel.come(address)
+        command = [sys.executable, "-c", PROGRAM, *argv, "--no-browser"]
+        refused.append(subprocess.run(command, capture_output=True, text=True))
+        await panel.submit("end")
+
+    run(argv, another, monkeypatch, 0)
+    (second,) = refused
+    assert second.returncode == 2
+    assert second.stderr.count("\n") == 1
+    assert f"found another run, process {os.getpid()} on " in second.stderr
+    assert str(folder) in second.stderr
+    capfd.readouterr()
+    assert not (folder / ".lock").exists()
+    assert read_visit(folder).about["participant"] == "01"
+
+
+def test_a_start_that_fails_leaves_no_visit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def taken(self: object) -> None:
+        raise OSError(errno.EADDRINUSE, "address already in use")
+
+    folder = tmp_path / "study" / "v"
+    argv = track(folder, "--conditions", "virtual", "--no-browser")
+    with monkeypatch.context() as patch:
+        patch.setattr("ikns.experiments.cockpit.Cockpit.__enter__", taken)
+        check_refused(argv, tmp_path, capfd)
+    assert list(tmp_path.iterdir()) == []
+
+    async def end(address: str) -> None:
+        panel = Page("panel")
+        await panel.come(address)
+        await panel.submit("end")
+
+    # So another design may follow, and from then on none.
+    other = track(folder, "--conditions", "virtual", "--rest", "7")
+    run(other, end, monkeypatch, 0)
+    with monkeypatch.context() as patch:
+        patch.setattr("ikns.experiments.cockpit.Cockpit.__enter__", taken)
+        check_refused([*other, "--no-browser"], tmp_path, capfd)
+    assert read_visit(folder).about["design"]["rest"] == 7.0
+
+
+def test_rows_that_a_visit_loses_are_on_the_panel_and_in_the_exit_code(
+    files: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    folder, shown = tmp_path / "v", {}
+
+    def full(self: RowFile) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    async def fill(address: str) -> None:
+        panel = Page("panel")
+        await panel.come(address)
+        await panel.wait(lambda shown: shown["source"].get("session") == "")
+        monkeypatch.setattr(RowFile, "_append", full)
+        await panel.wait(lambda shown: shown["source"].get("session"))
+        shown.update(panel.shown["source"])
+        await panel.submit("end")
+
+    argv = track(folder, "--conditions", "ikns", "--finger", "sim:", "--json")
+    argv += ["--subject", str(files / "person")]
+    argv += ["--source", f"replay:{files / 'free.c3d'}?loop=yes"]
+    run(argv, fill, monkeypatch, 1)
+    assert "cannot be written: no space left on device" in shown["session"]
+    out, err = capfd.readouterr()
+    losses = json.loads(out)["losses"]
+    assert losses
+    for sentence in losses:
+        assert "rows are missing (cannot be written: no space left" in sentence
+        assert sentence.rstrip(".") in err
+    lost = [int(each.split(": ")[1].split()[0]) for each in losses if "model" in each]
+    handed = [
+        int(each.split(" of ")[1].split()[0]) for each in losses if "model" in each
+    ]
+    session = folder / read_visit(folder).about["session"]
+    recorded = read_run(session)
+    assert handed[0] - lost[0] == len(recorded.frame)
