@@ -219,7 +219,9 @@ class Pages:
         panel, page = Page("panel"), Page("participant")
         for one in (panel, page):
             await one.come(found[0])
-        await panel.wait(lambda shown: shown["c"] is not None and shown["page_connected"])
+        await panel.wait(
+            lambda shown: shown["c"] is not None and shown["page_connected"]
+        )
         await panel.submit("begin")
         if self._command == "pick":
             await panel.until("ready")
