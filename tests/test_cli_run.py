@@ -4,6 +4,7 @@ import math
 import os
 import pty
 import re
+import select
 import signal
 import struct
 import subprocess
@@ -13,6 +14,7 @@ import time
 import urllib.request
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from command_line import check_refused, contents
 
@@ -281,6 +283,101 @@ def test_a_signal_ends_a_run_in_order(files, tmp_path, number):
     assert process.returncode == (3 if ended_safe else 128 + number), err
     assert "Traceback" not in err
     assert main(["replay", str(session)]) == 0
+
+
+def test_a_stopped_finger_is_armed_again_with_a_key(files, tmp_path):
+    argv = run_argv(files, "--duration", "60", "--json")
+    argv[argv.index("--source") + 1] = f"replay:{files / 'free.c3d'}?loop=yes"
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-c", IN_FOREGROUND, *argv],
+        stdin=theirs,
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        start_new_session=True,
+    ) as process:
+        os.close(theirs)
+        said = until(ours, "active ")
+        os.write(ours, b"R")  # nothing is stopped yet
+        os.kill(process.pid, signal.SIGSTOP)
+        time.sleep(1.0)
+        os.kill(process.pid, signal.SIGCONT)
+        said = until(ours, "press Shift+R to arm again")
+        assert "FINGER STOPPED: no " in said
+        os.write(ours, b"r\n")
+        time.sleep(0.5)
+        said = until(ours, "\x1b[K")
+        assert "active " not in said
+        os.write(ours, b"R")
+        until(ours, "active ")
+        os.kill(process.pid, signal.SIGSTOP)
+        time.sleep(1.0)
+        os.kill(process.pid, signal.SIGCONT)
+        until(ours, "press Shift+R to arm again")
+        os.write(ours, b"\x03")  # Ctrl-C
+        result = json.loads(process.stdout.read())
+        until(ours, "FINGER STOPPED")
+    os.close(ours)
+    assert process.returncode == 3
+    reached = [change["after"] for change in result["transitions"]]
+    assert reached.count("armed") == 2
+    assert reached[-2:] == ["safe", "disarmed"]
+
+
+#: As a shell starts a command: the terminal is its own.
+IN_FOREGROUND = (
+    f"import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); {PROGRAM}"
+)
+
+
+def until(terminal, words, seconds=120.0):
+    """Read what a program prints until it says something; return all since then."""
+    said, end = "", time.monotonic() + seconds
+    while words not in said:
+        assert time.monotonic() < end, said
+        if select.select([terminal], [], [], 1.0)[0]:
+            said += os.read(terminal, 4096).decode(errors="replace")
+    return said
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_ctrl_c_during_the_imports_is_no_traceback(files, seed):
+    wait = np.random.default_rng(seed).uniform(0.15, 1.5)
+    argv = run_argv(files, "--json")
+    argv[argv.index("--source") + 1] = f"replay:{files / 'free.c3d'}?loop=yes"
+    # Without arguments, as the console script calls it.
+    program = "import sys; from ikns.cli import main; print('ready', flush=True); "
+    program += "sys.exit(main())"
+    with subprocess.Popen(
+        [sys.executable, "-c", program, *argv],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(wait)
+        for _ in range(3):
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.01)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGINT
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("to", ["stdout", "both"])
+def test_output_that_no_one_reads_ends_it_without_a_word(files, to):
+    argv = run_argv(files, "--dry-run", "--json")
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *argv],
+        stdout=writing,
+        stderr=writing if to == "both" else subprocess.PIPE,
+        timeout=120,
+    )
+    os.close(writing)
+    assert done.returncode == 128 + signal.SIGPIPE
+    assert not done.stderr
 
 
 def test_the_body_is_shown_live_on_this_machine(files, monkeypatch, capfd):

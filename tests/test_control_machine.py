@@ -12,7 +12,7 @@ from ikns.live.control.smoothing import OneEuro
 
 # --- the state machine ---------------------------------------------------------------
 
-CALLS = ("arm", "activate", "pose", "check", "stop", "disarm")
+CALLS = ("arm", "activate", "pose", "check", "stop", "arm_again", "disarm")
 #: Every way there is, written down a second time.
 WAYS = {
     ("disarmed", "armed"),
@@ -25,6 +25,7 @@ WAYS = {
     ("holding", "active"),
     ("holding", "safe"),
     ("holding", "disarmed"),
+    ("safe", "armed"),
     ("safe", "disarmed"),
 }
 
@@ -36,6 +37,22 @@ def started(**times):
     machine.activate(0.0)
     assert machine.state == "active"
     return machine
+
+
+def test_only_a_request_leads_out_of_the_safe_state():
+    machine = started()
+    machine.stop(0.1, "button")
+    for name in ("arm", "activate", "pose", "check", "stop"):
+        call(machine, name, 0.2)
+        assert machine.state == "safe"
+    (change,) = machine.arm_again(0.3)
+    assert change[1:] == ("safe", "armed", "asked to arm again")
+    assert machine.arm_again(0.4) == ()
+    # It moves only once poses come, as after the first time.
+    assert machine.activate(0.4) == ()
+    machine.pose(0.5)
+    machine.activate(0.5)
+    assert machine.state == "active"
 
 
 def call(machine, name, now):

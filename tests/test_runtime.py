@@ -12,7 +12,7 @@ import small_person
 
 from ikns.calibration.subject import FILES, Subject
 from ikns.errors import InvalidInput, MarkerMismatch
-from ikns.finger import SimulatedFinger
+from ikns.finger import FingerError, SimulatedFinger
 from ikns.live.control.rejection_count import kind_of
 from ikns.live.control.settings import ControlSettings
 from ikns.live.runtime import replay_run, run
@@ -132,6 +132,67 @@ def test_a_long_silence_makes_the_finger_safe(subject, exploring, tmp_path):
     again = replay_run(read_run(folder))
     assert again.same
     assert STATES[again.state[-1]] == "safe"
+
+
+class Reconnected(SimulatedFinger):
+    """A finger that counts its connections and may refuse the second."""
+
+    def __init__(self, *, refuses=0):
+        super().__init__()
+        self.connections, self._refuses = 0, refuses
+
+    def connect(self):
+        self.connections += 1
+        if 1 < self.connections <= 1 + self._refuses:
+            raise FingerError("the servo is not there.")
+        super().connect()
+
+
+@pytest.mark.parametrize("refuses", [0, 1])
+def test_a_stopped_finger_is_armed_again_on_request_only(
+    subject, exploring, tmp_path, refuses
+):
+    folder, arm, shown = tmp_path / "session", threading.Event(), []
+    finger = Reconnected(refuses=refuses)
+
+    def show(status):
+        shown.append(status)
+        if len(shown) == 5:
+            finger.make_safe("a test")
+        # For a while nothing is asked for; then once more after each refusal.
+        stopped = sum(bool(status.stopped) for status in shown)
+        if status.stopped and stopped % 5 == 0:
+            arm.set()
+
+    with session_for(subject, folder, tmp_path) as session:
+        with source(exploring) as stream:
+            report = run(
+                stream,
+                subject,
+                finger,
+                session=session,
+                arm=arm,
+                on_status=show,
+                status_every=0.05,
+            )
+    # A busy machine may add pauses, in which it holds.
+    reached = [name for name in states(report) if name not in ("active", "holding")]
+    assert reached == ["armed", "safe", "armed", "disarmed"]
+    assert "active" in states(report)[-3:]
+    assert finger.connections == 2 + refuses
+    why = [status.stopped for status in shown if status.stopped]
+    assert len(why) >= 5
+    assert why[0].endswith("a test")
+    refused = "; arming again failed: the servo is not there"
+    assert why[-1].endswith(refused if refuses else "a test")
+    assert report.stopped == ""
+    assert replay_run(read_run(folder)).same
+
+
+def test_a_run_that_ends_stopped_says_so(subject, exploring):
+    with source(exploring, speed=2) as stream:
+        report = run(stream, subject, Failing(40))
+    assert report.stopped == "overheating"
 
 
 class Failing(SimulatedFinger):

@@ -219,11 +219,13 @@ class Pages:
         panel, page = Page("panel"), Page("participant")
         for one in (panel, page):
             await one.come(found[0])
-        await panel.wait(lambda shown: shown["c"] is not None and shown["page"])
-        await panel.ask("begin")
+        await panel.wait(
+            lambda shown: shown["c"] is not None and shown["page_connected"]
+        )
+        await panel.submit("begin")
         if self._command == "pick":
             await panel.until("ready")
-            await page.ask("toggle")
+            await page.submit("toggle")
         await panel.until("running" if self._command == "pick" else "track")
         self.running.set()
         both = (one.wait(lambda _: self._stop.is_set()) for one in (panel, page))

@@ -38,7 +38,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             from ikns.cli.app import run_command
 
             code = run_command(argv)
-        except (KeyboardInterrupt, SystemExit):
-            if not (code := signal_exit_code()):
+        except (KeyboardInterrupt, SystemExit) as ended:
+            code = signal_exit_code()
+            if not code and isinstance(ended.__context__, BrokenPipeError):
+                code = BROKEN_PIPE  # typer makes an exit of it
+            if not code:
                 raise
         return code if flush_output() else code or BROKEN_PIPE
