@@ -213,7 +213,7 @@ def test_a_frame_with_uncertain_weights_does_not_count(subject, exploring):
         if not wanted.solved.inside:
             continue
         within.append(decision)
-        assert "map" in decision.refused
+        assert "map" in decision.rejection
         assert np.isnan(decision.solved.c).all()
         angles = decision.solved.q[7:][-len(chain_joints(subject.chain)) :]
         assert np.isnan(learned.control_signal(angles, decision.solved.hand_in_thorax))

@@ -14,6 +14,9 @@ __all__ = ["power_of_ten", "say_size"]
 _FEWEST = 3
 #: Shorter distances are left out, m; marker noise changes them by much.
 _SHORTEST = 0.01
+#: Of a body of another unit, most ratios are alike; of markers that are anywhere, or
+#: named wrongly, they scatter: so much of them must be within so many powers of ten.
+_ALIKE, _WITHIN = 2 / 3, 0.18
 #: Frames are taken in such steps, to keep their number below this.
 _GLANCES = 100
 
@@ -22,8 +25,8 @@ def power_of_ten(skeleton: Skeleton, chain: str, markers: NDArray[np.float64]) -
     """Return the power of ten by which a body is larger than at calibration.
 
     That of the median ratio of the distances within segments, over distances and
-    frames, so that some markers may be astray. 0 for the right size and where too few
-    distances show one; 3 where millimeters were read as meters.
+    frames, so that some markers may be astray. 0 for the right size, and where too few
+    distances show one or they disagree; 3 where millimeters were read as meters.
 
     Parameters
     ----------
@@ -51,7 +54,10 @@ def power_of_ten(skeleton: Skeleton, chain: str, markers: NDArray[np.float64]) -
     shown = np.isfinite(ratio) & (ratio > 0)
     if not shown.any():
         return 0
-    return round(float(np.median(np.log10(ratio[shown]))))
+    powers = np.log10(ratio[shown])
+    middle = float(np.median(powers))
+    alike = np.mean(np.abs(powers - middle) < _WITHIN) >= _ALIKE
+    return round(middle) if alike else 0
 
 
 def say_size(power: int) -> str:
