@@ -20,17 +20,6 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = [
-    "BROKEN_PIPE",
-    "ending_requested",
-    "exit_on_signals",
-    "flush_output",
-    "handle_endings",
-    "open_standard_streams",
-    "signal_exit_code",
-    "stop_on_signals",
-]
-
 #: Ctrl-C, `kill`, a closed terminal or connection, and Ctrl-\.
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 #: Further signals are ignored for this long, s: impatience must not keep files from

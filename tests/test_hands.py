@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from ikns.view.scene.browser import HOW_TO_GET_ONE, browser_options, find_browser
+from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
 
 #: What every script has: `pads` is what the browser hands out; `at` reads a control
 #: signal after a change; `pad` and `odd` make gamepads.

@@ -22,8 +22,6 @@ import numba
 
 from ikns._kernels.machine_code import SUFFIX, KernelCache, is_private, say_once
 
-__all__ = ["compiled", "on_disk"]
-
 config: Any = numba.config
 #: Version of the files.
 _FORMAT = 1

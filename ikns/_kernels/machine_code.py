@@ -22,8 +22,6 @@ from typing import Any
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-__all__ = ["SUFFIX", "KernelCache", "is_private", "say_once"]
-
 SUFFIX = ".nbc"
 #: Length of a SHA-256, bytes.
 _DIGEST = 32

@@ -15,8 +15,6 @@ from ikns._kernels.compiled import compiled
 from ikns._kernels.row_space import orthogonalize
 from ikns.arrays import Array
 
-__all__ = ["write_principal_angles"]
-
 
 @compiled
 def write_principal_angles(A: Array, B: Array, angles: Array) -> None:

@@ -20,8 +20,6 @@ import numpy as np
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
-__all__ = ["orthogonalize", "write_bases"]
-
 #: Rounding of a double.
 _EPS = 2.0**-52
 #: Squares stay far from overflow and underflow while their sum is in this range.

@@ -10,8 +10,6 @@ from collections.abc import Sequence
 
 from ikns.errors import InvalidInput
 
-__all__ = ["CHAINS", "SIDES", "chain_joints", "chain_sides", "clavicle_counterpart"]
-
 #: Order of the side axis of every per-hand array.
 SIDES = ("right", "left")
 

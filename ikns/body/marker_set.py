@@ -18,8 +18,6 @@ from ikns.arrays import Array, Indices
 from ikns.body.model_file import urdf_folder
 from ikns.errors import FileError, MarkerMismatch
 
-__all__ = ["Marker", "MarkerSet"]
-
 _FORMAT = 1
 
 

@@ -17,18 +17,6 @@ from ikns.arrays import Array
 from ikns.body.anthropometry import Segment
 from ikns.errors import FileError, InvalidInput
 
-__all__ = [
-    "GENERIC_STATURE",
-    "SEGMENTS",
-    "Inertial",
-    "link_inertials",
-    "relative_sizes",
-    "resize_urdf",
-    "segment_ends",
-    "segment_lengths",
-    "urdf_folder",
-]
-
 #: Stature of the generic body: mean of the ANSUR II means of women and men, m.
 GENERIC_STATURE = (1.6285 + 1.7562) / 2
 #: Distance of the trunk's center of mass behind the sternal notch: midway between notch

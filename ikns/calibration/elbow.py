@@ -8,8 +8,6 @@ from ikns.arrays import Array
 from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 
-__all__ = ["elbow_reference"]
-
 #: Angle step of the central difference, rad: its error is of the order of the step
 #: squared (1e-10 m/rad), that of rounding 1e-16 m over the step (1e-11 m/rad).
 _STEP = 1e-5

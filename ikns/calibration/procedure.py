@@ -28,8 +28,6 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.recording.recording import Recording
 
-__all__ = ["calibrate"]
-
 #: Most still samples that are kept for pictures.
 _SHOWN = 3000
 

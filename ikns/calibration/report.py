@@ -16,14 +16,6 @@ from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.recording.recording import Recording
 
-__all__ = [
-    "exploration_report",
-    "extrinsic_report",
-    "marker_fault",
-    "points_report",
-    "static_report",
-]
-
 #: Most that the distance of two markers of a segment may differ from the static trial,
 #: median, m. Real people's differ by 2 to 4 mm, for moments by up to 24
 #: (benchmarks/stray_marker.py).

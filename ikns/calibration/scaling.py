@@ -19,8 +19,6 @@ from ikns.calibration.size_fit import (
 from ikns.calibration.static_trial import seen_markers, static_posture
 from ikns.recording.recording import Recording
 
-__all__ = ["ScalingReport", "scale"]
-
 #: A marker that the static trial does not show is kept only where its nominal place is
 #: known this well, standard deviation of all directions together, m: on landmarks, not
 #: in clusters.

@@ -15,8 +15,6 @@ from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.nullspace.map import still_mask
 
-__all__ = ["SwivelSamples", "is_simulated", "swivel_samples"]
-
 
 def is_simulated(
     subject: Subject, folder: Path, recordings: Sequence[Path] = ()

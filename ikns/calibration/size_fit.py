@@ -27,19 +27,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.static_trial import seen_markers
 from ikns.motion.marker_ik import MarkerIK
 
-__all__ = [
-    "MARKER_SD",
-    "POSE_SD",
-    "SEGMENT_SD",
-    "SIDE_SD",
-    "STATURE_SD",
-    "SizeFit",
-    "fit_sizes",
-    "length_deviations",
-    "size_covariance",
-    "size_factors",
-]
-
 #: Error of a marker's mean position over the trial, m: 0.1 to 1 mm of it is that of the
 #: cameras, the rest comes from segments that are not quite rigid.
 MARKER_SD = 1e-3

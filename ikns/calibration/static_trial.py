@@ -15,8 +15,6 @@ from ikns.errors import MarkerMismatch, NotEnoughData
 from ikns.numerics.rigid import rigid_transform
 from ikns.recording.recording import Recording
 
-__all__ = ["seen_markers", "static_posture"]
-
 #: With this many frames that show every marker only these are averaged; noise is then a
 #: third.
 _COMPLETE_FRAMES = 10

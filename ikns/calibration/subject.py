@@ -24,8 +24,6 @@ from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.output.folder import check_output_folder, output_folder
 
-__all__ = ["FILES", "FORMAT", "Subject"]
-
 #: Version of the folder's layout and of the JSON files in it.
 FORMAT = 1
 _NEEDED = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")

@@ -31,8 +31,6 @@ from ikns.cli.view import view
 from ikns.endings import BROKEN_PIPE, signal_exit_code
 from ikns.errors import DataLoss
 
-__all__ = ["app", "run_command"]
-
 app = typer.Typer(
     name="ikns",
     help="Learn a person's kinematic null space and turn it into a control signal.",

@@ -19,9 +19,6 @@ from ikns.cli.output import notes, progress, show, table
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
-__all__ = ["calibrate", "calibration_parts"]
-
-
 #: Options of a live calibration only.
 _LIVE_ONLY = (
     "source",

@@ -28,8 +28,6 @@ from ikns.errors import NotEnoughData, naming
 if TYPE_CHECKING:
     from ikns.analysis.compare import NullSpaceComparison
 
-__all__ = ["compare", "comparison_rows", "comparison_table"]
-
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
 

@@ -11,17 +11,6 @@ from ikns.cli.output import table
 if TYPE_CHECKING:
     from ikns.analysis.compare import Crosstalk, NullSpaceComparison
 
-__all__ = [
-    "HELD",
-    "LEGEND",
-    "crosstalk_json",
-    "crosstalk_sentence",
-    "findings_json",
-    "leak_sentence",
-    "point_table",
-    "pooled_table",
-]
-
 #: Names in words.
 HELD = {"pose": "position and orientation", "position": "position"}
 SHOULDER = {"internal": "internal", "isb": "ISB", "rotation_vector": "vector"}

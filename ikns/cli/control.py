@@ -13,8 +13,6 @@ from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
 from ikns.cli.output import progress, show, table
 from ikns.output.file import refuse_overwriting, write_csv
 
-__all__ = ["control"]
-
 
 def control(
     recording: RecordingFile,

@@ -14,8 +14,6 @@ from ikns.cli.output import json_text, notes, progress, show
 from ikns.output.file import write_csv, write_text
 from ikns.output.folder import check_output_folder, output_folder
 
-__all__ = ["demo"]
-
 _TRIALS = ("static", "free", "points")
 _RECORDINGS = (
     *(f"{trial}.c3d" for trial in _TRIALS),

@@ -14,8 +14,6 @@ from ikns.cli.output import progress, show, table
 from ikns.errors import naming
 from ikns.output.file import refuse_overwriting, write_csv
 
-__all__ = ["ik"]
-
 
 def ik(
     recording: RecordingFile,

@@ -9,8 +9,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-__all__ = ["keyboard", "pressed_keys"]
-
 
 @contextmanager
 def pressed_keys() -> Iterator[Callable[[float], str]]:

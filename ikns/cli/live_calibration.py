@@ -24,8 +24,6 @@ if TYPE_CHECKING:
         Verdict,
     )
 
-__all__ = ["LiveOptions", "record_live"]
-
 #: With --auto: takes of a step before it is skipped.
 _AUTO_TAKES = 3
 _KEYS: dict[str, Key] = {

@@ -14,8 +14,6 @@ import ikns
 if TYPE_CHECKING:
     from ikns.live.session import RunWriter
 
-__all__ = ["live_session", "say", "software"]
-
 
 def software() -> dict[str, str]:
     """Return the versions that a result may depend on."""

@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["AsJson", "Force", "MarkerSetName", "RecordingFile", "SubjectFolder"]
-
 AsJson = Annotated[
     bool, typer.Option("--json", help="Print one JSON object instead of a table.")
 ]

@@ -10,14 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-__all__ = [
-    "json_text",
-    "notes",
-    "progress",
-    "show",
-    "table",
-]
-
 #: Columns of a table that is written to a file or a pipe, which have no width.
 _WIDTH = 100
 

@@ -28,8 +28,6 @@ from ikns.cli.visit_options import (
     VisitFolder,
 )
 
-__all__ = ["pick"]
-
 _INPUTS = ("ikns", "ring")
 #: Design of experiment 2 of the paper.
 _DEFAULTS = {

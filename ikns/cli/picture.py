@@ -9,8 +9,6 @@ from typing import Any
 from ikns.errors import InvalidInput
 from ikns.output.file import refuse_overwriting, write_bytes
 
-__all__ = ["refuse_picture", "write_picture"]
-
 _ENDINGS = (".png", ".svg", ".pdf")
 
 

@@ -11,8 +11,6 @@ from ikns.errors import InvalidInput, naming
 if TYPE_CHECKING:
     from ikns.experiments.study.pilot import DeclaredDesign, PilotSpread
 
-__all__ = ["PlannedDesign", "resolve_plan", "resolve_spread"]
-
 Experiment = Literal["tracking", "picking"]
 _PAPER_LEVELS = {"tracking": 3, "picking": 11}
 _PAPER_REPEATS = {"tracking": 3, "picking": 1}

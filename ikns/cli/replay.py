@@ -10,8 +10,6 @@ import typer
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, show, table
 
-__all__ = ["replay"]
-
 
 def replay(
     session: Annotated[Path, typer.Argument(help="Folder that `ikns run` wrote.")],

@@ -21,8 +21,6 @@ from ikns.cli.output import notes, show
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.errors import naming
 
-__all__ = ["robot"]
-
 
 def robot(
     urdf: Annotated[Path, typer.Argument(help="Any robot's URDF file.")],

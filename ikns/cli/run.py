@@ -25,8 +25,6 @@ from ikns.errors import DataLoss, InvalidInput
 if TYPE_CHECKING:
     from ikns.live.runtime import LoopStatus, Report
 
-__all__ = ["run"]
-
 #: Interval of the status line on the terminal, s.
 _LINE_EVERY = 0.2
 

@@ -12,8 +12,6 @@ from ikns.cli.options import AsJson, Force
 from ikns.cli.output import show, table
 from ikns.output.file import refuse_overwriting, write_text
 
-__all__ = ["scale"]
-
 
 def scale(
     stature: Annotated[float, typer.Option(help="Standing height, m.")],

@@ -16,8 +16,6 @@ from ikns.cli.options import AsJson
 from ikns.cli.output import json_text
 from ikns.errors import InvalidInput
 
-__all__ = ["servo"]
-
 _KEYS = {
     "s": "silence",
     "m": "mute",

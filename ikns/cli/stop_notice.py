@@ -12,8 +12,6 @@ from ikns.cli.keyboard import keyboard, pressed_keys
 if TYPE_CHECKING:
     from ikns.live.runtime import LoopStatus
 
-__all__ = ["STOPPED", "stop_line", "watch_stops"]
-
 #: Exit code of a run that ends while its finger is stopped.
 STOPPED = 3
 #: With Shift: not typed by accident. Keys that come before the stop do not count.

@@ -14,8 +14,6 @@ from ikns.cli.output import show, table
 if TYPE_CHECKING:
     from ikns.live.stream import LslOutlet
 
-__all__ = ["stream"]
-
 
 def stream(
     recording: RecordingFile,

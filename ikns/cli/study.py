@@ -15,8 +15,6 @@ from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, progress, show
 from ikns.cli.study_plan import plan
 
-__all__ = ["study_app"]
-
 study_app = typer.Typer(
     help="Declare a study, simulate it, plan its size.",
     no_args_is_help=True,

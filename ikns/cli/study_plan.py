@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ikns.statistics.plan import SamplingPlan
     from ikns.statistics.power import Power
 
-__all__ = ["plan"]
-
 #: Quantity, unit, and the levels over which a participant's trials are averaged.
 _VALUE = {
     "tracking": ("RMSE", "of 100", "trajectories"),

@@ -11,8 +11,6 @@ from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, progress, show, table
 from ikns.output.folder import check_output_folder, output_folder
 
-__all__ = ["report"]
-
 
 def report(
     study: Annotated[

@@ -30,8 +30,6 @@ from ikns.cli.visit_options import (
 )
 from ikns.errors import InvalidInput
 
-__all__ = ["track"]
-
 _INPUTS = ("ikns", "gamepad", "keyboard", "mouse", "virtual")
 #: Design of experiment 1 of the paper.
 _DEFAULTS = {

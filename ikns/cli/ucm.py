@@ -15,8 +15,6 @@ from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.ucm_designs import over_points, over_time
 from ikns.errors import InvalidInput
 
-__all__ = ["ucm"]
-
 
 def ucm(
     recordings: Annotated[

@@ -13,8 +13,6 @@ from ikns.errors import naming
 if TYPE_CHECKING:
     from ikns.analysis.ucm import SplitAnalysis
 
-__all__ = ["Found", "over_points", "over_time"]
-
 #: Which normalized times the table shows, %; JSON has all.
 _SHOWN = range(0, 101, 10)
 

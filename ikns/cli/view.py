@@ -19,8 +19,6 @@ from ikns.output.file import refuse_overwriting, write_bytes, write_text
 if TYPE_CHECKING:
     from ikns.view.scene import Scene
 
-__all__ = ["view"]
-
 
 def view(
     subject: Annotated[Path, typer.Argument(help="Folder that ikns calibrate wrote.")],

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from ikns.experiments.conduct import Conductor, Driver, Experiment, HeldInput
     from ikns.live.runtime import LoopStatus
 
-__all__ = ["conduct"]
-
 #: A virtual operator begins after this long, s.
 _VIRTUAL_WAIT = 2.0
 

@@ -20,18 +20,6 @@ if TYPE_CHECKING:
     from ikns.live.session import RunWriter
     from ikns.live.stream import Source
 
-__all__ = [
-    "PAGE",
-    "ArmOptions",
-    "PageOptions",
-    "arm_driver",
-    "arm_is_simulated",
-    "arm_subject",
-    "finger_opener",
-    "describe_input",
-    "open_arm_source",
-]
-
 #: Inputs that come from the participant's page, and their descriptions.
 PAGE = {
     "gamepad": "gamepad at the participant's page",

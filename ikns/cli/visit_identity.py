@@ -9,14 +9,6 @@ from typing import Any, Literal
 
 from ikns.errors import InvalidInput
 
-__all__ = [
-    "VisitIdentity",
-    "find_visit",
-    "resolve_design",
-    "resolve_option",
-    "split_names",
-]
-
 
 @dataclass(frozen=True)
 class VisitIdentity:

@@ -7,23 +7,6 @@ from typing import Annotated, Literal
 
 import typer
 
-__all__ = [
-    "Browser",
-    "ForIkns",
-    "FromStudy",
-    "Host",
-    "Number",
-    "Participant",
-    "Port",
-    "Realtime",
-    "Rest",
-    "SafeState",
-    "SessionFolder",
-    "SourceAddress",
-    "View",
-    "VisitFolder",
-]
-
 VisitFolder = Annotated[
     Path | None,
     typer.Argument(help="Folder of the visit; an existing one is continued."),

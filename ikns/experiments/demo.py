@@ -24,8 +24,6 @@ from ikns.simulation import (
     write_protocol,
 )
 
-__all__ = ["Demo", "demo_summary", "run_demo"]
-
 
 class Demo(NamedTuple):
     """A calibrated virtual subject, and the truth.

@@ -7,8 +7,6 @@ from typing import Generic, Protocol, TypeVar
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Progress"]
-
 
 class _Step(Protocol):
     @property

@@ -11,8 +11,6 @@ from ikns.finger.errors import FingerError, NoResponse, PortLost, Rejected
 from ikns.finger.models import Model, alert_text
 from ikns.finger.serial_port import load_sdk, port_error_text, port_errors
 
-__all__ = ["Bus"]
-
 #: Bit rates and ids to try when the servo does not respond, most common first.
 _BAUDS = (57600, 1000000, 115200, 2000000, 3000000, 4000000, 9600)
 _IDS = (*range(1, 11), 0)

@@ -10,8 +10,6 @@ from ikns.finger.errors import FingerError
 from ikns.finger.laws import LAWS, Bench, LawBroken
 from ikns.finger.state import Finger
 
-__all__ = ["FingerReport", "check_finger"]
-
 
 @dataclass(frozen=True)
 class FingerReport:

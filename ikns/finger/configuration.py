@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from ikns.finger.limiter import Limits
 from ikns.finger.models import Model
 
-__all__ = ["RESPOND_TO_ALL", "ServoConfiguration"]
-
 #: The servo's own profile is faster than the limiter by this factor, so as not to slow
 #: the motion down.
 _PROFILE_MARGIN = 1.5

@@ -11,8 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-__all__ = ["AX_SERIES", "CURRENT_CONTROL", "X_SERIES", "Register", "read_table"]
-
 #: Encoding of negative values: none, two's complement, or a sign in bit 10.
 Sign = Literal["none", "two", "bit10"]
 

@@ -14,8 +14,6 @@ from ikns.finger.guard import Guard
 from ikns.finger.state import FingerState
 from ikns.finger.torque import LOST, Torque
 
-__all__ = ["Drive"]
-
 #: Seconds between readings of torque and settings, and between attempts to reopen the
 #: port.
 _CHECK_INTERVAL, _REOPEN_INTERVAL = 0.1, 0.2

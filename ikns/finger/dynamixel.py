@@ -19,8 +19,6 @@ from ikns.finger.models import model_named
 from ikns.finger.relax_at_exit import forget, relax_at_exit
 from ikns.finger.state import FingerState
 
-__all__ = ["DynamixelFinger"]
-
 #: Timeout for switching the torque off, s.
 _RELAX_TIMEOUT = 1.0
 #: Attempts per instruction while connecting: noise may damage a packet, but not five.

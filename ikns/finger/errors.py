@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from ikns.errors import IknsError
 
-__all__ = ["FingerError", "NoResponse", "PortLost", "Rejected"]
-
 
 class FingerError(IknsError, ConnectionError):
     """A finger is missing, is not the one that was asked for, or did not obey."""

@@ -20,16 +20,6 @@ import math
 
 from ikns.errors import InvalidInput
 
-__all__ = [
-    "FULL_FLEXION",
-    "MODULES",
-    "MODULE_LENGTH",
-    "WIDEST",
-    "flexion_at",
-    "joint_angles",
-    "opening",
-]
-
 MODULES = 6
 MODULE_LENGTH = 0.025  # m
 FULL_FLEXION = math.radians(20)  # of each module

@@ -9,8 +9,6 @@ from ikns.errors import InvalidInput
 from ikns.finger.limiter import Limiter, Limits
 from ikns.finger.state import SAFE_STATES, Mode, SafeState
 
-__all__ = ["Guard", "Safety"]
-
 
 @dataclass(frozen=True)
 class Safety:

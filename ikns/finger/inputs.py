@@ -21,8 +21,6 @@ from typing import Self
 from ikns.errors import InvalidInput
 from ikns.finger.errors import FingerError
 
-__all__ = ["Gamepad", "Keyboard", "RingButton"]
-
 #: struct js_event of linux/joystick.h: ms, value, type, number.
 _EVENT = struct.Struct("<IhBB")
 _AXIS, _INITIAL = 0x02, 0x80

@@ -10,8 +10,6 @@ from dataclasses import fields
 from ikns.finger.guard import Safety
 from ikns.finger.state import MODES, Finger, FingerState
 
-__all__ = ["LAWS", "Bench", "LawBroken"]
-
 #: Longest that a call of the control loop may take, s; one that waited for a device's
 #: timeout would take longer.
 _NEVER_BLOCKS = 0.25

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Limiter", "Limits", "approach"]
-
 
 @dataclass(frozen=True)
 class Limits:

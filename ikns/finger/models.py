@@ -15,8 +15,6 @@ from ikns.finger.control_table import (
     read_table,
 )
 
-__all__ = ["MODELS", "Model", "alert_text", "model_named"]
-
 
 @dataclass(frozen=True)
 class Model:

@@ -13,8 +13,6 @@ from ikns.finger.guard import Safety
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import Finger
 
-__all__ = ["open_finger"]
-
 _SIMULATED: dict[str, Callable[[str], Any]] = {"width": float, "effort": float}
 _DYNAMIXEL: dict[str, Callable[[str], Any]] = {
     "id": int,

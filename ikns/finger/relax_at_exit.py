@@ -22,8 +22,6 @@ from typing import Protocol
 
 from ikns.endings import exit_on_signals
 
-__all__ = ["forget", "relax_at_exit"]
-
 
 class _Connected(Protocol):
     def make_safe(self, reason: str) -> None: ...

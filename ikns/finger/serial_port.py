@@ -13,8 +13,6 @@ from typing import Any
 
 from ikns.finger.errors import FingerError
 
-__all__ = ["load_sdk", "port_error_text", "port_errors", "port_holder"]
-
 #: A read waits this long for bytes at a time, s; the SDK itself would spin.
 _WAIT = 0.001
 #: Longest wait for bytes to be taken, s.

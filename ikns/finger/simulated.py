@@ -15,8 +15,6 @@ from ikns.finger.guard import Guard, Safety
 from ikns.finger.relax_at_exit import forget, relax_at_exit
 from ikns.finger.state import FingerState
 
-__all__ = ["FOLLOW", "SPEED", "SPIN", "YIELD", "SimulatedFinger"]
-
 # Assumed: a servo that closes the finger in half a turn, modeled on an XL430-W250 (57
 # rev/min and 1.3 A at 11.1 V). Flexion per second, stall current in A, seconds to
 # follow and to change speed, and the error in flexion at which effort is full.

@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal, Protocol, Self
 
-__all__ = ["MODES", "SAFE_STATES", "Finger", "FingerState", "Mode", "SafeState"]
-
 Mode = Literal["relaxed", "active", "safe"]
 SafeState = Literal["hold", "open", "limp"]
 

@@ -12,8 +12,6 @@ from ikns.finger.bus import Bus
 from ikns.finger.configuration import ServoConfiguration
 from ikns.finger.errors import FingerError
 
-__all__ = ["LOST", "Torque"]
-
 #: Unit of the bus watchdog's register, s.
 _WATCHDOG_UNIT = 0.02
 #: What `Torque.check` says of a servo without torque, or with other settings.

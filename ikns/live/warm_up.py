@@ -17,8 +17,6 @@ from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import principal_angles
 
-__all__ = ["compiled_before", "warm_up"]
-
 _CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)
 
 

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
 
-__all__ = ["WebAccess"]
-
 _ALL_ADDRESSES = ("0.0.0.0", "::")
 
 

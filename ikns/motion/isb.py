@@ -13,8 +13,6 @@ from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 
-__all__ = ["isb_angles"]
-
 _MIRROR = np.diag([1.0, 1.0, -1.0])
 
 

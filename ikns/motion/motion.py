@@ -9,8 +9,6 @@ import numpy as np
 from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 
-__all__ = ["Motion", "all_seen"]
-
 
 @dataclass(frozen=True, eq=False)
 class Motion:

@@ -10,8 +10,6 @@ from ikns.arrays import Array
 from ikns.motion.motion import Motion
 from ikns.numerics.median import finite_median
 
-__all__ = ["MotionTable", "motion_table"]
-
 _THORAX = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
 
 

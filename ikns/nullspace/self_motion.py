@@ -15,8 +15,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import null_projector
 
-__all__ = ["posture_at_point", "postures_along", "self_motion", "visited_posture"]
-
 #: An arm resting on a table in front, rad.
 _REST = {
     "shoulder_abduction": 0.35,

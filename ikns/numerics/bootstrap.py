@@ -26,14 +26,6 @@ from scipy.stats import t as student
 from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
-__all__ = [
-    "block_counts",
-    "block_length",
-    "block_rows",
-    "length_interval",
-    "student_interval",
-]
-
 #: Least number of blocks; fewer hardly determine their own spread.
 _LEAST_BLOCKS = 3
 #: Share of the variance that may be lost at block ends: a twentieth of an interval.

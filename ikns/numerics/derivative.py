@@ -7,8 +7,6 @@ from scipy.signal import savgol_filter
 
 from ikns.arrays import Array, Mask
 
-__all__ = ["slope"]
-
 #: Width of the fit, s; voluntary motion of the arm is below about 5 Hz.
 WINDOW = 0.2
 #: Most variance of a slope next to a gap, over that at the end of a recording, where

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["finite_median"]
-
 
 def finite_median(values: ArrayLike) -> float:
     """Median of the finite values; NaN without any.

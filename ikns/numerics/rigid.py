@@ -7,8 +7,6 @@ from scipy.spatial.transform import Rotation
 
 from ikns.arrays import Array
 
-__all__ = ["pose_steps", "rigid_transform"]
-
 
 def rigid_transform(source: Array, target: Array) -> tuple[Array, Array]:
     """Rotation (3, 3) and shift that best map points (N, 3) to points (Kabsch 1976).

@@ -23,16 +23,6 @@ from ikns._kernels.row_space import write_bases
 from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
-__all__ = [
-    "largest_entry_positive",
-    "mean_null_direction",
-    "null_projector",
-    "null_space",
-    "null_spaces",
-    "principal_angles",
-    "principal_components",
-]
-
 #: Rows count as dependent when their smallest singular value is at most this share of
 #: the largest: far above rounding (1e-16), which would otherwise decide their span.
 _DEPENDENT = 1e-12

@@ -13,15 +13,6 @@ from pathlib import Path
 from ikns.errors import InvalidInput
 from ikns.output.inputs import refuse_input
 
-__all__ = [
-    "create_bytes",
-    "refuse_overwriting",
-    "sync",
-    "write_bytes",
-    "write_csv",
-    "write_text",
-]
-
 #: What a file system answers that has no hard links.
 _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 

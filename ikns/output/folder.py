@@ -12,8 +12,6 @@ from ikns.errors import FileError, InvalidInput
 from ikns.output.file import sync
 from ikns.output.inputs import refuse_input_folder
 
-__all__ = ["check_output_folder", "output_folder"]
-
 
 def check_output_folder(
     folder: str | Path,

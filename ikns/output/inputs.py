@@ -7,8 +7,6 @@ from pathlib import Path
 
 from ikns.errors import InvalidInput
 
-__all__ = ["refuse_input", "refuse_input_folder"]
-
 #: Device and number of a file on it: the same for all names of one file.
 Identity = tuple[int, int]
 

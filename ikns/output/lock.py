@@ -13,8 +13,6 @@ from pathlib import Path
 
 from ikns.errors import FileError, InvalidInput
 
-__all__ = ["hold_lock"]
-
 
 def _print(sentence: str) -> None:
     sys.stderr.write(f"ikns: {sentence}\n")

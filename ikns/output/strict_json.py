@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-__all__ = ["strict_json"]
-
 
 def strict_json(value: Any, *, indent: int | None = None) -> str:
     """Return strict JSON; NaN and infinities, which JSON does not have, become null.

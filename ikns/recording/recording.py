@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike
 from ikns.arrays import Array
 from ikns.errors import InvalidInput, MarkerMismatch
 
-__all__ = ["Recording"]
-
 
 # Arrays have no single truth value, so recordings are compared by identity.
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.numerics.subspace import null_space
 
-__all__ = ["ArmKinematics", "SelfMotion", "self_motion"]
-
 Array = NDArray[np.float64]
 
 #: Hand pose error at which Newton's method stops, m and rad: a thousandth of the 0.1 mm

@@ -11,8 +11,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.simulation.wander import wander
 
-__all__ = ["SoftTissue", "occlusions"]
-
 Array = NDArray[np.float64]
 
 #: Shares of the variance: the cluster moves as one, each marker moves with the posture,

@@ -15,8 +15,6 @@ from ikns.simulation.arm import ArmKinematics, SelfMotion
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.trial import SEATED_SWAY, place_in_room, still_joints
 
-__all__ = ["BodyFrames", "arm_rows"]
-
 Array = NDArray[np.float64]
 
 #: Height of the thorax frame, m: no result depends on it.

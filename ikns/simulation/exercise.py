@@ -18,8 +18,6 @@ from ikns.simulation.movement import (
 )
 from ikns.simulation.places import Place, random_place
 
-__all__ = ["explore_freely", "explore_points"]
-
 
 def explore_freely(
     arms: Sequence[ArmKinematics],

@@ -13,8 +13,6 @@ from ikns.recording.files import write_c3d
 from ikns.simulation.protocol import Protocol
 from ikns.simulation.trial import Trial
 
-__all__ = ["write_protocol"]
-
 _FORMAT = 1
 
 

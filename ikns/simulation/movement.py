@@ -18,19 +18,6 @@ from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.places import Place
 from ikns.simulation.wander import minimum_jerk, tremor, wander
 
-__all__ = [
-    "SWIVEL_HZ",
-    "MovementPlan",
-    "Unsteadiness",
-    "execute_plan",
-    "explore",
-    "hand_drift",
-    "join",
-    "reach",
-    "reach_samples",
-    "reach_seconds",
-]
-
 Array = NDArray[np.float64]
 
 #: Range of the swivel frequency in exploration, Hz: a comfortable pace (assumption).

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["draw_parameters"]
-
 
 def draw_parameters(
     table: Mapping[str, Mapping[str, Any]], rng: np.random.Generator

@@ -18,15 +18,6 @@ from scipy.optimize import least_squares
 from ikns.errors import InvalidInput
 from ikns.simulation.arm import ArmKinematics, SelfMotion, girdle, self_motion
 
-__all__ = [
-    "Place",
-    "box_points",
-    "comfortable_posture",
-    "explored_places",
-    "random_place",
-    "widest_place",
-]
-
 Array = NDArray[np.float64]
 
 #: Corners of the box from the shoulder joint, in arm lengths (shoulder to knuckles):

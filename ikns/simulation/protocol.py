@@ -22,8 +22,6 @@ from ikns.simulation.protocol_body import draw_protocol_body
 from ikns.simulation.subject import VirtualSubject
 from ikns.simulation.trial import Trial, record_trial
 
-__all__ = ["Protocol", "simulate_protocol"]
-
 Array = NDArray[np.float64]
 
 

@@ -16,8 +16,6 @@ from ikns.simulation.places import Place, box_points, explored_places
 from ikns.simulation.subject import VirtualSubject
 from ikns.simulation.trial import SEATED_SWAY, place_in_room, still_joints
 
-__all__ = ["RESTING", "STATIC_SD", "ProtocolBody", "both_arms", "draw_protocol_body"]
-
 Array = NDArray[np.float64]
 
 #: Height of the jugular notch over the floor, share of stature, standing and on a chair

@@ -10,8 +10,6 @@ from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput
 from ikns.simulation.wander import wander
 
-__all__ = ["explore_null_space", "reach_pose"]
-
 Array = NDArray[np.float64]
 
 #: Pose error at which Newton's method stops, m and rad: far above rounding, far below

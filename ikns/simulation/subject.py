@@ -11,8 +11,6 @@ from ikns.body.anthropometry import Adult, sample_adults, segments
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 
-__all__ = ["VirtualSubject", "virtual_subject"]
-
 #: Spread of thorax size between people of one stature, relative (our estimate).
 _THORAX_SD = 0.04
 #: Spread of a segment's length between the sides of one person, relative (our

@@ -18,15 +18,6 @@ from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.wander import wander
 
-__all__ = [
-    "SEATED_SWAY",
-    "Trial",
-    "place_in_room",
-    "record_trial",
-    "still_joints",
-    "true_motion",
-]
-
 Array = NDArray[np.float64]
 
 #: Sway of the trunk on a chair, m and rad, standard deviations per axis: small, as the

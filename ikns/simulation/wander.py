@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfilt
 
-__all__ = ["minimum_jerk", "tremor", "wander"]
-
 Array = NDArray[np.float64]
 
 

@@ -31,13 +31,6 @@ from ikns.statistics.times import TimeTest, restricted_pairs, time_test
 from ikns.statistics.within_subject_anova import VarianceTable, within_subject_anova
 from ikns.statistics.wording import counted
 
-__all__ = [
-    "PickAnalysis",
-    "TrackingAnalysis",
-    "analyze_picking",
-    "analyze_tracking",
-]
-
 #: statsmodels' table takes minutes for a thousand subjects, as their number cubed.
 _MOST_ANOVA = 200
 

@@ -21,8 +21,6 @@ from ikns.statistics.paper import SUBJECTS, TIME, subject_spread_limit
 from ikns.statistics.power import Spread
 from ikns.statistics.table import Table, column, labels, numbers
 
-__all__ = ["AssumedSpread", "paper_spread", "pilot_spread"]
-
 Array = NDArray[np.float64]
 
 

@@ -14,8 +14,6 @@ from scipy.special import gammaln, nctdtrinc
 from ikns.statistics.pairs import Pairs
 from ikns.statistics.wording import interval_text, number
 
-__all__ = ["Effect", "cohens_dz", "effect_sizes", "hedges_g_av", "hodges_lehmann"]
-
 Array = NDArray[np.float64]
 
 

@@ -18,8 +18,6 @@ from ikns.statistics.library import statsmodels
 from ikns.statistics.pairs import Pairs
 from ikns.statistics.wording import interval_text, number, p_text
 
-__all__ = ["Equivalence", "Verdict", "checked_margin", "equivalence"]
-
 Verdict = Literal["equivalent", "equivalent though different", "different", "undecided"]
 
 

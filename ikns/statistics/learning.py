@@ -24,8 +24,6 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.statistics.table import Table, column, finite_values, labels
 from ikns.statistics.wording import number
 
-__all__ = ["MODELS", "LearningCurve", "LearningCurves", "learning_curves"]
-
 Array = NDArray[np.float64]
 
 MODELS = ("constant", "exponential", "power law")

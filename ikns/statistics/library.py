@@ -7,8 +7,6 @@ from typing import Any
 
 from ikns.errors import InvalidInput
 
-__all__ = ["statsmodels"]
-
 
 def statsmodels(module: str) -> Any:
     """Import a module of statsmodels by its path below the package."""

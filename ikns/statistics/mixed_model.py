@@ -28,8 +28,6 @@ from ikns.statistics.model_design import comparable_trials, fixed_effects
 from ikns.statistics.table import Table
 from ikns.statistics.wording import interval_text, number, p_text
 
-__all__ = ["Coefficient", "MixedModel", "mixed_model"]
-
 Array = NDArray[np.float64]
 
 _FULL = "random intercept and condition per subject"

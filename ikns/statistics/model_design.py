@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.statistics.table import Table, column, finite_values, labels, two_conditions
 
-__all__ = ["ComparableTrials", "comparable_trials", "fixed_effects"]
-
 Array = NDArray[np.float64]
 
 

@@ -16,18 +16,6 @@ from scipy import stats
 from ikns.statistics.pairs import Pairs
 from ikns.statistics.wording import counted, interval_text, number, p_text
 
-__all__ = [
-    "Normality",
-    "PairedT",
-    "RankTest",
-    "SignTest",
-    "exact_sign",
-    "normality",
-    "pooled_t",
-    "signed_rank",
-    "subject_means_t",
-]
-
 _POOLED = "as the paper did it, counting {n} pairs of {m} subjects as independent"
 _OWN = "over {m} subjects, one pair each"
 

@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.statistics.table import Table, column, finite_values, labels, two_conditions
 
-__all__ = ["Pairs", "pair_arrays", "pair_trials"]
-
 Array = NDArray[np.float64]
 
 

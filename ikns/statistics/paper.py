@@ -11,15 +11,6 @@ import math
 import numpy as np
 from scipy import stats
 
-__all__ = [
-    "POOLED_P",
-    "RMSE",
-    "SUBJECTS",
-    "TIME",
-    "TRAJECTORIES",
-    "subject_spread_limit",
-]
-
 SUBJECTS = 10
 TRAJECTORIES = ("T1", "T2", "T3")
 #: Of a control signal of 0 to 100, for each trajectory: mean and standard deviation.

@@ -11,8 +11,6 @@ from ikns.statistics.equivalence import checked_margin
 from ikns.statistics.power import Design, Power, Spread, simulated_power
 from ikns.statistics.wording import number
 
-__all__ = ["SampleSize", "SamplingPlan", "plan_participants", "sample_size"]
-
 #: At most how many numbers of participants the curve has, and in which steps.
 _PLACES = 14
 _STEPS = [k * 10**power for power in range(7) for k in (1, 2, 5)]

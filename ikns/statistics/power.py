@@ -22,13 +22,6 @@ from ikns.errors import InvalidInput
 from ikns.statistics.equivalence import checked_margin
 from ikns.statistics.wording import number
 
-__all__ = [
-    "Design",
-    "Power",
-    "Spread",
-    "simulated_power",
-]
-
 Array = NDArray[np.float64]
 Analysis = Literal["subject means", "pooled"]
 #: Largest number of normal draws held at once.

@@ -15,8 +15,6 @@ from ikns.statistics.pairs import Pairs, pair_trials
 from ikns.statistics.table import Table, column, labels
 from ikns.statistics.wording import p_text
 
-__all__ = ["SuccessTest", "success_pairs", "success_test"]
-
 
 @dataclass(frozen=True)
 class SuccessTest:

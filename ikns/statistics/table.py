@@ -14,15 +14,6 @@ from numpy.typing import NDArray
 
 from ikns.errors import InvalidInput, NotEnoughData
 
-__all__ = [
-    "Table",
-    "column",
-    "finite_values",
-    "labels",
-    "numbers",
-    "two_conditions",
-]
-
 Array = NDArray[np.float64]
 Table = Mapping[str, Sequence[Any] | NDArray[Any]]
 

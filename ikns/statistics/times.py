@@ -24,8 +24,6 @@ from ikns.statistics.success import success_pairs
 from ikns.statistics.table import Table, column, finite_values, numbers
 from ikns.statistics.wording import interval_text, number, p_text
 
-__all__ = ["TimeTest", "restricted_mean", "restricted_pairs", "time_test"]
-
 
 @dataclass(frozen=True)
 class TimeTest:

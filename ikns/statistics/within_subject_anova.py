@@ -17,8 +17,6 @@ from ikns.statistics.library import statsmodels
 from ikns.statistics.pairs import Pairs
 from ikns.statistics.wording import number, p_text
 
-__all__ = ["VarianceTable", "within_subject_anova"]
-
 
 @dataclass(frozen=True)
 class VarianceTable:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["counted", "interval_text", "number", "p_text"]
-
 
 def number(value: float, unit: str = "") -> str:
     """Three digits and the unit.

@@ -23,8 +23,6 @@ from ikns.symbolic.kinematics import (
 )
 from ikns.symbolic.volumes import Capsule, arm_pairs, capsules, distance
 
-__all__ = ["Chain", "Held", "chain_of", "held"]
-
 Array = NDArray[np.float64]
 Pair = tuple[Capsule, Capsule]
 

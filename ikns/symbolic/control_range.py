@@ -12,8 +12,6 @@ from ikns.symbolic.held_hand import HeldHand
 from ikns.symbolic.posture import start_of
 from ikns.symbolic.results import AvailableRange
 
-__all__ = ["ControlRange", "available_control"]
-
 
 @dataclass(frozen=True, eq=False)
 class ControlRange:

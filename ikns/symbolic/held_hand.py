@@ -30,8 +30,6 @@ from ikns.symbolic.posture import Start, binding, start_of
 from ikns.symbolic.programs import NODES, Climber, Sweeper
 from ikns.symbolic.results import AvailableRange, Sweep
 
-__all__ = ["HeldHand", "available_range"]
-
 Array = NDArray[np.float64]
 #: A posture or postures, active limits, whether it is a solution, optimizer status.
 Found = tuple[Array, tuple[str, ...], bool, str]

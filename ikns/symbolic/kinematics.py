@@ -19,17 +19,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.markers import part_along
 from ikns.errors import InvalidInput
 
-__all__ = [
-    "chain_jacobian",
-    "frame",
-    "joint_frames",
-    "link_in_thorax",
-    "markers_in_world",
-    "path_jacobian",
-    "root_at_origin",
-    "sized_markers",
-]
-
 Array = NDArray[np.float64]
 #: Rotation (3, 3) and translation (3, 1), m, as expressions.
 Pose = tuple[ca.SX, ca.SX]

@@ -41,8 +41,6 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.recording.recording import Recording
 from ikns.symbolic.length_program import FrameData, LengthProgram, Solution
 
-__all__ = ["LengthFit", "fit_lengths"]
-
 Array = NDArray[np.float64]
 
 #: Fewer frames than this are refused.

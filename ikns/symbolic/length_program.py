@@ -22,8 +22,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.size_fit import size_covariance
 from ikns.symbolic.kinematics import sized_markers
 
-__all__ = ["FrameData", "LengthProgram", "Solution"]
-
 Array = NDArray[np.float64]
 
 _IPOPT: dict[str, Any] = {

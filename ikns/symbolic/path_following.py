@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["STRIDE", "Function", "Walk", "come_back", "walk"]
-
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
 

@@ -11,8 +11,6 @@ from ikns._kernels.body.tree import PRISMATIC
 from ikns.errors import InvalidInput
 from ikns.symbolic.chain import Chain, Held
 
-__all__ = ["Start", "binding", "start_of"]
-
 Array = NDArray[np.float64]
 
 #: A limit or volume is active when less than this is left, rad and m: a thousand times

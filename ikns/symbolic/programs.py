@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from ikns.symbolic.chain import Chain, Held
 
-__all__ = ["NODES", "Climber", "Sweeper"]
-
 Array = NDArray[np.float64]
 
 #: IPOPT without its output, to 1e-9 in meters and radians; a warm start stays near.

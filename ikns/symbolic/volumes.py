@@ -20,8 +20,6 @@ from scipy.spatial.transform import Rotation
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Capsule", "arm_pairs", "capsules", "distance"]
-
 Array = NDArray[np.float64]
 
 #: Part of the upper arm next to the shoulder that is not kept off the trunk, which it

@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.arrays import Array
 from ikns.errors import InvalidInput
 
-__all__ = ["outward", "same_length", "series"]
-
 
 def series(values: ArrayLike, name: str) -> Array:
     """Return `values` as a float array with one axis."""

@@ -14,8 +14,6 @@ from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 
-__all__ = ["arm_points", "body_surfaces"]
-
 # Girth of the drawing as fractions of the shoulder-to-shoulder distance, read off the
 # shapes of urdf/upper_body.urdf. Nothing is computed from it.
 _ARM_RADII = (0.115, 0.095, 0.07, 0.05)

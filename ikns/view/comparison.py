@@ -14,8 +14,6 @@ from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.view.style import BLUE, GREY, INK, MARKS, figure_style, new_figure
 
-__all__ = ["comparison_figure"]
-
 
 def comparison_figure(
     found: Mapping[str, NullSpaceComparison],

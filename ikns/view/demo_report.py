@@ -33,8 +33,6 @@ from ikns.view.report import (
 )
 from ikns.view.style import figure_style
 
-__all__ = ["write_demo_report"]
-
 #: Largest angle expected of a simulated subject with 1 mm of marker noise, rad.
 _ANGLE_GOAL = np.radians(6.0)
 #: Hand speed below which samples were learned from: the default of a calibration, m/s.

@@ -22,8 +22,6 @@ from ikns.view.style import (
     new_figure,
 )
 
-__all__ = ["directions_figure", "principal_angle_figure"]
-
 _COLUMNS = 5
 _MARKS = (*MARKS, (RED, "v"))
 

@@ -18,19 +18,6 @@ from ikns.errors import InvalidInput
 from ikns.view.render import data_uri
 from ikns.view.style import PAGE_WIDTH
 
-__all__ = [
-    "Cell",
-    "KeyNumber",
-    "ReportPage",
-    "Picture",
-    "Section",
-    "NextStep",
-    "Table",
-    "facts_html",
-    "inline",
-    "steps_html",
-]
-
 Cell = str | int | float | bool | None
 
 

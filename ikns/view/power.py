@@ -10,8 +10,6 @@ from ikns.errors import InvalidInput
 from ikns.view.arrays import same_length, series
 from ikns.view.style import BLUE, INK, ORANGE, figure_style, new_figure
 
-__all__ = ["power_figure"]
-
 
 def power_figure(
     participants: ArrayLike,

@@ -11,8 +11,6 @@ from matplotlib.figure import Figure
 
 from ikns.view.style import figure_style
 
-__all__ = ["data_uri", "pdf", "png", "svg"]
-
 #: Dots per inch of a PNG: about two per pixel of a page 900 pixels wide.
 _DPI = 170
 #: Points of a figure above which an SVG (60 bytes each) is larger than the PNG.

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike
 from ikns.view.arrays import same_length, series
 from ikns.view.style import BLUE, RED, figure_style, new_figure
 
-__all__ = ["residual_figure"]
-
 
 def residual_figure(time: ArrayLike, residual: ArrayLike, *, simulated: bool) -> Figure:
     """Draw the distance between seen and modeled markers over time.

@@ -20,8 +20,6 @@ from ikns.view.style import (
     point_color,
 )
 
-__all__ = ["control_figure", "swivel_figure"]
-
 _COLUMNS = 5
 #: Widest axis of c: outside the volume c has no bound.
 _FARTHEST_C = (-1.5, 2.5)

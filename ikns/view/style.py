@@ -11,24 +11,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-__all__ = [
-    "BLUE",
-    "GREEN",
-    "GREY",
-    "INK",
-    "MARKS",
-    "ORANGE",
-    "PAGE_WIDTH",
-    "PALE",
-    "RED",
-    "VOLUME",
-    "figure_style",
-    "joint_labels",
-    "new_figure",
-    "outside_legend",
-    "point_color",
-]
-
 # Okabe and Ito, "Color Universal Design" (2008): distinct with any color vision.
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 BLUE, RED, PURPLE, YELLOW = "#0072B2", "#D55E00", "#CC79A7", "#F0E442"

@@ -13,8 +13,6 @@ from ikns.errors import InvalidInput
 from ikns.view.arrays import same_length, series
 from ikns.view.style import BLUE, GREY, INK, ORANGE, figure_style, new_figure
 
-__all__ = ["variance_split_figure"]
-
 _AXIS = {"time": "normalized time (%)", "points": "PCA point"}
 
 

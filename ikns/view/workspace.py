@@ -24,8 +24,6 @@ from ikns.view.style import (
     point_color,
 )
 
-__all__ = ["workspace_figure"]
-
 #: Thorax frame (X forward, Y up, Z right) to the drawing's right, forward, up.
 _TO_DRAWING = [2, 0, 1]
 _MARGIN = 0.04  # m around everything that is drawn

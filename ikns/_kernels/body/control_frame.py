@@ -22,8 +22,6 @@ from ikns._kernels.voronoi.diagram import NOT_FINITE, OUTSIDE_HULL
 from ikns._kernels.voronoi.query import natural_weights
 from ikns.arrays import Array, Indices
 
-__all__ = ["ControlMap", "control_frame"]
-
 
 class ControlMap(NamedTuple):
     """P points for d signals of n joints, seen by M markers on L links."""

@@ -17,8 +17,6 @@ from ikns._kernels.body.tree_cholesky import factor, solve
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
-__all__ = ["copy", "descend", "errors_at"]
-
 #: The step after one with the true Hessian is about its square times the rate at which
 #: the Hessian changes, up to 50 per radian where markers barely determine a joint. So
 #: after a step of this times the root of the tolerance less than 5 % of it remain.

@@ -9,8 +9,6 @@ from ikns._kernels.body.tree import Tree, place_joints
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
-__all__ = ["add_penalties", "marker_errors", "penalties", "take_markers"]
-
 
 @compiled
 def take_markers(

@@ -22,8 +22,6 @@ from ikns._kernels.body.tree import FREE_FLYER
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices, Mask
 
-__all__ = ["INFINITE", "solve_frame", "solve_frames"]
-
 #: Iterations of a frame with an infinite marker, which is a fault and not a gap.
 INFINITE = -1
 

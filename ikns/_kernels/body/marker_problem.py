@@ -15,8 +15,6 @@ from ikns._kernels.body.tree import Tree
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
-__all__ = ["MarkerProblem", "Scratch", "cut", "pack", "scratch_size", "unpack"]
-
 
 class MarkerProblem(NamedTuple):
     """What does not change between frames: n rates, M markers, S starts.

@@ -25,8 +25,6 @@ from ikns._kernels.body.tree import FREE_FLYER, Tree
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
-__all__ = ["MOMENTS", "linearize"]
-
 #: m, h (3), f (3), C (6: xx yy zz yz zx xy), B (9, row after row).
 MOMENTS = 22
 

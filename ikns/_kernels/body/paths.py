@@ -17,8 +17,6 @@ from ikns._kernels.body.tree import PRISMATIC
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
-__all__ = ["Paths", "follow_path", "path_jacobian", "place_frames", "write_jacobians"]
-
 
 class Paths(NamedTuple):
     """Paths from one base to E frames, concatenated; K joints in total.

@@ -13,8 +13,6 @@ import numpy as np
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array
 
-__all__ = ["rigid_pose"]
-
 
 @compiled
 def rigid_pose(

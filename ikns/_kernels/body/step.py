@@ -20,8 +20,6 @@ from ikns._kernels.body.tree import FREE_FLYER, Tree
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array
 
-__all__ = ["displacement", "integrate"]
-
 #: Below this angle the series are exact to rounding with three terms: t^6 / 10^5.
 _SMALL = 1e-2
 

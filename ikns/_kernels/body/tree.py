@@ -15,16 +15,6 @@ import numpy as np
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
-__all__ = [
-    "FREE_FLYER",
-    "PRISMATIC",
-    "REVOLUTE",
-    "Tree",
-    "joint_axes",
-    "place_joint",
-    "place_joints",
-]
-
 REVOLUTE, PRISMATIC, FREE_FLYER = 0, 1, 2
 #: Not a plain 2, for which numba would compile another version of its callees.
 _Z = np.int64(2)

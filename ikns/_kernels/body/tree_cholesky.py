@@ -17,8 +17,6 @@ import numpy as np
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
-__all__ = ["factor", "solve"]
-
 
 @compiled
 def factor(H: Array, path: Indices, depth: Indices) -> bool:

@@ -28,8 +28,6 @@ from ikns._kernels.voronoi.diagram import (
 )
 from ikns.arrays import Array, Indices
 
-__all__ = ["write_answer"]
-
 
 @compiled
 def _smooth_coefficients(

@@ -39,8 +39,6 @@ from ikns._kernels.voronoi.hull import CANCELED
 from ikns._kernels.voronoi.query import NEGATIVE
 from ikns.arrays import Array, Indices
 
-__all__ = ["answer_batch", "batch_scratch_rows"]
-
 
 def batch_scratch_rows(indices: Indices) -> int:
     """Rows of scratch memory that `answer_batch` needs."""

@@ -42,14 +42,6 @@ from ikns._kernels.voronoi.double_double import Triple, difference, double_doubl
 from ikns._kernels.voronoi.hull import CANCELED, depth_behind, exact_depth
 from ikns.arrays import Array, Indices
 
-__all__ = [
-    "check_all_spheres",
-    "clear_cavity",
-    "find_cavity",
-    "kept_length",
-    "power_to",
-]
-
 #: Keeps a share of nothing, 0 / 0, at nothing; powers are zero or more than 1e-40.
 _NOTHING = 1e-300
 

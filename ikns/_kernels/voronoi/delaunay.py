@@ -21,8 +21,6 @@ from ikns._kernels.voronoi.exact import SCRATCH, Sites
 from ikns._kernels.voronoi.predicates import in_sphere, orientation
 from ikns.arrays import Indices
 
-__all__ = ["OUTWARD", "triangulate"]
-
 _INFINITY = -1
 _FREE = -2  # in place 0 of a row that holds no cell
 #: Vertices of a facet in turn, seen from outside.

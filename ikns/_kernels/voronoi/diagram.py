@@ -20,8 +20,6 @@ import numpy as np
 
 from ikns.arrays import Array, Indices
 
-__all__ = ["new_work", "place"]
-
 # Places are unsigned: of signed ones numba checks whether they count from the end,
 # which costs as much as what is done there.
 place = np.uint64

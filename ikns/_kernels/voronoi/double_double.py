@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from ikns._kernels.compiled import compiled
 
-__all__ = ["Triple", "difference", "product", "double_double_dot"]
-
 Triple = tuple[float, float, float]
 
 

@@ -20,23 +20,6 @@ from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.double_double import difference
 from ikns.arrays import Array, Indices
 
-__all__ = [
-    "CENTER",
-    "DETERMINANT",
-    "NORMAL",
-    "POWER",
-    "SCRATCH",
-    "SPHERE",
-    "TO_SPHERE",
-    "VOLUME",
-    "VW",
-    "Sites",
-    "determinants",
-    "on_lattice",
-    "sign_of",
-    "values",
-]
-
 #: Sites are cut off to steps of this size.
 _FINEST = 2.0**-100
 _BITS = 30

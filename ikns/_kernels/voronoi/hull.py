@@ -21,15 +21,6 @@ from ikns._kernels.voronoi.diagram import (
 from ikns._kernels.voronoi.double_double import Triple, difference, double_double_dot
 from ikns.arrays import Array, Indices, Mask
 
-__all__ = [
-    "CANCELED",
-    "depth_behind",
-    "exact_depth",
-    "hull_depths",
-    "inside_many",
-    "scaled",
-]
-
 #: Where a product of floats is below this part of its terms, it is formed again with
 #: twice the digits; above, rounding costs at most 1e-16 / 1e-3.
 CANCELED = 1e-3

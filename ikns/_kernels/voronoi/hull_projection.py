@@ -15,8 +15,6 @@ from ikns._kernels.voronoi.diagram import HULL, HULL_SITES, SITE, place
 from ikns._kernels.voronoi.double_double import Triple
 from ikns.arrays import Array, Indices
 
-__all__ = ["nearest_on_hull"]
-
 #: Distances that differ by less are compared by where the sites lie.
 _TIE = 1e-12
 

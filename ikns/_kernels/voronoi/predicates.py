@@ -26,8 +26,6 @@ from ikns._kernels.voronoi.exact import (
 )
 from ikns.arrays import Indices
 
-__all__ = ["in_sphere", "orientation"]
-
 _ULP = 2.0**-53
 # Shewchuk's o3derrboundA and isperrboundA times sqrt(3), 1.74 with its own rounding.
 _PLANE_BOUND = 1.74 * (7 + 56 * _ULP) * _ULP

@@ -40,8 +40,6 @@ from ikns._kernels.voronoi.hull_projection import nearest_on_hull
 from ikns._kernels.voronoi.sibson import add_faces
 from ikns.arrays import Array, Indices
 
-__all__ = ["NEGATIVE", "answer_many", "answer_one", "natural_weights"]
-
 #: Queries closer to the hull than this part of the way to the middle are moved in to
 #: there. The hull of a box whose corners are rounded is uneven by 1e-16, and closer to
 #: it the weights would depend on how.

@@ -11,8 +11,6 @@ from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.delaunay import OUTWARD
 from ikns.arrays import Indices
 
-__all__ = ["list_facets", "list_sides"]
-
 
 def list_facets(
     simplices: Indices, neighbors: Indices

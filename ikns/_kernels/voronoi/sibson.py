@@ -40,8 +40,6 @@ from ikns._kernels.voronoi.diagram import (
 )
 from ikns.arrays import Array, Indices
 
-__all__ = ["add_faces"]
-
 
 @compiled
 def add_faces(numbers: Array, indices: Indices, tetrahedra: int, work: Array) -> None:

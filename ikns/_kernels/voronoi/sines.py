@@ -18,8 +18,6 @@ from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.double_double import difference, double_double_dot
 from ikns.arrays import Array, Indices
 
-__all__ = ["sines"]
-
 
 @compiled
 def sines(

@@ -9,8 +9,6 @@ from scipy.stats import beta
 from ikns.errors import InvalidInput
 from ikns.numerics.subspace import principal_angles
 
-__all__ = ["chance_angles", "chance_inside", "random_subspaces"]
-
 Array = NDArray[np.float64]
 
 #: Draws where there is no closed form.

@@ -11,8 +11,6 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.map.checks import checked_map
 from ikns.numerics.subspace import null_spaces
 
-__all__ = ["CheckedSamples", "checked_samples"]
-
 Array = NDArray[np.float64]
 
 

@@ -12,8 +12,6 @@ from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 
-__all__ = ["Combinations", "compare_combinations"]
-
 
 class Combinations(NamedTuple):
     """Comparisons by (chain, task, coordinates), and why chains have none, by name."""

@@ -24,8 +24,6 @@ from scipy.spatial.transform import Rotation
 
 from ikns.errors import InvalidInput
 
-__all__ = ["COORDINATES", "Coordinates", "shoulder_coordinates"]
-
 Array = NDArray[np.float64]
 
 COORDINATES = ("internal", "isb", "rotation_vector")

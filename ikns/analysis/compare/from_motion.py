@@ -24,8 +24,6 @@ from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap, still_mask
 
-__all__ = ["compare_motion", "motion_crosstalk"]
-
 Array = NDArray[np.float64]
 
 _SHOULDER = ("shoulder_abduction", "shoulder_flexion", "shoulder_rotation")

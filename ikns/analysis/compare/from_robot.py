@@ -18,8 +18,6 @@ from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput
 from ikns.nullspace.map import NullSpaceMap
 
-__all__ = ["compare_robot"]
-
 
 def compare_robot(
     learned: NullSpaceMap,

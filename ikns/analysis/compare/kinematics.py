@@ -11,8 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from ikns.numerics.subspace import mean_null_direction, principal_angles
 
-__all__ = ["Kinematics", "hand_rates", "null_turn", "straight_departure"]
-
 Array = NDArray[np.float64]
 
 #: Half a step along Z for the derivative of the hand's pose, rad: its error is of the

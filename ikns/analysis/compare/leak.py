@@ -11,8 +11,6 @@ from scipy.spatial.transform import Rotation
 from ikns.analysis.compare.resampling import draw
 from ikns.numerics.bootstrap import length_interval
 
-__all__ = ["HandSlope", "hand_slope", "hand_turns", "slope_scores", "slopes"]
-
 Array = NDArray[np.float64]
 
 

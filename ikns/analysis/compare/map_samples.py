@@ -16,14 +16,6 @@ from ikns.errors import NotEnoughData
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap
 
-__all__ = [
-    "MapSamples",
-    "change_coordinates",
-    "compare_map_samples",
-    "learn_again",
-    "visited_points",
-]
-
 Array = NDArray[np.float64]
 
 

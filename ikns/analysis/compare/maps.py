@@ -17,8 +17,6 @@ from ikns.nullspace.map import NullSpaceMap, null_space_samples, still_mask
 from ikns.numerics.bootstrap import length_interval
 from ikns.numerics.subspace import principal_angles
 
-__all__ = ["MapComparison", "compare"]
-
 Array = NDArray[np.float64]
 
 #: Fewer samples have no interval.

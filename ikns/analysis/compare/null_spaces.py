@@ -21,15 +21,6 @@ from ikns.analysis.compare.subspaces import (
 from ikns.numerics.bootstrap import student_interval
 from ikns.numerics.subspace import null_space, null_spaces
 
-__all__ = [
-    "InsideVariance",
-    "NullSpaces",
-    "agreement",
-    "angles_to_null_spaces",
-    "inside_variance",
-    "point_null_spaces",
-]
-
 Array = NDArray[np.float64]
 
 

@@ -28,8 +28,6 @@ from ikns.analysis.compare.resampling import resampled_moments
 from ikns.analysis.compare.subspaces import Subspaces, angle_interval, share_interval
 from ikns.numerics.bootstrap import length_interval
 
-__all__ = ["compare_point", "pool"]
-
 Array = NDArray[np.float64]
 
 

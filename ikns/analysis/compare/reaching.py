@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.numerics.bootstrap import block_counts, block_length, student_interval
 
-__all__ = ["Crosstalk", "crosstalk", "find_reaches"]
-
 Array = NDArray[np.float64]
 
 #: Neighboring reaches share the rest between them, so their changes are correlated, by

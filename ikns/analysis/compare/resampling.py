@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from ikns.numerics.bootstrap import block_counts, block_length
 
-__all__ = ["Moments", "draw", "resampled_moments"]
-
 Array = NDArray[np.float64]
 
 

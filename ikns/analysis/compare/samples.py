@@ -19,8 +19,6 @@ from ikns.analysis.compare.checks import checked_samples
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.point import compare_point, pool
 
-__all__ = ["NullSpaceComparison", "compare_samples"]
-
 Array = NDArray[np.float64]
 
 

@@ -10,15 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.numerics.bootstrap import length_interval, student_interval
 from ikns.numerics.subspace import principal_angles
 
-__all__ = [
-    "Subspaces",
-    "angle_interval",
-    "compare_subspaces",
-    "learned_directions",
-    "share_interval",
-    "span_covariance",
-]
-
 Array = NDArray[np.float64]
 
 

@@ -14,8 +14,6 @@ from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap, analytic_map, null_space_samples
 
-__all__ = ["VisitedComparison", "compare_visited"]
-
 
 class VisitedComparison(NamedTuple):
     """What :func:`compare_visited` found; V of the map's P points were visited.

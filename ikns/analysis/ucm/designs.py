@@ -15,8 +15,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 
-__all__ = ["across_trials", "within_trial"]
-
 
 def across_trials(
     skeleton: Skeleton,

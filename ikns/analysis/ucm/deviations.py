@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput, NotEnoughData
 
-__all__ = ["check_joints", "check_trials", "mean_jacobian"]
-
 Array = NDArray[np.float64]
 
 #: A joint that moves less than this share of its largest angle is constant but for

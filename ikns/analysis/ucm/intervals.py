@@ -13,8 +13,6 @@ from ikns.analysis.ucm.split import VarianceSplit, half_log_ratio, parts
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.numerics.bootstrap import block_counts, block_length, student_interval
 
-__all__ = ["Interval", "confidence_interval", "mean_interval"]
-
 Array = NDArray[np.float64]
 
 

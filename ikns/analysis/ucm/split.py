@@ -29,15 +29,6 @@ from ikns.analysis.ucm.deviations import check_joints, check_trials, mean_jacobi
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.numerics.subspace import null_spaces
 
-__all__ = [
-    "VarianceSplit",
-    "delta_vz",
-    "half_log_ratio",
-    "parts",
-    "sums_of_squares",
-    "variance_split",
-]
-
 Array = NDArray[np.float64]
 
 #: A part of the squares below this share is what rounding leaves of zero: a deviation

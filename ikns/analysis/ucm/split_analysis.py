@@ -20,14 +20,6 @@ from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap, still_mask
 
-__all__ = [
-    "PointsAnalysis",
-    "SplitAnalysis",
-    "TrialsAnalysis",
-    "analyze_points",
-    "analyze_trials",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class SplitAnalysis:

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from ikns.analysis.ucm.split import VarianceSplit, half_log_ratio, sums_of_squares
 from ikns.errors import InvalidInput
 
-__all__ = ["SurrogateTest", "surrogate_test"]
-
 Array = NDArray[np.float64]
 
 #: Differences of dVz up to this are rounding: the same trials summed in another order.

@@ -11,8 +11,6 @@ from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 
-__all__ = ["chain_task", "numerical_task"]
-
 Array = NDArray[np.float64]
 
 

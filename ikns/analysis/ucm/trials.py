@@ -12,8 +12,6 @@ from scipy.interpolate import CubicSpline
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 
-__all__ = ["aligned_angles", "movement", "normalize_time"]
-
 Array = NDArray[np.float64]
 
 #: A time this part of a step from a sample is that sample's, but for rounding.

@@ -12,8 +12,6 @@ from ikns.body.anthropometry.measures import checked_measure, expected_measure
 from ikns.body.anthropometry.shoulder import clavicle_length, shoulder_joints
 from ikns.body.anthropometry.tables import row, subjects
 
-__all__ = ["LIMB_SEGMENTS", "expected_lengths", "length_uncertainty"]
-
 #: Segments of each side, from the sternum to the hand.
 LIMB_SEGMENTS = ("clavicle", "upper_arm", "forearm", "hand")
 

@@ -9,8 +9,6 @@ from ikns.arrays import Array
 from ikns.body.anthropometry.tables import row
 from ikns.errors import InvalidInput
 
-__all__ = ["checked_measure", "expected_measure"]
-
 #: What is plausible for adults, with the unit and what may have been given instead.
 #: Statures: wide enough for short and tall people, narrow enough to detect centimeters
 #: and feet.

@@ -14,8 +14,6 @@ from ikns.body.anthropometry.measures import expected_measure
 from ikns.body.anthropometry.tables import normalize_sex, row, table
 from ikns.errors import InvalidInput
 
-__all__ = ["Adult", "sample_adults"]
-
 #: Stature and every residual stay within this many standard deviations of their means.
 TRUNCATION = 3.0
 

@@ -18,8 +18,6 @@ from ikns.body.anthropometry.shoulder import shoulder_joints
 from ikns.body.anthropometry.tables import normalize_sex, row
 from ikns.errors import InvalidInput
 
-__all__ = ["Segment", "segments"]
-
 
 @dataclass(frozen=True)
 class Segment:

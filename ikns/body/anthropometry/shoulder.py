@@ -9,8 +9,6 @@ from ikns.arrays import Array
 from ikns.body.anthropometry.measures import checked_measure, expected_measure
 from ikns.body.anthropometry.tables import row
 
-__all__ = ["clavicle_length", "shoulder_joints"]
-
 
 def shoulder_joints(
     stature: ArrayLike, sex: str, *, biacromial: ArrayLike | None = None

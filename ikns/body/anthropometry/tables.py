@@ -9,8 +9,6 @@ from typing import Any
 
 from ikns.errors import InvalidInput
 
-__all__ = ["SEXES", "TABLES", "normalize_sex", "row", "subjects", "table"]
-
 #: The sexes in the tables.
 SEXES = ("female", "male")
 

@@ -15,8 +15,6 @@ from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton.model import joint_tree
 from ikns.errors import FileError, InvalidInput
 
-__all__ = ["LinkFrames"]
-
 
 class LinkFrames:
     """The links of a model, as in :func:`joint_tree`; joint 0 carries the thorax."""

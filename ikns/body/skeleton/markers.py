@@ -12,8 +12,6 @@ from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS, segment_ends
 from ikns.errors import MarkerMismatch
 
-__all__ = ["Markers", "grown_positions", "part_along"]
-
 
 class Markers:
     """M markers, given in link frames, fixed to the joints of a model."""

@@ -14,15 +14,6 @@ from ikns.body.chains import SIDES, chain_joints
 from ikns.body.model_file import SEGMENTS
 from ikns.errors import FileError
 
-__all__ = [
-    "NQ_ROOT",
-    "NV_ROOT",
-    "build_model",
-    "joint_tree",
-    "read_urdf",
-    "upper_body_model",
-]
-
 #: Columns of a configuration and of its tangent that hold the free flyer.
 NQ_ROOT, NV_ROOT = 7, 6
 

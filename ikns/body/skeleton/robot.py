@@ -20,8 +20,6 @@ from ikns.body.skeleton.model import build_model, read_urdf
 from ikns.errors import FileError, InvalidInput
 from ikns.numerics.subspace import null_spaces
 
-__all__ = ["Robot"]
-
 #: How many of a robot's links an error names.
 _NAMED = 12
 

@@ -40,8 +40,6 @@ from ikns.body.skeleton.model import NQ_ROOT, NV_ROOT, read_urdf, upper_body_mod
 from ikns.errors import InvalidInput
 from ikns.numerics.subspace import null_spaces
 
-__all__ = ["Skeleton"]
-
 
 class Skeleton:
     """An upper body with markers on it.

@@ -10,8 +10,6 @@ from tornado.websocket import WebSocketHandler
 
 from ikns.experiments.cockpit.hub import Hub
 
-__all__ = ["FILES", "CheckedSocket", "PageHandler"]
-
 #: Path, file and content type of everything that is served.
 FILES = {
     "/": ("participant.html", "text/html"),

@@ -8,8 +8,6 @@ from typing import Any, Literal, Protocol
 from ikns.experiments.conduct import Conductor
 from ikns.live.web_access import WebAccess
 
-__all__ = ["ConnectedPage", "Hub", "Role"]
-
 #: The first participant's page is in control; further ones only watch.
 Role = Literal["participant", "viewer", "panel"]
 

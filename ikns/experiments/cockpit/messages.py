@@ -6,8 +6,6 @@ import json
 import math
 from typing import Any, NamedTuple, NoReturn
 
-__all__ = ["Message", "read_message"]
-
 #: Longest name of a command or a condition, and longest reason or comment, characters.
 _MAX_NAME, _MAX_TEXT = 32, 500
 #: Largest integer that a page can count to.

@@ -16,8 +16,6 @@ from ikns.experiments.cockpit.messages import read_message
 from ikns.experiments.conduct import Command
 from ikns.output.strict_json import strict_json
 
-__all__ = ["PageSocket"]
-
 #: A page with so many unanswered states gets no new one; 0.2 s at 60 Hz.
 _MAX_UNANSWERED = 12
 #: Commands of the participant's page; all others are the experimenter's.

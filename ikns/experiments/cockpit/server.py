@@ -14,8 +14,6 @@ from ikns.experiments.cockpit.hub import ConnectedPage
 from ikns.experiments.conduct import Command, Conductor, HeldInput
 from ikns.live.web_access import WebAccess
 
-__all__ = ["Cockpit", "check_port"]
-
 _LOOPBACK = "127.0.0.1"
 #: How often pages get the newest state, 1/s.
 _PUSH_RATE = 60.0

@@ -24,8 +24,6 @@ from ikns.experiments.conduct.screen import (
 from ikns.experiments.conduct.visit_log import VisitLog
 from ikns.experiments.conduct.visit_state import VisitState
 
-__all__ = ["Conductor"]
-
 #: Attempts that the panel lists.
 _LISTED = 8
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol
 
-__all__ = ["COMMANDS", "Command", "Experiment"]
-
 #: Commands of every experiment. The server itself sends ``page_connected`` and
 #: ``page_disconnected``; ``connect`` opens the source of the signal again; ``arm`` lets
 #: a finger follow again that is in its safe state.

@@ -12,8 +12,6 @@ from ikns.experiments.tracking.profiles import Profile
 from ikns.live.stream.delays import Delays
 from ikns.simulation.operator import Delay, Operator
 
-__all__ = ["Driver", "HeldInput", "Sample", "SampleQueue", "VirtualInput"]
-
 #: Without a sample for longer than this there is no control signal, s: of the 60 per
 #: second that a page sends, twelve in a row are missing.
 TIMEOUT = 0.2

@@ -20,8 +20,6 @@ from ikns.live.runtime import LoopStatus, Report, run
 from ikns.live.session import RunWriter
 from ikns.live.stream import Source
 
-__all__ = ["LiveDriver", "live_driver"]
-
 #: How often the loop reports its status, s.
 _STATUS_EVERY = 1 / 30
 #: Frames are counted this long for a frame rate, s.

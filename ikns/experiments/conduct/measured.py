@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["recent_values"]
-
 #: What was measured longer ago than this is unknown, s. Without poses for as long the
 #: finger goes to its safe state.
 _KNOWN_FOR = 0.5

@@ -9,8 +9,6 @@ from typing import Any, Literal
 from ikns.errors import InvalidInput
 from ikns.experiments.picking import PickAttempt, PickStep, PickVisit, load_objects
 
-__all__ = ["PickingExperiment"]
-
 _PROMPTS = {
     "ready": "Get ready",
     "running": "Pick it up and put it down",

@@ -9,8 +9,6 @@ from ikns.experiments.conduct.experiment import Experiment
 from ikns.experiments.conduct.screen import attempt_facts
 from ikns.experiments.conduct.visit_log import VisitLog
 
-__all__ = ["AttemptRecorder"]
-
 #: Attempts that could not be written are tried again this often, s.
 _RETRY_INTERVAL = 2.0
 #: Outcomes of a trial that ran to its end.

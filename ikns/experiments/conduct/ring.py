@@ -16,8 +16,6 @@ from ikns.experiments.conduct.measured import recent_values
 from ikns.finger import Finger
 from ikns.finger.inputs import RingButton
 
-__all__ = ["RingDriver", "ring_driver"]
-
 #: How often the finger gets a command, 1/s.
 _RATE = 100.0
 

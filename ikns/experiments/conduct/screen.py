@@ -7,15 +7,6 @@ from typing import Any
 
 from ikns.experiments.conduct.experiment import Experiment
 
-__all__ = [
-    "EMERGENCY",
-    "attempt_facts",
-    "plan_steps",
-    "progress_facts",
-    "prompt",
-    "step_facts",
-]
-
 #: The notice after an emergency stop.
 EMERGENCY = {
     "title": "Run stopped",

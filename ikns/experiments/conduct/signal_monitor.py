@@ -6,8 +6,6 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
-__all__ = ["SignalMonitor"]
-
 #: A trial that needs a control signal begins only if one came within this time, s.
 _SIGNAL_TIMEOUT = 1.0
 

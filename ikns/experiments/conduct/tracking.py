@@ -19,8 +19,6 @@ from ikns.experiments.tracking import (
 from ikns.experiments.tracking.trial import ALIGN, TrackingView
 from ikns.experiments.visits import tracking_row
 
-__all__ = ["TrackingExperiment"]
-
 #: Step between the points of the curve that pages draw, s: the fastest move covers 2 of
 #: 100 in that time.
 _CURVE_STEP = 0.04

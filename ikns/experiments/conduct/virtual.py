@@ -10,8 +10,6 @@ from ikns.experiments.conduct.inputs import VirtualInput
 from ikns.experiments.tracking.profiles import Profile
 from ikns.simulation.operator import Delay, Operator, typical
 
-__all__ = ["virtual_input"]
-
 #: Delay between stick and pointer, s.
 _DEVICE_DELAY = 0.05
 #: Trials that the operator has done before.

@@ -12,8 +12,6 @@ from ikns.errors import DataLoss, IknsError, InvalidInput
 from ikns.experiments.visits import append_attempt, create_visit, read_visit
 from ikns.experiments.visits.parquet import table_bytes
 
-__all__ = ["VisitLog"]
-
 #: What must be the same when a visit is continued.
 _FIXED = (
     "experiment",

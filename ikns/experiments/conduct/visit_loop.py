@@ -12,8 +12,6 @@ from ikns.errors import IknsError, InvalidInput
 from ikns.experiments.conduct.conductor import Conductor
 from ikns.experiments.conduct.inputs import Driver
 
-__all__ = ["run_visit"]
-
 Drivers = Mapping[str, Callable[[], AbstractContextManager[Driver]]]
 
 

@@ -12,8 +12,6 @@ from ikns.experiments.conduct.recorder import AttemptRecorder
 from ikns.experiments.conduct.signal_monitor import SignalMonitor
 from ikns.experiments.conduct.visit_log import VisitLog
 
-__all__ = ["VisitState"]
-
 
 class VisitState:
     """State of a running visit.

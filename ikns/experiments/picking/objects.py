@@ -9,8 +9,6 @@ from typing import Literal
 
 from ikns.errors import InvalidInput
 
-__all__ = ["OBJECT_IDS", "PickObject", "load_objects"]
-
 #: Codes of the paper's table.
 OBJECT_IDS = tuple("ABCDEFGHILM")
 

@@ -12,8 +12,6 @@ from ikns.errors import InvalidInput
 from ikns.experiments.picking.objects import OBJECT_IDS
 from ikns.experiments.tracking.schedule import williams
 
-__all__ = ["LIMIT", "PickStep", "pick_schedule"]
-
 #: Time limit for one object, s (the paper's).
 LIMIT = 20.0
 

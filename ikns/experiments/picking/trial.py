@@ -9,8 +9,6 @@ from typing import Literal, NamedTuple
 from ikns.errors import InvalidInput
 from ikns.experiments.picking.schedule import PickStep
 
-__all__ = ["PickRecord", "PickTrial", "PickView"]
-
 Ended = Literal["success", "dropped", "timeout", "aborted"]
 State = Literal["waiting", "running", "success", "dropped", "timeout", "aborted"]
 

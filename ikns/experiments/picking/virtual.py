@@ -33,8 +33,6 @@ from ikns.simulation.grasp.route import DOWN, EXTRA_RANGE, LIFT
 from ikns.simulation.movement import Unsteadiness, hand_drift, reach_seconds
 from ikns.simulation.operator import Operator, Participant
 
-__all__ = ["VIRTUAL_CONDITIONS", "virtual_pick", "virtual_pick_step"]
-
 Array = NDArray[np.float64]
 
 #: Conditions that a virtual participant can do.

@@ -9,8 +9,6 @@ from ikns.experiments.picking.schedule import PickStep
 from ikns.experiments.picking.trial import PickRecord, PickTrial
 from ikns.experiments.progress import Progress
 
-__all__ = ["FINAL", "PickAttempt", "PickVisit"]
-
 #: Outcomes after which a step is not repeated: a drop and a timeout are results.
 FINAL = ("success", "dropped", "timeout", "skipped")
 

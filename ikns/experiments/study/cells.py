@@ -27,8 +27,6 @@ from ikns.experiments.tracking.visit import Attempt
 from ikns.experiments.visits import table_bytes, tracking_row
 from ikns.simulation.operator import Participant
 
-__all__ = ["SimulatedVisit", "Task", "simulate", "visit_name"]
-
 S = TypeVar("S", TrackingStep, PickStep)
 
 #: Errors that keep one virtual person from taking part, and do not end the run.

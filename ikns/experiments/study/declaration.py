@@ -16,8 +16,6 @@ from ikns.experiments.study.tables import check_keys, choice, fill
 from ikns.experiments.tracking.profiles import draw_profile
 from ikns.simulation.operator import CONDITIONS
 
-__all__ = ["FILE", "FORMAT", "Study", "read_study", "study_from_table"]
-
 #: Name of the file in a study folder, and the version of its keys.
 FILE, FORMAT = "study.toml", 1
 #: Conditions that virtual participants can do.

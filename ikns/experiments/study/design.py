@@ -15,8 +15,6 @@ from ikns.experiments.tracking.profiles import CHARACTERS, draw_profile
 from ikns.experiments.tracking.schedule import TrackingStep, schedule
 from ikns.experiments.tracking.trial import ALIGN
 
-__all__ = ["LAYOUTS", "Parameters", "PickingDesign", "TrackingDesign"]
-
 #: Numbers of the points of the calibration box from which the map is learned.
 LAYOUTS = {
     "box": tuple(range(10)),

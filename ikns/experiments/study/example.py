@@ -8,8 +8,6 @@ from pathlib import Path
 from ikns.experiments.study.declaration import FILE
 from ikns.output.folder import check_output_folder, output_folder
 
-__all__ = ["init_study"]
-
 
 def init_study(folder: str | Path, *, force: bool = False) -> Path:
     """Write a study folder with a commented example file.

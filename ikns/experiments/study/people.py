@@ -14,8 +14,6 @@ from ikns.recording.recording import Recording
 from ikns.simulation.operator import Participant, draw_participant
 from ikns.simulation.protocol import Protocol
 
-__all__ = ["recalibrated", "study_participant"]
-
 #: Parameters that change what is made of the recordings, not the recordings.
 _OF_CALIBRATION = ("max_hand_speed", "layout", "outside", "interpolation")
 

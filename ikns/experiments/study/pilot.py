@@ -13,8 +13,6 @@ from ikns.experiments.study.declaration import Study
 from ikns.experiments.study.summary import summarize
 from ikns.statistics.assumed_spread import AssumedSpread, pilot_spread
 
-__all__ = ["DeclaredDesign", "PilotSpread", "declared_design", "spread_of_pilot"]
-
 
 class DeclaredDesign(NamedTuple):
     """One experiment of a study, in the same words for both experiments.

@@ -15,8 +15,6 @@ from ikns.experiments.visits import EXPERIMENTS, has_attempts, list_visits
 from ikns.output.file import write_text
 from ikns.output.lock import hold_lock
 
-__all__ = ["check_declaration", "missing_tasks", "run_lock", "save_declaration"]
-
 #: Copy of the declaration from before the first result, and lock file of a run.
 _DECLARED, _LOCK = "declared.json", ".run.lock"
 

@@ -20,8 +20,6 @@ from ikns.experiments.study.workers import compute, processes
 from ikns.experiments.visits import write_visit
 from ikns.live.warm_up import compiled_before, warm_up
 
-__all__ = ["StudyRun", "run_study"]
-
 
 @dataclass(frozen=True)
 class StudyRun:

@@ -10,8 +10,6 @@ from typing import Any, TypeVar, get_type_hints
 
 from ikns.errors import InvalidInput
 
-__all__ = ["check_keys", "choice", "fill", "positive"]
-
 T = TypeVar("T")
 
 _WORDS = {

@@ -18,8 +18,6 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from ikns.errors import InvalidInput, StreamError
 
-__all__ = ["compute", "processes"]
-
 T = TypeVar("T")
 R = TypeVar("R")
 

@@ -13,15 +13,6 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.experiments.tracking.profiles import Profile
 from ikns.experiments.tracking.trial import TrackingRecord
 
-__all__ = [
-    "Metrics",
-    "error_over_time",
-    "lag",
-    "measure",
-    "overshoot",
-    "spectral_arc_length",
-]
-
 Array = NDArray[np.float64]
 
 #: Trials are resampled to this rate for lag and smoothness, 1/s.

@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 
-__all__ = ["CHARACTERS", "Character", "Profile", "draw_profile"]
-
 Array = NDArray[np.float64]
 
 #: Peak speed of a minimum-jerk move over its mean speed (Flash and Hogan 1985).

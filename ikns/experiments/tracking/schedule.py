@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from ikns.errors import InvalidInput
 
-__all__ = ["TrackingStep", "schedule", "williams"]
-
 
 @dataclass(frozen=True)
 class TrackingStep:

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from ikns.errors import InvalidInput
 from ikns.experiments.tracking.profiles import Profile
 
-__all__ = ["ALIGN", "TrackingRecord", "TrackingTrial", "TrackingView"]
-
 Array = NDArray[np.float64]
 State = Literal["waiting", "align", "track", "done", "aborted"]
 

@@ -13,8 +13,6 @@ from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrackingTrial
 from ikns.simulation.operator import CONDITIONS, Delay, Operator, Participant, track
 from ikns.simulation.operator.loop import ControlledElement
 
-__all__ = ["virtual_step", "virtual_trial"]
-
 
 def virtual_trial(
     operator: Operator,

@@ -10,8 +10,6 @@ from ikns.experiments.tracking.profiles import draw_profile
 from ikns.experiments.tracking.schedule import TrackingStep
 from ikns.experiments.tracking.trial import ALIGN, TrackingRecord, TrackingTrial
 
-__all__ = ["FINAL", "Attempt", "Visit"]
-
 #: Outcomes after which a step is not repeated.
 FINAL = ("done", "skipped")
 

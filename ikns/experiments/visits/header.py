@@ -10,8 +10,6 @@ from typing import Any
 from ikns.errors import FileError
 from ikns.experiments.visits.rows import EXPERIMENTS
 
-__all__ = ["FORMAT", "HEADER", "header_fault", "read_header"]
-
 #: Version of a visit's files.
 FORMAT = 1
 #: Name of the file.

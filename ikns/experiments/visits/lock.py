@@ -9,8 +9,6 @@ from pathlib import Path
 from ikns.errors import FileError, InvalidInput
 from ikns.output.lock import hold_lock
 
-__all__ = ["LOCK", "visit_lock"]
-
 #: Name of the lock file in the visit's folder.
 LOCK = ".lock"
 

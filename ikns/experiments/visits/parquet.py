@@ -11,8 +11,6 @@ import numpy as np
 from ikns.errors import FileError, InvalidInput
 from ikns.experiments.visits.rows import COLUMNS
 
-__all__ = ["read_rows", "table_bytes"]
-
 
 def table_bytes(experiment: str, rows: Sequence[Mapping[str, Any]]) -> bytes:
     """Return a Parquet file of attempts; the same rows give the same bytes.

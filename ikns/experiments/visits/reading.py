@@ -10,14 +10,6 @@ from ikns.errors import FileError
 from ikns.experiments.visits.header import HEADER, read_header
 from ikns.experiments.visits.parquet import read_rows
 
-__all__ = [
-    "VisitRecord",
-    "empty_visits",
-    "has_attempts",
-    "list_visits",
-    "read_visit",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class VisitRecord:

@@ -15,14 +15,6 @@ from ikns.experiments.tracking.trial import TrackingRecord
 from ikns.experiments.tracking.visit import FINAL as TRACKING_FINAL
 from ikns.experiments.tracking.visit import Attempt
 
-__all__ = [
-    "COLUMNS",
-    "EXPERIMENTS",
-    "counted_attempts",
-    "tracking_record",
-    "tracking_row",
-]
-
 #: Columns that every attempt of an experiment has, and their types. ``series`` is a
 #: list of doubles of any length; a table may have further columns of single values.
 COLUMNS: dict[str, dict[str, str]] = {

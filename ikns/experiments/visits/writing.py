@@ -14,8 +14,6 @@ from ikns.experiments.visits.lock import LOCK
 from ikns.experiments.visits.parquet import table_bytes
 from ikns.output.file import create_bytes, sync
 
-__all__ = ["append_attempt", "create_visit", "write_attempts", "write_visit"]
-
 _ALL_ATTEMPTS = "attempts.parquet"
 #: End of the name of an unfinished file, which is never read.
 _PART = ".part"

@@ -5,8 +5,6 @@ from __future__ import annotations
 from ikns.errors import InvalidInput
 from ikns.finger.models import Model
 
-__all__ = ["baud_code", "baud_rate"]
-
 _CODES = (9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000)
 
 

@@ -23,8 +23,6 @@ from ikns.finger.emulator.packet import BROADCAST, Packet, Parser
 from ikns.finger.emulator.reply import Reply, expects_reply, make_reply
 from ikns.finger.models import alert_text, model_named
 
-__all__ = ["Servo"]
-
 _WATCHDOG_UNIT = 0.02
 _BOOT = 0.2
 _GOALS = ("goal_pwm", "goal_current", "goal_velocity", "goal_position")

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
 
-__all__ = ["FAULTS", "Fault", "parse_fault"]
-
 #: Kinds of faults, and what each one does with its value, if it takes one.
 FAULTS: dict[str, str] = {
     "silence": "nothing passes, in either direction",

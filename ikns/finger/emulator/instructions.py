@@ -10,8 +10,6 @@ from typing import NamedTuple
 
 from ikns.finger.emulator.packet import Protocol
 
-__all__ = ["ReadRequest", "bulk_read", "bulk_writes", "sync_read", "sync_writes"]
-
 
 class ReadRequest(NamedTuple):
     """Bytes that a servo has to send.

@@ -7,8 +7,6 @@ import math
 from ikns.finger.control_table import Register
 from ikns.finger.models import Model
 
-__all__ = ["Memory", "StatusError"]
-
 
 class StatusError(Exception):
     """Error number for the status packet (Protocol 2.0)."""

@@ -7,8 +7,6 @@ import math
 from ikns.finger.limiter import approach
 from ikns.finger.models import Model
 
-__all__ = ["Motor"]
-
 # Assumed for a loaded servo of this size: seconds to follow its profile, seconds to
 # change speed, and the error in turns at which it pushes with full effort.
 _FOLLOW, _SPIN, _YIELD = 0.03, 0.01, 0.02

@@ -9,18 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = [
-    "BROADCAST",
-    "Packet",
-    "Parser",
-    "Protocol",
-    "checksum",
-    "crc16",
-    "encode",
-    "stuff",
-    "unstuff",
-]
-
 Protocol = Literal[1, 2]
 
 BROADCAST = 0xFE

@@ -9,8 +9,6 @@ from ikns.finger.emulator.memory import Memory
 from ikns.finger.emulator.packet import BROADCAST, STATUS, Packet, encode
 from ikns.finger.models import Model
 
-__all__ = ["Reply", "expects_reply", "make_reply"]
-
 _PING, _READ, _SYNC_READ, _BULK_READ = 0x01, 0x02, 0x82, 0x92
 #: Status errors of Protocol 1.0 for the error numbers of Protocol 2.0.
 _ERRORS_1 = {1: 64, 2: 64, 3: 16, 4: 8, 5: 8, 6: 2, 7: 8}

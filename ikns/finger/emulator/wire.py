@@ -18,8 +18,6 @@ from ikns.finger.emulator.device import Servo
 from ikns.finger.emulator.faults import FAULTS, MOMENTARY, Fault
 from ikns.finger.emulator.packet import checksum, crc16
 
-__all__ = ["Wire"]
-
 #: Longest step of the servos' simulation, s.
 _TICK = 0.005
 #: The adapter is unplugged during a response, or after this time without one, s.

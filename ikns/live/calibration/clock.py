@@ -7,8 +7,6 @@ import time
 
 from ikns.live.stream import Frame
 
-__all__ = ["DeviceClock"]
-
 #: Larger jumps of the device's clock between frames are not followed, s.
 JUMP = 2.0
 #: Time continues without frames after this delay, s.

@@ -21,8 +21,6 @@ from ikns.live.calibration.verdict import Verdict
 from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
 
-__all__ = ["RecordingsFolder"]
-
 #: Version of ``protocol.json``.
 FORMAT = 1
 _NAME = "protocol.json"

@@ -9,8 +9,6 @@ import numpy as np
 from ikns.live.stream import Frame
 from ikns.recording.recording import Recording
 
-__all__ = ["recording_from_frames"]
-
 
 def recording_from_frames(
     frames: Sequence[Frame], labels: Sequence[str], rate: float, source: str

@@ -18,8 +18,6 @@ from ikns.live.calibration.targets import TargetPoints, direction_in_words
 from ikns.live.stream import Frame, Source
 from ikns.motion.marker_ik import MarkerIK
 
-__all__ = ["CalibrationStatus", "Guidance", "HandTracker"]
-
 Array = NDArray[np.float64]
 
 

@@ -15,8 +15,6 @@ from ikns.live.calibration.protocol import ProtocolStep
 from ikns.live.calibration.verdict import Verdict, judge_free, judge_static
 from ikns.recording.recording import Recording
 
-__all__ = ["Judge"]
-
 
 class Judge:
     """Judge recordings with the settings of the calibration to come.

@@ -14,15 +14,6 @@ from ikns.motion.motion import Motion
 from ikns.numerics.rigid import rigid_transform
 from ikns.recording.recording import Recording
 
-__all__ = [
-    "median",
-    "millimeters",
-    "missing_percent",
-    "percent",
-    "marker_displacement",
-    "tracking_fault",
-]
-
 Array = NDArray[np.float64]
 
 #: Largest median distance between markers and body, m: half of the limit above which

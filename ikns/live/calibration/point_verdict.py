@@ -26,8 +26,6 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.recording.recording import Recording
 
-__all__ = ["judge_point"]
-
 Array = NDArray[np.float64]
 
 #: Smallest share of samples with the hand still. A virtual person who holds the hand,

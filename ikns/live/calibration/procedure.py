@@ -25,8 +25,6 @@ from ikns.live.stream import Frame, Source
 from ikns.live.stream.subjects import check_one_subject
 from ikns.recording.files import read
 
-__all__ = ["accepted_recordings", "run_protocol", "check_labels", "restore"]
-
 #: Called with a change, the verdict if there is one, and the direction of the target.
 OnChange = Callable[[Change, Verdict | None, str], None]
 

@@ -16,16 +16,6 @@ from ikns.live.calibration.frames import recording_from_frames
 from ikns.live.stream import Frame
 from ikns.recording.recording import Recording
 
-__all__ = [
-    "KEYS",
-    "Change",
-    "Key",
-    "LiveProtocol",
-    "ProtocolStep",
-    "State",
-    "paper_steps",
-]
-
 Key = Literal["next", "redo", "skip", "quit"]
 KEYS: tuple[Key, ...] = ("next", "redo", "skip", "quit")
 State = Literal[

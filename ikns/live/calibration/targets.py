@@ -11,8 +11,6 @@ from ikns.nullspace.clustering import (
     minimum_bounding_box,
 )
 
-__all__ = ["TargetPoints", "direction_in_words", "target_points"]
-
 Array = NDArray[np.float64]
 
 #: Components smaller than this share of the largest one are not mentioned.

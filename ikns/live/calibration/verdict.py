@@ -30,8 +30,6 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.clustering import minimum_bounding_box
 from ikns.recording.recording import Recording
 
-__all__ = ["ONE_PLACE", "Verdict", "judge_free", "judge_static"]
-
 Array = NDArray[np.float64]
 
 #: Largest displacement of a marker of a person who stands still, without the sway of

@@ -18,8 +18,6 @@ from ikns.live.control.safety import Changes, SafetyMachine, State
 from ikns.live.control.settings import ControlSettings
 from ikns.live.control.smoothing import OneEuro
 
-__all__ = ["Controller", "Decision"]
-
 #: A device clock that steps back by more than this was restarted, s.
 _RESTART = 1.0
 #: Cut-off frequency for the hand's speed, Hz; natural reaches are below it.

@@ -17,8 +17,6 @@ from ikns.motion.marker_ik.kernel import KernelSolver
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 
-__all__ = ["ControlFrame", "FrameSolver"]
-
 Array = NDArray[np.float64]
 
 

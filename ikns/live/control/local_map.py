@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 
-__all__ = ["LocalMap"]
-
 Array = NDArray[np.float64]
 
 

@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 
-__all__ = ["checked_metric", "garrote", "null_rate"]
-
 Array = NDArray[np.float64]
 
 

@@ -33,8 +33,6 @@ from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import null_spaces
 
-__all__ = ["RateControl", "samples_of"]
-
 Array = NDArray[np.float64]
 
 #: Samples farther apart are not integrated across, s.

@@ -9,8 +9,6 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.live.control.rate import RateControl, samples_of
 from ikns.motion.motion import Motion
 
-__all__ = ["reach_gain"]
-
 
 def reach_gain(
     control: RateControl, motion: Motion, *, quantile: float = 0.9

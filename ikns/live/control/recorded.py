@@ -12,8 +12,6 @@ from ikns.live.control.rate import RateControl
 from ikns.motion.motion import Motion
 from ikns.numerics.median import finite_median
 
-__all__ = ["ControlTable", "control_table"]
-
 
 class ControlTable(NamedTuple):
     """The control signal of a recording by frame.

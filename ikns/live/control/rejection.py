@@ -10,8 +10,6 @@ from ikns.live.control.frame import ControlFrame, FrameSolver
 from ikns.live.control.settings import ControlSettings
 from ikns.motion.marker_ik.size import power_of_ten, say_size
 
-__all__ = ["fits_markers", "rejection_reason"]
-
 
 def fits_markers(solved: ControlFrame, settings: ControlSettings) -> bool:
     """Whether a pose fits the markers; an error of NaN does not fit."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["RejectionCount", "kind_of"]
-
 #: Amounts in the sentences of :mod:`ikns.live.control.rejection`.
 _AMOUNT = re.compile(r"(\d+) mm")
 _PLACE = "# mm"

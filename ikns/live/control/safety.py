@@ -16,8 +16,6 @@ from typing import Literal, NamedTuple
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Changes", "SafetyMachine", "State", "Transition"]
-
 State = Literal["disarmed", "armed", "active", "holding", "safe"]
 
 

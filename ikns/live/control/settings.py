@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
 
-__all__ = ["ControlSettings"]
-
 
 @dataclass(frozen=True)
 class ControlSettings:

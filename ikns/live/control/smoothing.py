@@ -11,8 +11,6 @@ import math
 
 from ikns.errors import InvalidInput
 
-__all__ = ["OneEuro"]
-
 
 class OneEuro:
     """A one-euro filter.

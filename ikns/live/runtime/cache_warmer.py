@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from ikns.live.control.controller import Controller
 from ikns.live.session import micro
 
-__all__ = ["CacheWarmer"]
-
 #: How long before a frame is due, s; warming up takes a third of this.
 _AHEAD = 1.5e-3
 

@@ -27,8 +27,6 @@ from ikns.live.runtime.session_log import (
 from ikns.live.session import RunWriter, micro
 from ikns.live.stream import Frame, Source
 
-__all__ = ["FrameLoop"]
-
 #: Longest time between two commands to the finger and checks of the watchdog, s.
 _KEEP_ALIVE = 0.02
 #: Command with which the finger brakes and stays where it is.

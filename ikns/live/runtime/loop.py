@@ -27,8 +27,6 @@ from ikns.live.session import RunWriter
 from ikns.live.stream import Source
 from ikns.live.stream.subjects import check_one_subject
 
-__all__ = ["run"]
-
 
 def run(
     source: Source,

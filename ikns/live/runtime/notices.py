@@ -8,8 +8,6 @@ from ikns.live.control.rejection_count import kind_of
 from ikns.live.control.safety import Transition
 from ikns.live.stream import Event, Source
 
-__all__ = ["Notices"]
-
 #: A run that is not active says why from this time on, s; as long as it takes until a
 #: finger that moved goes to its safe state.
 _WHY_AFTER = 0.5

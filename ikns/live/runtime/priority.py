@@ -10,8 +10,6 @@ from contextlib import contextmanager
 
 from ikns.errors import InvalidInput
 
-__all__ = ["check_realtime", "realtime_priority"]
-
 #: Switch interval of the interpreter, s: another thread may keep the loop waiting for
 #: as long as a frame takes. Python's default of 5 ms is ten times as long (measured
 #: with a busy thread in benchmarks/live_loop.py).

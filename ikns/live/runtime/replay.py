@@ -15,8 +15,6 @@ from ikns.live.control.settings import ControlSettings
 from ikns.live.session import Run
 from ikns.live.session.channels import STATES
 
-__all__ = ["Replayed", "replay_run"]
-
 
 @dataclass(frozen=True, eq=False)
 class Replayed:

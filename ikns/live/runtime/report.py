@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from ikns.live.control.safety import Transition
 from ikns.live.stream.delays import Delays
 
-__all__ = ["LoopStatus", "Report"]
-
 
 @dataclass(frozen=True)
 class LoopStatus:

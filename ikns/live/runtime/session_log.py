@@ -10,8 +10,6 @@ from ikns.live.control.safety import Transition
 from ikns.live.session import RunWriter
 from ikns.live.session.channels import STATES
 
-__all__ = ["write_frame", "write_notice", "write_stop", "write_transition"]
-
 
 def write_frame(
     session: RunWriter,

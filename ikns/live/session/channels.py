@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["STATES", "Channel", "marker_channels", "micro", "model_channels"]
-
 #: States of the safety machine; the column ``state`` has their index.
 STATES = ("disarmed", "armed", "active", "holding", "safe")
 

@@ -10,8 +10,6 @@ from ikns.errors import FileError
 from ikns.live.session.dataset import next_run, run_files
 from ikns.live.session.reader import Run, read_run, runs
 
-__all__ = ["check_session", "mend_session"]
-
 
 def check_session(session: str | Path) -> list[str]:
     """Check a session for faults: rows, times, ranges, personal data.

@@ -23,18 +23,6 @@ from ikns.live.session.sidecars import (
 from ikns.live.session.writer import RunWriter
 from ikns.output.lock import hold_lock
 
-__all__ = [
-    "BIDS_VERSION",
-    "EVENTS",
-    "FORMAT",
-    "create_session",
-    "discard_run",
-    "next_run",
-    "open_run",
-    "run_files",
-    "session_lock",
-]
-
 #: Version of the standard that the files follow.
 BIDS_VERSION = "1.10.0"
 #: Version of the conventions of this package within it.

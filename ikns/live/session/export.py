@@ -15,8 +15,6 @@ from ikns.output.file import refuse_overwriting, write_bytes, write_text
 from ikns.recording.files import write_c3d
 from ikns.recording.recording import Recording
 
-__all__ = ["FORMATS", "check_export", "export_run"]
-
 FORMATS = ("csv", "mat", "c3d")
 
 

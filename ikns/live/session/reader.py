@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from ikns.errors import FileError
 from ikns.live.session.dataset import next_run, run_files
 
-__all__ = ["Run", "read_run", "runs"]
-
 Array = NDArray[np.float64]
 
 

@@ -11,8 +11,6 @@ from pathlib import Path
 
 from ikns.live.session.channels import Channel
 
-__all__ = ["RowFile"]
-
 Row = tuple[float | str, ...]
 
 #: Rows that wait in memory while the file cannot be written: ten minutes at 100 Hz.

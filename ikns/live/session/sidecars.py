@@ -11,15 +11,6 @@ from typing import Any
 from ikns.errors import InvalidInput
 from ikns.live.session.channels import STATES, Channel
 
-__all__ = [
-    "EVENTS_ABOUT",
-    "TASK",
-    "json_text",
-    "write_json",
-    "write_new",
-    "write_sidecars",
-]
-
 TASK = "ikns"
 #: Content of the sidecar of the events.
 EVENTS_ABOUT = {

@@ -19,8 +19,6 @@ from ikns.errors import InvalidInput
 from ikns.live.session.channels import Channel
 from ikns.live.session.row_file import RowFile
 
-__all__ = ["RunWriter"]
-
 #: Time between writes, and between syncs to the disk, s.
 _FLUSH, _SYNC = 0.2, 0.8
 

@@ -19,8 +19,6 @@ from ikns.live.stream.source import Source
 from ikns.live.stream.subjects import SubjectFeed, check_one_subject, subjects_of
 from ikns.recording.files import read
 
-__all__ = ["open_source"]
-
 _KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST"
 #: So many frames of a recording show the size of the body.
 _GLANCES = 1000

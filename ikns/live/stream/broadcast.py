@@ -18,8 +18,6 @@ from ikns.live.stream.lsl_outlet import LslOutlet
 from ikns.live.stream.replay import frame_times, wait_until
 from ikns.recording.recording import Recording
 
-__all__ = ["Broadcast", "broadcast"]
-
 #: Seconds between the last frame and the end of the stream; frames that a listener has
 #: not read when a stream ends are lost in LSL.
 _LINGER = 0.5

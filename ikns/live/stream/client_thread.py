@@ -13,8 +13,6 @@ from ikns.errors import StreamError
 from ikns.live.stream.frame import Event
 from ikns.live.stream.inbox import Inbox
 
-__all__ = ["RECONNECT", "ClientThread"]
-
 #: Time between attempts to connect, s.
 RECONNECT = 0.5
 #: Frames kept for a reader that is busy.

@@ -15,8 +15,6 @@ from ikns.errors import InvalidInput
 from ikns.live.stream.delays import Delays
 from ikns.live.stream.frame import Frame
 
-__all__ = ["Continuity", "Counts"]
-
 #: Half of the window for the smallest delay, s.
 _WINDOW = 30.0
 #: Number of gaps that late frames can still fill; older gaps are final.

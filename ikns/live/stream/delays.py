@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 
-__all__ = ["Delays"]
-
 # 40 bins per decade: an edge is 10^(1/40) = 1.059 times the one before.
 _PER_DECADE, _LOWEST, _HIGHEST = 40, -6, 3
 

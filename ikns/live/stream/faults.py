@@ -11,8 +11,6 @@ import numpy as np
 
 from ikns.errors import InvalidInput
 
-__all__ = ["Faults", "Sent", "inject"]
-
 
 @dataclass(frozen=True)
 class Faults:

@@ -9,8 +9,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Event", "Feed", "Frame"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:

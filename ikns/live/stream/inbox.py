@@ -8,8 +8,6 @@ from collections import deque
 
 from ikns.live.stream.frame import Frame
 
-__all__ = ["Inbox"]
-
 
 class Inbox:
     """A bounded queue that drops the oldest frame when it is full.

@@ -15,8 +15,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["only_from_this_machine"]
-
 _SO_ATTACH_FILTER = 26
 #: Offset of the IPv4 header, relative to the network layer (SKF_NET_OFF).
 _NETWORK = 0xFFF00000

@@ -18,8 +18,6 @@ from ikns.live.stream.lsl_library import lsl
 from ikns.live.stream.lsl_numbers import Numbers
 from ikns.live.stream.lsl_search import Wanted, find_stream, find_successor
 
-__all__ = ["LslFeed"]
-
 #: Longest call into liblsl, s, so that Ctrl-C is handled.
 _SLICE = 0.2
 #: Seconds of frames kept for a busy reader; the oldest frames beyond that are lost.

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from ikns.errors import StreamError
 from ikns.recording.files.conversion import METERS
 
-__all__ = ["LslLayout", "channel_fields", "read_lsl_layout"]
-
 
 @dataclass(frozen=True, eq=False)
 class LslLayout:

@@ -15,8 +15,6 @@ from typing import Any
 
 from ikns.live.stream.optional import load_client
 
-__all__ = ["lsl", "lsl_settings"]
-
 _once = threading.Lock()
 _library: Any = None
 

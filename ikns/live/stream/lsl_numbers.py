@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["Numbers"]
-
 #: Stamps farther than this from whole frame periods are uneven, in periods.
 _EVEN = 0.25
 #: Number of successive even stamps that end an uneven stretch; the probability that

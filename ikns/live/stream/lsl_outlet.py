@@ -15,8 +15,6 @@ from ikns.live.stream.loopback import only_from_this_machine
 from ikns.live.stream.lsl_layout import channel_fields
 from ikns.live.stream.lsl_library import lsl
 
-__all__ = ["LslOutlet"]
-
 
 class LslOutlet:
     """An LSL stream of type MoCap with PositionX, PositionY, PositionZ in meters.

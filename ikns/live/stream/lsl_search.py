@@ -12,15 +12,6 @@ from urllib.parse import quote
 
 from ikns.errors import StreamError
 
-__all__ = [
-    "ANY_MOCAP",
-    "SETTLE",
-    "Wanted",
-    "describe_stream",
-    "find_stream",
-    "find_successor",
-]
-
 #: How long more streams may answer after the first, s. liblsl asks again after 0.5 s,
 #: so that each stream is asked twice.
 SETTLE = 1.0

@@ -7,8 +7,6 @@ from typing import Any
 
 from ikns.errors import StreamError
 
-__all__ = ["load_client"]
-
 
 def load_client(module: str, *, needed_by: str, remedy: str) -> Any:
     """Import a module, or raise an error that says what to install.

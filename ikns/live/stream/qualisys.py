@@ -19,8 +19,6 @@ from ikns.live.stream.client_thread import RECONNECT, ClientThread
 from ikns.live.stream.frame import Frame
 from ikns.live.stream.optional import load_client
 
-__all__ = ["PORT", "QualisysFeed"]
-
 #: Port of QTM for little-endian clients.
 PORT = 22223
 

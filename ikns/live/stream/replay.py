@@ -10,8 +10,6 @@ from ikns.errors import InvalidInput
 from ikns.live.stream.frame import Event, Frame
 from ikns.recording.recording import Recording
 
-__all__ = ["Replay", "frame_times", "wait_until"]
-
 
 def wait_until(due: float) -> float:
     """Sleep until a time of `time.monotonic`; return the time after it."""

@@ -14,8 +14,6 @@ from ikns.live.stream.frame import Feed
 from ikns.motion.marker_ik.size import power_of_ten, say_size
 from ikns.recording.files.conversion import METERS, mark_gaps
 
-__all__ = ["check_size", "first_frames"]
-
 #: Longest look at a source, s.
 _SECONDS = 0.5
 

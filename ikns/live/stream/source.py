@@ -11,8 +11,6 @@ from ikns.live.stream.continuity import Continuity
 from ikns.live.stream.frame import Event, Feed, Frame
 from ikns.recording.files.conversion import mark_gaps
 
-__all__ = ["Source"]
-
 
 class Source:
     """Frames from a feed; a context manager and an iterator.

@@ -11,8 +11,6 @@ from ikns.body.marker_set import MarkerSet
 from ikns.errors import MarkerMismatch
 from ikns.live.stream.frame import Event, Feed, Frame
 
-__all__ = ["SubjectFeed", "check_one_subject", "subjects_of"]
-
 #: Between the name of a subject and that of a marker: Vicon's and Qualisys's.
 _SEPARATORS = ":_"
 

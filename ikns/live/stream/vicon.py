@@ -16,8 +16,6 @@ from ikns.live.stream.client_thread import RECONNECT, ClientThread
 from ikns.live.stream.frame import Frame
 from ikns.live.stream.optional import load_client
 
-__all__ = ["PORT", "ViconFeed"]
-
 #: Port of the DataStream.
 PORT = 801
 

@@ -23,8 +23,6 @@ from ikns.motion.marker_ik.pose import (
     starting_poses,
 )
 
-__all__ = ["KernelSolver", "marker_problem", "tree_paths"]
-
 
 def marker_problem(
     skeleton: Skeleton, *, max_iterations: int, tolerance: float

@@ -11,18 +11,6 @@ from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 
-__all__ = [
-    "LIMIT",
-    "LOST",
-    "MAX_ITERATIONS",
-    "PRIOR",
-    "PRIOR_FROM_SCRATCH",
-    "STEP_TOLERANCE",
-    "Pose",
-    "SolvedFrames",
-    "starting_poses",
-]
-
 #: Pull towards the pose before, m/rad and m/m: the ratio of marker noise (1 mm) to
 #: what a joint typically turns within a frame (5 rad/s at 100 Hz is 0.05 rad). A joint
 #: with markers 50 mm from its axis lags by (0.02 / 0.05)^2 = 16 % of a frame, one with

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.visibility import segment_pairs
 
-__all__ = ["power_of_ten", "say_size"]
-
 #: Fewer distances say nothing about a size: one of them may be a ghost's.
 _FEWEST = 3
 #: Shorter distances are left out, m; marker noise changes them by much.

@@ -38,8 +38,6 @@ from ikns.numerics.derivative import slope
 from ikns.numerics.rigid import pose_steps
 from ikns.recording.recording import Recording
 
-__all__ = ["MarkerIK"]
-
 #: Frames between two reports of progress: milliseconds.
 _CHUNK = 500
 

@@ -19,15 +19,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import MarkerMismatch
 from ikns.motion.motion import all_seen
 
-__all__ = [
-    "Visibility",
-    "require_sight",
-    "say_apart",
-    "segment_pairs",
-    "sight_needs",
-    "visible_segments",
-]
-
 #: Markers that determine a segment by themselves.
 _ENOUGH = 3
 

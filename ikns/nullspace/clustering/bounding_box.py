@@ -13,8 +13,6 @@ from scipy.spatial.distance import cdist
 from ikns.arrays import Array
 from ikns.errors import InvalidInput
 
-__all__ = ["BoundingBox", "box_surface_points", "minimum_bounding_box"]
-
 # A side shorter than this times the longest is flat: far above rounding (1e-16) and
 # below the 0.1 mm that cameras resolve in a workspace of a meter.
 _FLAT = 1e-9

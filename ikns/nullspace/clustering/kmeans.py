@@ -17,8 +17,6 @@ from ikns.nullspace.clustering.bounding_box import (
     minimum_bounding_box,
 )
 
-__all__ = ["BoundingBoxKMeans", "nearest_center"]
-
 # An outlier is this many robust standard deviations farther from its centroid than the
 # median sample. The distances of an isotropic normal distribution of
 # standard deviation s have median 1.54 s and robust deviation 0.68 s, so the radius is

@@ -34,8 +34,6 @@ from ikns.nullspace.interpolation.double_double import (
 )
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["diagram", "insertion_order"]
-
 Stage = np.signedinteger
 
 #: Where a sum known to 2**-97 of the size of its terms is below this part of that, it

@@ -15,8 +15,6 @@ from ikns.nullspace.interpolation.diagram import diagram as voronoi
 from ikns.nullspace.interpolation.double_double import difference, double_double_dot
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["Domain", "domain", "scaled_gradients"]
-
 
 @dataclass(frozen=True)
 class Domain:

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from ikns.arrays import Array
 
-__all__ = ["difference", "double_double_dot", "product"]
-
 
 def difference(a: Array, b: Array) -> tuple[Array, Array]:
     """Return a - b as a float, and what that float rounds off."""

@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike
 from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
-__all__ = ["checked_out", "checked_points", "checked_queries", "checked_values"]
-
 # In sizes of the set: closer sites are taken for one, thinner sets for flat.
 _COINCIDENT = 1e-10
 _FLAT = 1e-9

@@ -29,8 +29,6 @@ from ikns.nullspace.interpolation.inputs import (
 )
 from ikns.nullspace.interpolation.packed import BRUTE_FORCE_LIMIT, morton_order, packed
 
-__all__ = ["Method", "NaturalNeighborInterpolator", "Outside"]
-
 Method = Literal["sibson", "laplace", "sibson_c1"]
 Outside = Literal["nearest", "project", "nan"]
 

@@ -14,8 +14,6 @@ from ikns.arrays import Array, Indices
 from ikns.nullspace.interpolation.domain import Domain
 from ikns.nullspace.interpolation.voronoi import Voronoi
 
-__all__ = ["BRUTE_FORCE_LIMIT", "morton_order", "packed"]
-
 #: Up to so many tetrahedra checking all is faster than walking (measured).
 BRUTE_FORCE_LIMIT = 60
 #: Bits for each axis: a cell for each of a billion sites.

@@ -17,8 +17,6 @@ from dataclasses import dataclass
 from ikns._kernels.voronoi import faces
 from ikns.arrays import Array, Indices
 
-__all__ = ["Voronoi"]
-
 
 @dataclass(frozen=True)
 class Voronoi:

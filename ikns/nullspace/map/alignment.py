@@ -9,8 +9,6 @@ import numpy as np
 from ikns.arrays import Array, Indices
 from ikns.numerics.subspace import largest_entry_positive
 
-__all__ = ["align", "spanning_tree"]
-
 
 def spanning_tree(strength: Array, edges: Indices, root: int) -> list[tuple[int, int]]:
     """Maximum spanning tree of a connected graph, grown from its root (Prim 1957).

@@ -20,8 +20,6 @@ from ikns.numerics.subspace import mean_null_direction
 if TYPE_CHECKING:
     from ikns.body.skeleton import Skeleton
 
-__all__ = ["analytic_map"]
-
 
 def analytic_map(
     skeleton: Skeleton,

@@ -11,8 +11,6 @@ from ikns.arrays import Array, Indices
 from ikns.nullspace.map.alignment import align
 from ikns.nullspace.map.checks import MapSettings, MapWarning, format_point
 
-__all__ = ["assemble"]
-
 # Directions more than 60 degrees apart say little about each other's sign.
 _WEAK = 0.5
 # The sign of a reference within 6 degrees of orthogonal changes with a little noise.

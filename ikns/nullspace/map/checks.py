@@ -12,18 +12,6 @@ from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.clustering import BoundingBoxKMeans
 
-__all__ = [
-    "MapWarning",
-    "MapSettings",
-    "format_point",
-    "checked_map",
-    "checked_rows",
-    "checked_settings",
-    "checked_velocities",
-    "usable_points",
-    "warn_of_components",
-]
-
 DOMAINS = ("position", "velocity")
 OUTSIDES = ("nearest", "project", "nan")
 # Points thinner than this share of their width are flat: 2 cm of 40 cm, about the drift

@@ -35,8 +35,6 @@ from ikns.nullspace.map.checks import (
 from ikns.nullspace.map.interpolator import Interpolation, make_interpolator
 from ikns.numerics.subspace import principal_components
 
-__all__ = ["NullSpaceMap"]
-
 
 class NullSpaceMap(BaseEstimator):
     """Directions Z and ranges m, M at PCA points, and the control signal between them.

@@ -17,8 +17,6 @@ from ikns.errors import InvalidInput
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 
-__all__ = ["Interpolation", "NearestPoint", "make_interpolator"]
-
 Interpolation = Literal["natural", "laplace", "nearest"]
 
 _METHODS: dict[str, Literal["sibson", "laplace"]] = {

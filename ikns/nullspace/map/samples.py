@@ -10,8 +10,6 @@ from ikns.body.skeleton import Robot
 from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
 
-__all__ = ["null_space_samples", "robot_null_space_samples", "still_mask"]
-
 
 def still_mask(
     motion: Motion,

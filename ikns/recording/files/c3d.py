@@ -28,8 +28,6 @@ from ikns.recording.files.conversion import (
 )
 from ikns.recording.recording import Recording
 
-__all__ = ["read_c3d"]
-
 #: Parameter lists of the POINT group whose members are not positions.
 _NOT_POSITIONS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 

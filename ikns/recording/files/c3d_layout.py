@@ -21,8 +21,6 @@ from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
 
-__all__ = ["C3dLayout", "floats", "read_layout"]
-
 _BLOCK = 512
 _KEY = 0x50
 _INTEL, _DEC, _MIPS = 84, 85, 86

@@ -12,8 +12,6 @@ from ikns.output.file import sync
 from ikns.recording.files.c3d_layout import read_layout
 from ikns.recording.recording import Recording
 
-__all__ = ["write_c3d"]
-
 #: Largest 16-bit word; the largest frame number in two of them.
 _WORD = 0xFFFF
 _LAST_FRAME = 2**31 - 1

@@ -17,17 +17,6 @@ from ikns.arrays import Array, Mask
 from ikns.errors import FileError, InvalidInput
 from ikns.recording.recording import Recording
 
-__all__ = [
-    "METERS",
-    "checked_rate",
-    "existing_file",
-    "is_unlabeled",
-    "mark_gaps",
-    "meters_per",
-    "shown",
-    "to_recording",
-]
-
 #: Meters in one unit, by the spellings that cameras' software writes.
 METERS = {
     short: meters

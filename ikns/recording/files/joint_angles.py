@@ -11,8 +11,6 @@ import numpy as np
 from ikns.arrays import Array
 from ikns.errors import FileError
 
-__all__ = ["read_joint_angles"]
-
 #: Endings of a column's name, and the unit that each stands for, in rad or m.
 _UNITS = {"_rad": 1.0, "_m": 1.0, "_deg": 0.017453292519943295}
 

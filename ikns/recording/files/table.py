@@ -11,8 +11,6 @@ from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
 
-__all__ = ["number_table", "text_lines"]
-
 
 def text_lines(path: Path) -> list[str]:
     """Return a text file's lines, whatever its byte-order mark and line ends."""

@@ -22,8 +22,6 @@ from ikns.recording.files.conversion import (
 from ikns.recording.files.table import number_table, text_lines
 from ikns.recording.recording import Recording
 
-__all__ = ["read_trc"]
-
 #: Lines before the first frame; a blank one may follow them.
 _HEADER = 5
 

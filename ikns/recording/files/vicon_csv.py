@@ -20,8 +20,6 @@ from ikns.recording.files.conversion import (
 from ikns.recording.files.table import number_table, text_lines
 from ikns.recording.recording import Recording
 
-__all__ = ["read_vicon_csv"]
-
 
 def read_vicon_csv(path: Path) -> Recording:
     """Read the trajectories of a Vicon Nexus CSV export.

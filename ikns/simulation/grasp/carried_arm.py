@@ -19,8 +19,6 @@ from ikns.simulation.grasp.route import Route
 from ikns.simulation.operator.cohort import Participant
 from ikns.simulation.operator.loop import Delay
 
-__all__ = ["CarriedArm"]
-
 Array = NDArray[np.float64]
 
 

@@ -12,8 +12,6 @@ from typing import Literal
 from ikns.body.model_file import urdf_folder
 from ikns.errors import InvalidInput
 
-__all__ = ["Module", "Solid", "constant", "finger_parts", "hand_size"]
-
 Three = tuple[float, float, float]
 
 

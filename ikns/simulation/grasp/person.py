@@ -15,8 +15,6 @@ from ikns.errors import InvalidInput
 from ikns.simulation.grasp.physics import Observation
 from ikns.simulation.parameter_table import draw_parameters
 
-__all__ = ["Habits", "Person", "draw_habits", "habit_table"]
-
 Phase = Literal["opening", "reaching", "closing", "carrying", "placing", "releasing"]
 
 #: The finger looks open below this flexion.

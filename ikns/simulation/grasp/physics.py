@@ -16,8 +16,6 @@ from ikns.finger.simulated import FOLLOW, SPEED, SPIN
 from ikns.simulation.grasp.parts import Solid, constant, finger_parts
 from ikns.simulation.grasp.world import world_model
 
-__all__ = ["Grasp", "Observation"]
-
 Array = NDArray[np.float64]
 
 

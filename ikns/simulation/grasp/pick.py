@@ -18,8 +18,6 @@ from ikns.simulation.grasp.physics import Grasp, Observation
 from ikns.simulation.operator.loop import Delay
 from ikns.simulation.operator.model import Operator
 
-__all__ = ["ElbowInput", "PickResult", "RingInput", "arch_length", "pick"]
-
 Array = NDArray[np.float64]
 Outcome = Literal["success", "dropped", "timeout"]
 Feedback = Literal["finger", "signal"]

@@ -21,8 +21,6 @@ from ikns.simulation.artifacts import SoftTissue
 from ikns.simulation.body_frames import arm_rows
 from ikns.simulation.operator.cohort import Participant, tracking_place
 
-__all__ = ["EXTRA_RANGE", "DOWN", "LEVELS", "LIFT", "Route", "hand_route"]
-
 Array = NDArray[np.float64]
 Piece = tuple[Array, Array, Array]
 

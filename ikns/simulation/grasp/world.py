@@ -19,8 +19,6 @@ from ikns.finger.geometry import WIDEST
 from ikns.finger.simulated import YIELD
 from ikns.simulation.grasp.parts import Solid, constant, finger_parts, hand_size
 
-__all__ = ["CLEAR", "grip_height", "object_in_gripper", "world_model"]
-
 #: Mass of hand and forearm, kg: the weld carries it, and no result depends on it.
 _CARRIER = 1.5
 #: Space between palm and straight finger, m.

@@ -14,15 +14,6 @@ import numpy as np
 from ikns.errors import InvalidInput
 from ikns.simulation.parameter_table import draw_parameters
 
-__all__ = [
-    "CONDITIONS",
-    "Ability",
-    "parameters",
-    "phase_margin",
-    "sample_abilities",
-    "typical",
-]
-
 #: Conditions that an operator can do: with the elbow, or with a stick.
 CONDITIONS = ("ikns", "gamepad")
 #: Smallest phase margin, rad; a draw with less is repeated, as people lower their gain

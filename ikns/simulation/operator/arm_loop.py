@@ -23,8 +23,6 @@ from ikns.simulation.movement import Unsteadiness, hand_drift
 from ikns.simulation.operator.loop import Delay
 from ikns.simulation.places import Place
 
-__all__ = ["ArmLoop"]
-
 Array = NDArray[np.float64]
 
 

@@ -19,8 +19,6 @@ from ikns.simulation.places import GIRDLE_FOLLOW, Place, widest_place
 from ikns.simulation.protocol import Protocol, simulate_protocol
 from ikns.simulation.subject import virtual_subject
 
-__all__ = ["Participant", "draw_participant", "tracking_place"]
-
 Array = NDArray[np.float64]
 
 #: Largest number of persons drawn until one can do the protocol.

@@ -13,8 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.errors import InvalidInput
 from ikns.simulation.operator.model import Operator
 
-__all__ = ["ControlledElement", "Delay", "TrackingTrace", "track"]
-
 Array = NDArray[np.float64]
 
 

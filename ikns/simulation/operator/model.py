@@ -24,8 +24,6 @@ from scipy.linalg import expm
 from ikns.errors import InvalidInput
 from ikns.simulation.operator.ability import Ability
 
-__all__ = ["Operator", "discrete_step"]
-
 Array = NDArray[np.float64]
 
 #: Anti-windup: how far the command u may exceed the limits of the limb, c.

@@ -18,16 +18,6 @@ from ikns.view.scene.commands import (
 )
 from ikns.view.scene.shapes import Shape, visual_shapes
 
-__all__ = [
-    "arm_links",
-    "body_commands",
-    "drawn_links",
-    "ghost_commands",
-    "link_poses",
-    "marker_commands",
-    "pose_commands",
-]
-
 #: Light, so that data are visible on it; the arms of the task are darker.
 _BODY, _ARM, _MARKER = "#D9DCE2", "#9FA9B8", "#4A4F57"
 _MARKER_RADIUS = 0.006  # m, slightly less than that of the usual 14 mm marker

@@ -19,19 +19,6 @@ from numpy.typing import NDArray
 
 from ikns.arrays import Array, Indices
 
-__all__ = [
-    "ROOT",
-    "Command",
-    "line_mesh",
-    "object_command",
-    "pose_matrix",
-    "property_command",
-    "root_commands",
-    "surface",
-    "text_command",
-    "transform_command",
-]
-
 Command = dict[str, Any]
 
 ROOT = "/ikns"

@@ -21,8 +21,6 @@ from ikns.view.scene.commands import ROOT, Command
 from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
 from ikns.view.style import GREY, INK, figure_style
 
-__all__ = ["visible_nodes", "scene_drawing"]
-
 #: Thorax frame (X forward, Y up, Z right) to matplotlib's axes, of which Z is up.
 _TO_DRAWING = [2, 0, 1]
 _DPI = 100

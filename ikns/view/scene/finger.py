@@ -27,8 +27,6 @@ from ikns.view.scene.commands import (
 from ikns.view.scene.scene import Layer, Scene
 from ikns.view.scene.shapes import visual_shapes
 
-__all__ = ["finger_path", "flexion_commands", "with_finger"]
-
 _COLOR, _TIP = "#40454C", "#D97340"
 #: Half the thickness of the hand of ``urdf/upper_body.urdf``, m.
 _HALF_HAND = 0.014

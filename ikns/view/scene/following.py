@@ -17,8 +17,6 @@ from ikns.view.scene.map_scene import map_scene
 if TYPE_CHECKING:
     from ikns.live.runtime import LoopStatus
 
-__all__ = ["body_view"]
-
 
 @contextmanager
 def body_view(

@@ -27,8 +27,6 @@ from ikns.view.scene.finger import flexion_commands
 from ikns.view.scene.page import packed_json, scene_html
 from ikns.view.scene.scene import Scene
 
-__all__ = ["LiveView"]
-
 _LOOPBACK = "127.0.0.1"
 _FRAMES = "/frames"
 #: A quiet view sends a comment after this many seconds, to notice who has left.

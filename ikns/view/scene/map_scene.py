@@ -21,8 +21,6 @@ from ikns.view.scene.scene import Layer, Scene, camera_and_target
 from ikns.view.scene.swivel import Swivel, swivel_commands, swivel_tracks
 from ikns.view.style import INK, VOLUME, point_color
 
-__all__ = ["chosen_point", "hidden", "map_commands", "map_layers", "map_scene"]
-
 #: Legend entry of objects in many colors.
 _MANY = "conic-gradient({} 33%, {} 0 67%, {} 0)".format(
     *(to_hex(point_color(k)) for k in range(3))

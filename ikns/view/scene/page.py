@@ -19,8 +19,6 @@ import numpy as np
 from ikns.errors import FileError
 from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
 
-__all__ = ["packed_json", "scene_html"]
-
 #: Arrays up to this size are written as numbers.
 _SHORT = 16
 _KINDS = {"f": ("<f4", "f4"), "u": ("<u4", "u4"), "i": ("<u4", "u4")}

@@ -14,14 +14,6 @@ from ikns.view.scene.drawing import scene_drawing
 from ikns.view.scene.page import scene_html
 from ikns.view.scene.scene import Scene
 
-__all__ = [
-    "HOW_TO_GET_ONE",
-    "ScenePicture",
-    "find_browser",
-    "scene_picture",
-    "screenshot",
-]
-
 HOW_TO_GET_ONE = (
     "no Chromium or Chrome found; get one with `apt install chromium`, or name yours "
     "in the environment variable CHROME"

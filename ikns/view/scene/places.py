@@ -21,8 +21,6 @@ from ikns.view.scene.commands import (
 )
 from ikns.view.style import BLUE, VOLUME, point_color
 
-__all__ = ["point_commands", "trail_commands", "volume_commands"]
-
 _POINT_RADIUS = 0.011  # m
 _NUMBER = 0.026  # height of a point's number, m
 _NUMBER_AWAY = 0.026  # of a number from its point, m

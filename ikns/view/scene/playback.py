@@ -15,16 +15,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.view.scene.body import drawn_links
 from ikns.view.scene.commands import ROOT, Command
 
-__all__ = [
-    "Track",
-    "animation_command",
-    "body_tracks",
-    "kept_frames",
-    "marker_tracks",
-    "markers_in_thorax",
-    "pose_tracks",
-]
-
 #: Frames in one page at most: 15 MB of tracks for a body with 24 markers.
 MOST_FRAMES = 18_000
 

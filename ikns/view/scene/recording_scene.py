@@ -33,8 +33,6 @@ from ikns.view.scene.scene import Layer, Scene, camera_and_target
 from ikns.view.scene.swivel import Swivel, swivel_commands
 from ikns.view.style import BLUE
 
-__all__ = ["recording_scene"]
-
 _SEEN = "#222222"
 _BALL = {
     "type": "SphereGeometry",

@@ -12,8 +12,6 @@ from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
 from ikns.view.scene.commands import Command
 
-__all__ = ["FIELD_OF_VIEW", "Layer", "Scene", "camera_and_target"]
-
 #: Vertical angle of view, deg: small, so that near objects are not enlarged much.
 FIELD_OF_VIEW = 28.0
 #: Direction of the camera: front, above, and the side of the arm; thorax frame.

@@ -12,8 +12,6 @@ import numpy as np
 from ikns.arrays import Array
 from ikns.errors import FileError
 
-__all__ = ["Shape", "visual_shapes"]
-
 
 @dataclass(frozen=True, eq=False)
 class Shape:

@@ -20,8 +20,6 @@ from ikns.view.scene.places import trail_commands
 from ikns.view.scene.playback import Track, body_tracks, pose_tracks
 from ikns.view.style import INK, point_color
 
-__all__ = ["Swivel", "swivel_commands", "swivel_tracks"]
-
 #: Control signals of the ghosts; the body is in the middle.
 _STEPS = np.array([0.0, 0.25, 0.75, 1.0])
 #: Duration of a sweep and its return, s.

@@ -22,19 +22,6 @@ from ikns.view.style import (
     new_figure,
 )
 
-__all__ = [
-    "NO_MARGIN",
-    "NO_TRIAL",
-    "ReportFigure",
-    "condition_styles",
-    "difference_figures",
-    "difference_name",
-    "effects_table",
-    "scatter_places",
-    "study_figure",
-    "tests_table",
-]
-
 NO_MARGIN = "No margin was declared beforehand, so equivalence was not tested."
 NO_TRIAL = "No trial was finished, so there is nothing to draw or to test."
 _BOX = {"facecolor": GREEN, "alpha": 0.13, "lw": 0}

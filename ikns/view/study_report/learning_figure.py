@@ -14,8 +14,6 @@ from ikns.view.study_report.comparisons import (
 )
 from ikns.view.style import GREEN, GREY, INK, PALE, PURPLE, figure_style, outside_legend
 
-__all__ = ["learning_figure"]
-
 _LINES = {
     "constant": (GREY, ":"),
     "exponential": (GREEN, "-"),

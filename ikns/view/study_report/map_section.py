@@ -11,8 +11,6 @@ from ikns.view.parts import Section
 from ikns.view.study_report.comparisons import ReportFigure
 from ikns.view.workspace import workspace_figure
 
-__all__ = ["map_figure", "map_section"]
-
 _NO_MAP = (
     "Left out: no visit has a recorded session, or a folder `subject` (as `ikns "
     "calibrate` writes it) in it or next to it, to take a map from."

@@ -15,13 +15,6 @@ from ikns.experiments.study.summary.answers import people
 from ikns.experiments.study.summary.methods import methods, setting_text
 from ikns.view.parts import Cell, Section, Table
 
-__all__ = [
-    "done_section",
-    "left_out_section",
-    "methods_section",
-    "variation_section",
-]
-
 #: Visits left out that are listed at most.
 _MOST = 50
 _OUTCOMES = {

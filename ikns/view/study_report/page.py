@@ -22,8 +22,6 @@ from ikns.view.parts import (
 )
 from ikns.view.report import html_document
 
-__all__ = ["study_html"]
-
 #: The people, or the simulated participants, with the sections on them.
 GroupPart = tuple[Group, Sequence[Section]]
 

@@ -13,8 +13,6 @@ from ikns.view.study_report.comparisons import (
 )
 from ikns.view.style import GREY, INK, PALE, figure_style, outside_legend
 
-__all__ = ["picking_figure"]
-
 _APART = 0.36
 
 

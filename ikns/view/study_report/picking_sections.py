@@ -24,8 +24,6 @@ from ikns.view.study_report.comparisons import (
 )
 from ikns.view.study_report.picking_figures import picking_figure
 
-__all__ = ["picking_figures", "picking_sections"]
-
 
 def picking_figures(found: PickingSummary) -> list[ReportFigure]:
     """All figures of experiment 2; none without a trial."""

@@ -16,8 +16,6 @@ from ikns.view.study_report.comparisons import (
 )
 from ikns.view.style import GREY, INK, PALE, figure_style, outside_legend
 
-__all__ = ["error_figure", "rmse_figure", "trace_figure"]
-
 #: Above so many participants single ones are drawn fainter.
 _MANY = 40
 

@@ -27,8 +27,6 @@ from ikns.view.study_report.tracking_figures import (
     trace_figure,
 )
 
-__all__ = ["tracking_figures", "tracking_sections"]
-
 _NAMES = {
     "mae": "mean absolute error",
     "lag": "lag",

@@ -27,8 +27,6 @@ from ikns.view.study_report.tracking_sections import (
     tracking_sections,
 )
 
-__all__ = ["report_files", "study_page", "write_study_report"]
-
 _PAGE, _NUMBERS = "report.html", "numbers.json"
 _TABLES: dict[str, Callable[[StudySummary], str]] = {
     "tables/tracking.csv": lambda summary: trials_csv(summary, "tracking"),

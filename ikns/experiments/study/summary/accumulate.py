@@ -19,8 +19,6 @@ from ikns.experiments.study.summary.digest import (
 )
 from ikns.experiments.study.summary.running_error import ErrorOverTime, RunningError
 
-__all__ = ["VisitAccumulator"]
-
 #: Parts of ``visit.json`` that the methods text needs, and how many different ones.
 _SETTINGS, _MAX_SETTINGS = ("design", "versions", "input", "training", "parameters"), 10
 

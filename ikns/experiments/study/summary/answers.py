@@ -15,8 +15,6 @@ from ikns.experiments.study.summary.tracking import (
 from ikns.statistics import Equivalence, PairedT, SuccessTest
 from ikns.statistics.wording import counted, interval_text, number, p_text
 
-__all__ = ["people", "picking_answer", "tracking_answer", "worded"]
-
 #: Names of conditions in sentences; others keep their own.
 _WORDS = {
     "ikns": "the null space (ikns)",

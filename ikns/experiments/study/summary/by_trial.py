@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TrialMeans", "rmse_by_trial"]
-
 Array = NDArray[np.float64]
 
 

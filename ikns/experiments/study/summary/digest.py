@@ -23,18 +23,6 @@ from ikns.experiments.visits import (
     tracking_record,
 )
 
-__all__ = [
-    "METRICS",
-    "PICKING",
-    "RATE",
-    "TEXTS",
-    "TRACKING",
-    "WHOLE",
-    "Digest",
-    "ExcludedVisit",
-    "digest_visit",
-]
-
 Array = NDArray[np.float64]
 
 #: Of :class:`ikns.experiments.tracking.Metrics`.

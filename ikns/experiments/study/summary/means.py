@@ -12,8 +12,6 @@ from scipy import stats
 
 from ikns.experiments.study.summary.trials import Columns
 
-__all__ = ["ConditionMean", "Mean", "condition_means", "mean_of", "subject_means"]
-
 Array = NDArray[np.float64]
 
 

@@ -11,8 +11,6 @@ from ikns.experiments.study.summary.study import Group
 from ikns.experiments.study.summary.tracking import TrackingSummary
 from ikns.statistics.wording import number
 
-__all__ = ["methods", "setting_text"]
-
 #: Keys of a design that the paragraphs mention.
 _MENTIONED = {
     "conditions",

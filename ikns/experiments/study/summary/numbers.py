@@ -14,8 +14,6 @@ from ikns.experiments.study.summary.picking import PickingSummary
 from ikns.experiments.study.summary.study import Group, StudySummary
 from ikns.experiments.study.summary.tracking import TrackingSummary
 
-__all__ = ["error_csv", "numbers", "trials_csv"]
-
 
 def numbers(summary: StudySummary) -> dict[str, Any]:
     """Return all numbers of a study: dicts, lists, text and floats, NaN for missing."""

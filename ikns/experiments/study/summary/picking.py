@@ -36,8 +36,6 @@ from ikns.statistics import (
 )
 from ikns.statistics.times import restricted_pairs
 
-__all__ = ["ObjectResult", "PickComparison", "PickingSummary", "summarize_picking"]
-
 
 @dataclass(frozen=True)
 class ObjectResult:

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput
 
-__all__ = ["ErrorOverTime", "RunningError"]
-
 Array = NDArray[np.float64]
 
 #: Range and bin width of the histograms of errors, of 100.

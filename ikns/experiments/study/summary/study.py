@@ -16,8 +16,6 @@ from ikns.experiments.study.summary.picking import PickingSummary, summarize_pic
 from ikns.experiments.study.summary.tracking import TrackingSummary, summarize_tracking
 from ikns.experiments.visits import empty_visits, list_visits
 
-__all__ = ["Group", "StudySummary", "summarize"]
-
 #: With fewer visits, several processes take longer to start than they save.
 _MIN_PARALLEL = 40
 

@@ -14,8 +14,6 @@ from ikns.errors import IknsError
 from ikns.experiments.study.summary.study import Group
 from ikns.live.session import read_run
 
-__all__ = ["VisitSubject", "first_subject"]
-
 Array = NDArray[np.float64]
 
 

@@ -27,8 +27,6 @@ from ikns.experiments.tracking import TrackingRecord
 from ikns.experiments.visits import read_visit, tracking_record
 from ikns.statistics import TrackingAnalysis, analyze_tracking
 
-__all__ = ["UNITS", "TrackingComparison", "TrackingSummary", "summarize_tracking"]
-
 #: Units of the metrics in tables.
 UNITS = {
     "rmse": "of 100",

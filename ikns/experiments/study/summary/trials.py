@@ -8,15 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "Columns",
-    "ordered",
-    "paired_subjects",
-    "rows_of",
-    "select",
-    "study_conditions",
-]
-
 #: A table of trials: arrays of one length by name.
 Columns = Mapping[str, NDArray[Any]]
 

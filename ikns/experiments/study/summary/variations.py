@@ -11,8 +11,6 @@ import numpy as np
 from ikns.experiments.study.summary.means import Mean, mean_of, subject_means
 from ikns.experiments.study.summary.trials import Columns
 
-__all__ = ["VariationMean", "compare_variations"]
-
 
 @dataclass(frozen=True)
 class VariationMean:
