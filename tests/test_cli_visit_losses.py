@@ -45,15 +45,19 @@ def test_a_second_program_at_a_visit_is_refused(
         panel = Page("panel")
         await panel.come(address)
         command = [sys.executable, "-c", PROGRAM, *argv, "--no-browser"]
-        refused.append(subprocess.run(command, capture_output=True, text=True))
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as second:
+            # Meanwhile this page answers, as a page does.
+            await panel.wait(lambda shown: second.poll() is not None, seconds=300)
+            assert second.stderr is not None
+            refused.append((second.returncode, second.stderr.read()))
         await panel.submit("end")
 
     run(argv, another, monkeypatch, 0)
-    (second,) = refused
-    assert second.returncode == 2
-    assert second.stderr.count("\n") == 1
-    assert f"found another run, process {os.getpid()} on " in second.stderr
-    assert str(folder) in second.stderr
+    ((code, said),) = refused
+    assert code == 2
+    assert said.count("\n") == 1
+    assert f"found another run, process {os.getpid()} on " in said
+    assert str(folder) in said
     capfd.readouterr()
     assert not (folder / ".lock").exists()
     assert read_visit(folder).about["participant"] == "01"
