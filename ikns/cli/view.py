@@ -34,7 +34,9 @@ def view(
         int | None,
         typer.Option(
             help="PCA point, from 1, at which the arm shows its null space; default: "
-            "the one with the widest range."
+            "the one with the widest range.",
+            min=1,
+            max=1000,
         ),
     ] = None,
     open_page: Annotated[
@@ -51,6 +53,10 @@ def view(
 
     refuse_overwriting(out, force=force)
     if png is not None:
+        if png.suffix.lower() != ".png":
+            raise InvalidInput(
+                f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
+            )
         refuse_overwriting(png, force=force)
         if png.absolute() == out.absolute():
             raise InvalidInput(f"{png}: expected two files, found one for both.")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pinocchio as pin
 
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton.urdf import parse_urdf
 from ikns.errors import FileError
 
 __all__ = ["NQ_ROOT", "NV_ROOT", "build_model", "read_urdf", "upper_body_model"]
@@ -27,8 +27,14 @@ def read_urdf(path: Path) -> str:
     """
     try:
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{path}: cannot be read as a URDF: {error}") from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FileError(f"{path}: cannot be read as a URDF: {reason}.") from None
+    except UnicodeDecodeError as error:
+        raise FileError(
+            f"{path}: expected a URDF as text in UTF-8, found other bytes at "
+            f"{error.start}."
+        ) from None
 
 
 def build_model(urdf: str) -> pin.Model:
@@ -39,12 +45,12 @@ def build_model(urdf: str) -> pin.Model:
     FileError
         When the text is not a URDF.
     """
+    parse_urdf(urdf)
     try:
-        # Pinocchio's own parser prints to the terminal before it raises.
-        ET.fromstring(urdf)
         return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-    except (ET.ParseError, ValueError, RuntimeError) as error:
-        raise FileError(f"the URDF cannot be read: {error}") from None
+    except (ValueError, RuntimeError) as error:
+        reason = str(error).strip().rstrip(".")
+        raise FileError(f"the URDF cannot be read: {reason}.") from None
 
 
 def upper_body_model(urdf: str) -> pin.Model:

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from ikns._kernels.body.tree import Tree
 from ikns.body.skeleton.frames import LinkFrames
 from ikns.body.skeleton.model import build_model, read_urdf
-from ikns.errors import FileError, InvalidInput
+from ikns.body.skeleton.urdf import parse_urdf
+from ikns.errors import InvalidInput, naming
 from ikns.numerics.subspace import null_spaces
 
 __all__ = ["Robot"]
@@ -107,7 +108,8 @@ class Robot:
         frame : str
             The link that does the task.
         """
-        return cls(read_urdf(Path(path)), frame)
+        with naming(str(path)):
+            return cls(read_urdf(Path(path)), frame)
 
     @property
     def tree(self) -> Tree:
@@ -179,10 +181,10 @@ def _with_one_angle_a_joint(urdf: str) -> tuple[str, set[str], set[str]]:
     Pinocchio stores a continuous joint as cosine and sine; here it is an angle. A
     floating or planar joint becomes revolute, and is refused where it moves the frame.
     """
-    try:
-        robot = ET.fromstring(urdf)
-    except ET.ParseError as error:
-        raise FileError(f"the URDF cannot be read: {error}.") from None
+    robot = parse_urdf(urdf)
+    for link in robot.findall("link"):
+        # Neither shapes nor masses change the kinematics.
+        link[:] = []
     continuous, refused = set(), set()
     for joint in robot.iter("joint"):
         name, kind = joint.get("name", ""), joint.get("type")
