@@ -6,12 +6,14 @@ import contextlib
 import signal
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated
 
 import typer
 
 import ikns
 from ikns.cli.calibrate import calibrate
+from ikns.cli.checks import checked
 from ikns.cli.compare import compare
 from ikns.cli.control import control
 from ikns.cli.demo import demo
@@ -29,7 +31,7 @@ from ikns.cli.track import track
 from ikns.cli.ucm import ucm
 from ikns.cli.view import view
 from ikns.endings import BROKEN_PIPE, signal_exit_code
-from ikns.errors import DataLoss
+from ikns.errors import DataLoss, InvalidInput
 
 app = typer.Typer(
     name="ikns",
@@ -55,7 +57,7 @@ for command in (
     pick,
     report,
 ):
-    app.command()(command)
+    app.command()(checked(command))
 app.add_typer(study_app, name="study")
 
 
@@ -88,10 +90,12 @@ def run_command(argv: Sequence[str] | None = None) -> int:
         finger never moved or ended in its safe state, 128 + n when signal n ended the
         command.
     """
+    given = list(sys.argv[1:] if argv is None else argv)
     try:
+        _refuse_empty(given)
         # Not standalone: typer then raises errors instead of printing several lines.
         code = typer.main.get_command(app).main(
-            args=_repeat("--exploration", sys.argv[1:] if argv is None else argv),
+            args=_repeat("--exploration", given),
             prog_name="ikns",
             standalone_mode=False,
         )
@@ -118,6 +122,16 @@ def run_command(argv: Sequence[str] | None = None) -> int:
     with contextlib.suppress(OSError):
         sys.stderr.write(f"ikns: {' '.join(message.split())}\n")
     return 2
+
+
+def _refuse_empty(argv: Sequence[str]) -> None:
+    """Refuse an empty value: as the name of a file it would mean the folder here."""
+    for before, argument in pairwise(["", *argv]):
+        option, equals, value = argument.partition("=")
+        named = option if equals and option.startswith("--") else before
+        if not (value if named == option else argument):
+            where = f"for {named}" if named.startswith("--") else "as an argument"
+            raise InvalidInput(f"expected a value {where}, found an empty one.")
 
 
 def _repeat(option: str, argv: Sequence[str]) -> list[str]:

@@ -71,34 +71,47 @@ def calibrate(
     stature: Annotated[float | None, typer.Option(help="Standing height, m.")] = None,
     mass: Annotated[float | None, typer.Option(help="Body mass, kg.")] = None,
     sex: Annotated[str | None, typer.Option(help="'female' or 'male'.")] = None,
-    points: Annotated[int, typer.Option(help="PCA points.")] = 10,
+    points: Annotated[int, typer.Option(help="PCA points.", min=1, max=1000)] = 10,
     static_seconds: Annotated[
-        float, typer.Option(help="Live: standing still, s.")
+        float, typer.Option(help="Live: standing still, s.", min=0.0, max=3600.0)
     ] = 5.0,
     free_seconds: Annotated[
-        float, typer.Option(help="Live: free exploration, s.")
+        float, typer.Option(help="Live: free exploration, s.", min=0.0, max=3600.0)
     ] = 60.0,
-    point_seconds: Annotated[float, typer.Option(help="Live: each point, s.")] = 5.0,
+    point_seconds: Annotated[
+        float, typer.Option(help="Live: each point, s.", min=0.0, max=3600.0)
+    ] = 5.0,
     countdown: Annotated[
-        float, typer.Option(help="Live: before each recording, s.")
+        float, typer.Option(help="Live: before each recording, s.", min=0.0, max=3600.0)
     ] = 3.0,
-    n_dof: Annotated[int, typer.Option(help="Degrees of freedom to control.")] = 1,
+    n_dof: Annotated[
+        int, typer.Option(help="Degrees of freedom to control.", min=1, max=7)
+    ] = 1,
     max_hand_speed: Annotated[
-        float, typer.Option(help="Hand speed below which it counts as still, m/s.")
+        float,
+        typer.Option(
+            help="Hand speed below which it counts as still, m/s.", min=0.0, max=10.0
+        ),
     ] = 0.05,
     radius: Annotated[
         float | None,
-        typer.Option(help="Largest distance of a sample from its point, m."),
+        typer.Option(
+            help="Largest distance of a sample from its point, m.", min=0.0, max=10.0
+        ),
     ] = None,
     outside: Annotated[
         Literal["nearest", "project", "nan"],
         typer.Option(help="Map outside the volume of the points."),
     ] = "nearest",
     min_static: Annotated[
-        float, typer.Option(help="Shortest static trial accepted, s.")
+        float,
+        typer.Option(help="Shortest static trial accepted, s.", min=0.0, max=3600.0),
     ] = 1.0,
     min_still: Annotated[
-        float, typer.Option(help="Least duration of still samples at a point, s.")
+        float,
+        typer.Option(
+            help="Least duration of still samples at a point, s.", min=0.0, max=3600.0
+        ),
     ] = 0.5,
     force: Force = False,
     as_json: AsJson = False,

@@ -58,9 +58,14 @@ def compare(
         Path | None, typer.Option(help="Picture to write, .png, .svg or .pdf.")
     ] = None,
     intervals: Annotated[
-        int, typer.Option(help="Resamples for the 95 % intervals; 0 for none.", min=0)
+        int,
+        typer.Option(
+            help="Resamples for the 95 % intervals; 0 for none.", min=0, max=100000
+        ),
     ] = 400,
-    seed: Annotated[int, typer.Option(help="Of the resamples.", min=0)] = 0,
+    seed: Annotated[
+        int, typer.Option(help="Of the resamples.", min=0, max=2**32 - 1)
+    ] = 0,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:

@@ -26,7 +26,9 @@ _RESULTS = ("control.csv", "report.html", "summary.json", "view.html", "workspac
 
 def demo(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("ikns-demo"),
-    seed: Annotated[int, typer.Option(help="Seed of the virtual subject.")] = 1,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the virtual subject.", min=0, max=2**32 - 1)
+    ] = 1,
     quick: Annotated[
         bool, typer.Option("--quick", help="3 s a point instead of 5 s.")
     ] = False,

@@ -60,20 +60,30 @@ def pick(
     repeats: Annotated[
         int | None,
         typer.Option(
-            help="Repeats of each object in each condition.", show_default="1"
+            help="Repeats of each object in each condition.",
+            show_default="1",
+            min=1,
+            max=1000,
         ),
     ] = None,
     training: Annotated[
         int | None,
-        typer.Option(help="Objects before each condition.", show_default="10"),
+        typer.Option(
+            help="Objects before each condition.", show_default="10", min=0, max=1000
+        ),
     ] = None,
     limit: Annotated[
         float | None,
-        typer.Option(help="Time limit for an object, s.", show_default="20"),
+        typer.Option(
+            help="Time limit for an object, s.", show_default="20", min=0.0, max=3600.0
+        ),
     ] = None,
     rest: Rest = None,
     seed: Annotated[
-        int | None, typer.Option(help="Seed of the orders.", show_default="0")
+        int | None,
+        typer.Option(
+            help="Seed of the orders.", show_default="0", min=0, max=2**32 - 1
+        ),
     ] = None,
     subject: ForIkns = None,
     source: SourceAddress = None,
@@ -84,7 +94,11 @@ def pick(
     safe_state: SafeState = "limp",
     hold_speed: Annotated[
         float | None,
-        typer.Option(help="For ikns: hold the finger while the hand is faster, m/s."),
+        typer.Option(
+            help="For ikns: hold the finger while the hand is faster, m/s.",
+            min=0.0,
+            max=100.0,
+        ),
     ] = None,
     view: View = True,
     realtime: Realtime = False,

@@ -14,7 +14,10 @@ from ikns.cli.output import notes, show, table
 def replay(
     session: Annotated[Path, typer.Argument(help="Folder that `ikns run` wrote.")],
     run: Annotated[
-        int | None, typer.Option(help="Number of the run; the last by default.")
+        int | None,
+        typer.Option(
+            help="Number of the run; the last by default.", min=1, max=1000000
+        ),
     ] = None,
     export: Annotated[
         Path | None, typer.Option(help="Also write the run as .csv, .mat or .c3d.")

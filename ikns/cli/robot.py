@@ -34,13 +34,18 @@ def robot(
     task: Annotated[
         Literal["both", "pose", "position"], typer.Option(help="What was held.")
     ] = "both",
-    points: Annotated[int, typer.Option(help="PCA points.", min=1)] = 10,
+    points: Annotated[int, typer.Option(help="PCA points.", min=1, max=1000)] = 10,
     radius: Annotated[
         float | None,
-        typer.Option(help="Largest distance of a sample from its point, m."),
+        typer.Option(
+            help="Largest distance of a sample from its point, m.", min=0.0, max=100.0
+        ),
     ] = None,
     speed: Annotated[
-        float, typer.Option(help="Speed below which the frame counts as held, m/s.")
+        float,
+        typer.Option(
+            help="Speed below which the frame counts as held, m/s.", min=0.0, max=100.0
+        ),
     ] = 0.05,
     simulated: Annotated[
         bool, typer.Option("--simulated", help="Label tables and picture as simulated.")
@@ -48,7 +53,9 @@ def robot(
     figure: Annotated[
         Path | None, typer.Option(help="Picture to write, .png, .svg or .pdf.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the intervals.", min=0)] = 0,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the intervals.", min=0, max=2**32 - 1)
+    ] = 0,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:

@@ -47,7 +47,8 @@ def run(
         str, typer.Option(help="Pseudonym: letters and digits.")
     ] = "01",
     duration: Annotated[
-        float | None, typer.Option(help="Seconds; until Ctrl-C without it.")
+        float | None,
+        typer.Option(help="Seconds; until Ctrl-C without it.", min=0.0, max=86400.0),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Do everything but move the finger.")
@@ -61,7 +62,9 @@ def run(
     ] = "limp",
     hold_speed: Annotated[
         float | None,
-        typer.Option(help="Hold the finger while the hand is faster, m/s."),
+        typer.Option(
+            help="Hold the finger while the hand is faster, m/s.", min=0.0, max=100.0
+        ),
     ] = None,
     view: Annotated[
         bool, typer.Option("--view", help="Show the body live in a browser.")

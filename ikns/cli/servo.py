@@ -37,7 +37,7 @@ def servo(
     model: Annotated[
         str, typer.Option(help="xl430, xm430, mx28 or ax12 (Protocol 1.0).")
     ] = "xl430",
-    id: Annotated[int, typer.Option(help="ID on the bus.")] = 1,
+    id: Annotated[int, typer.Option(help="ID on the bus.", min=0, max=252)] = 1,
     baud: Annotated[int, typer.Option(help="Bits per second.")] = 57600,
     link: Annotated[
         Path | None, typer.Option(help="Symbolic link to create to its port.")
@@ -54,10 +54,16 @@ def servo(
         ),
     ] = 0.0,
     obstacle: Annotated[
-        float | None, typer.Option(help="Position that it cannot pass, ticks.")
+        float | None,
+        typer.Option(
+            help="Position that it cannot pass, ticks.", min=-1000000.0, max=1000000.0
+        ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Seconds to run; default: until q or Ctrl-C.")
+        float | None,
+        typer.Option(
+            help="Seconds to run; default: until q or Ctrl-C.", min=0.0, max=86400.0
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

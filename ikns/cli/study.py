@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ikns.cli.checks import checked
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, progress, show
 from ikns.cli.study_plan import plan
@@ -29,7 +30,6 @@ _NAMED = 5
 StudyFolder = Annotated[Path, typer.Argument(help="Folder of the study.")]
 
 
-@study_app.command()
 def init(folder: StudyFolder, force: Force = False, as_json: AsJson = False) -> None:
     """Write a study folder with a commented example: both experiments, 10 people."""
     from ikns.experiments.study import init_study, read_study
@@ -45,15 +45,18 @@ def init(folder: StudyFolder, force: Force = False, as_json: AsJson = False) -> 
     )
 
 
-@study_app.command()
 def run(
     folder: StudyFolder,
-    jobs: Annotated[int, typer.Option(help="Processes; -1: one for each core.")] = -1,
+    jobs: Annotated[
+        int, typer.Option(help="Processes; -1: one for each core.", min=-1, max=1024)
+    ] = -1,
     scheduler: Annotated[
         str | None,
         typer.Option(help="Dask scheduler to compute on, tcp://HOST:PORT."),
     ] = None,
-    participants: Annotated[int | None, typer.Option(help="Only the first N.")] = None,
+    participants: Annotated[
+        int | None, typer.Option(help="Only the first N.", min=1, max=5000)
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Simulate the visits that a study lacks; a stopped run continues where it was.
@@ -98,7 +101,8 @@ def run(
     )
 
 
-study_app.command()(plan)
+for command in (init, run, plan):
+    study_app.command()(checked(command))
 
 
 @contextmanager

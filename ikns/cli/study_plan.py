@@ -41,33 +41,50 @@ def plan(
     margin: Annotated[
         float | None,
         typer.Option(
-            help="Margin of equivalence: RMSE of 100, or s.",
+            help="Margin of equivalence: RMSE of 100, or s.", min=0.0, max=1000000.0
         ),
     ] = None,
     difference: Annotated[
         float,
-        typer.Option(help="True difference; without a margin, the one to detect."),
+        typer.Option(
+            help="True difference; without a margin, the one to detect.",
+            min=-1000000.0,
+            max=1000000.0,
+        ),
     ] = 0.0,
     participants: Annotated[
-        int | None, typer.Option(help="Of the study.", min=2)
+        int | None, typer.Option(help="Of the study.", min=2, max=5000)
     ] = None,
     levels: Annotated[
-        int | None, typer.Option(help="Trajectories or objects.", min=1)
+        int | None, typer.Option(help="Trajectories or objects.", min=1, max=1000)
     ] = None,
     repeats: Annotated[
-        int | None, typer.Option(help="Of each level in each condition.", min=1)
+        int | None,
+        typer.Option(help="Of each level in each condition.", min=1, max=1000),
     ] = None,
     spread: Annotated[
         float | None,
-        typer.Option(help="Standard deviation of the difference between participants."),
+        typer.Option(
+            help="Standard deviation of the difference between participants.",
+            min=0.0,
+            max=1000000.0,
+        ),
     ] = None,
     level_spread: Annotated[
         float | None,
-        typer.Option(help="Between levels within a participant; with --spread."),
+        typer.Option(
+            help="Between levels within a participant; with --spread.",
+            min=0.0,
+            max=1000000.0,
+        ),
     ] = None,
     trial_spread: Annotated[
         float | None,
-        typer.Option(help="Between repeats of one condition; with --spread."),
+        typer.Option(
+            help="Between repeats of one condition; with --spread.",
+            min=0.0,
+            max=1000000.0,
+        ),
     ] = None,
     pilot: Annotated[
         Path | None,
@@ -79,10 +96,14 @@ def plan(
         int, typer.Option(help="Most participants to try.", min=2, max=5000)
     ] = 500,
     simulations: Annotated[
-        int, typer.Option(help="Simulated studies per number of participants.", min=1)
+        int,
+        typer.Option(
+            help="Simulated studies per number of participants.", min=1, max=1000000
+        ),
     ] = 10_000,
     seed: Annotated[
-        int | None, typer.Option(help="Seed of the simulated studies.", min=0)
+        int | None,
+        typer.Option(help="Seed of the simulated studies.", min=0, max=2**32 - 1),
     ] = None,
     figure: Annotated[
         Path | None, typer.Option(help="Power curve to write, .png, .svg or .pdf.")

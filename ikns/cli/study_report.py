@@ -23,9 +23,10 @@ def report(
     jobs: Annotated[
         int | None,
         typer.Option(
-            min=-1,
             help="Processes that read visits; -1: one for each core, the default for "
             "many visits.",
+            min=-1,
+            max=1024,
         ),
     ] = None,
     force: Force = False,

@@ -63,24 +63,39 @@ def track(
     repeats: Annotated[
         int | None,
         typer.Option(
-            help="Repeats of each trajectory in each condition.", show_default="3"
+            help="Repeats of each trajectory in each condition.",
+            show_default="3",
+            min=1,
+            max=1000,
         ),
     ] = None,
     training: Annotated[
         int | None,
-        typer.Option(help="Trials before each condition.", show_default="10"),
+        typer.Option(
+            help="Trials before each condition.", show_default="10", min=0, max=1000
+        ),
     ] = None,
     seconds: Annotated[
         float | None,
-        typer.Option(help="Duration of a trajectory, s.", show_default="25"),
+        typer.Option(
+            help="Duration of a trajectory, s.", show_default="25", min=0.0, max=3600.0
+        ),
     ] = None,
     align: Annotated[
         float | None,
-        typer.Option(help="Time to align before a trajectory, s.", show_default="5"),
+        typer.Option(
+            help="Time to align before a trajectory, s.",
+            show_default="5",
+            min=0.0,
+            max=3600.0,
+        ),
     ] = None,
     rest: Rest = None,
     seed: Annotated[
-        int | None, typer.Option(help="Seed of the trajectories.", show_default="0")
+        int | None,
+        typer.Option(
+            help="Seed of the trajectories.", show_default="0", min=0, max=2**32 - 1
+        ),
     ] = None,
     subject: ForIkns = None,
     source: SourceAddress = None,
@@ -103,7 +118,11 @@ def track(
     realtime: Realtime = False,
     rate: Annotated[
         float,
-        typer.Option(help="Rate at which a page's control signal is recorded, Hz."),
+        typer.Option(
+            help="Rate at which a page's control signal is recorded, Hz.",
+            min=0.0,
+            max=1000.0,
+        ),
     ] = 100.0,
     host: Host = "127.0.0.1",
     port: Port = 0,

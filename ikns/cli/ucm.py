@@ -32,15 +32,18 @@ def ucm(
     onset_speed: Annotated[
         float,
         typer.Option(
-            min=0.0,
             help="Hand speed, m/s: a repetition lasts from its first to its last "
             "crossing; in a single recording the hand is still below it.",
+            min=0.0,
+            max=10.0,
         ),
     ] = 0.05,
     surrogates: Annotated[
-        int, typer.Option(min=1, help="Number of surrogates.")
+        int, typer.Option(help="Number of surrogates.", min=1, max=1000000)
     ] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the surrogates.")] = 0,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the surrogates.", min=0, max=2**32 - 1)
+    ] = 0,
     figure: Annotated[
         Path | None, typer.Option(help="Picture to write: .png, .svg or .pdf.")
     ] = None,

@@ -32,7 +32,9 @@ def view(
         int | None,
         typer.Option(
             help="PCA point, from 1, at which the arm shows its null space; default: "
-            "the one with the widest range."
+            "the one with the widest range.",
+            min=1,
+            max=1000,
         ),
     ] = None,
     open_page: Annotated[
@@ -50,6 +52,10 @@ def view(
     inputs = [subject, recording]
     refuse_overwriting(out, force=force, inputs=inputs)
     if png is not None:
+        if png.suffix.lower() != ".png":
+            raise InvalidInput(
+                f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
+            )
         refuse_overwriting(png, force=force, inputs=inputs)
         if png.resolve() == out.resolve():
             raise InvalidInput(f"{png}: expected two files, found one for both.")

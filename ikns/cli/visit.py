@@ -194,6 +194,7 @@ def _checked(
     subject = arm_subject(arm) if "ikns" in conditions else None
     finger_opener(arm)
     check_port(pages.host, pages.port)
+    _check_session(arm.session)
     simulated = virtual or (subject is not None and arm_is_simulated(subject, arm))
     if identity.study is not None and identity.study.simulated != simulated:
         words = {True: "simulated", False: "with people"}
@@ -202,6 +203,17 @@ def _checked(
             f"declares, found one that is {words[simulated]}."
         )
     return subject, simulated
+
+
+def _check_session(session: Path | None) -> None:
+    """Check that the live loop can keep its runs there."""
+    if session is None or session.is_dir():
+        return
+    if session.exists() or not session.absolute().parent.is_dir():
+        raise InvalidInput(
+            f"{session}: expected a folder for --session, or a new one in an existing "
+            "folder."
+        )
 
 
 def _about(

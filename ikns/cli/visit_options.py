@@ -19,10 +19,14 @@ Participant = Annotated[
     str | None, typer.Option(help="Pseudonym, letters and digits.", show_default="01")
 ]
 Number = Annotated[
-    int | None, typer.Option(help="Participant's number, from 0; sets the order.")
+    int | None,
+    typer.Option(help="Participant's number, from 0; sets the order.", min=0, max=9999),
 ]
 Rest = Annotated[
-    float | None, typer.Option(help="Seconds between conditions.", show_default="120")
+    float | None,
+    typer.Option(
+        help="Seconds between conditions.", show_default="120", min=0.0, max=3600.0
+    ),
 ]
 ForIkns = Annotated[
     Path | None, typer.Option(help="For ikns: folder that `ikns calibrate` wrote.")
@@ -56,7 +60,9 @@ Host = Annotated[
         "address; to other machines they are sent unencrypted."
     ),
 ]
-Port = Annotated[int, typer.Option(help="Port of the pages; 0 takes a free one.")]
+Port = Annotated[
+    int, typer.Option(help="Port of the pages; 0 takes a free one.", min=0, max=65535)
+]
 Browser = Annotated[
     bool, typer.Option("--browser/--no-browser", help="Open the pages.")
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from ikns._kernels.body.tree import FREE_FLYER, PRISMATIC, REVOLUTE, Tree
 from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.model_file import SEGMENTS
+from ikns.body.skeleton.urdf import parse_urdf
 from ikns.errors import FileError
 
 #: Columns of a configuration and of its tangent that hold the free flyer.
@@ -22,18 +22,24 @@ def read_urdf(path: Path) -> str:
     """Read the text of a URDF file."""
     try:
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{path}: cannot be read as a URDF: {error}") from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FileError(f"{path}: cannot be read as a URDF: {reason}.") from None
+    except UnicodeDecodeError as error:
+        raise FileError(
+            f"{path}: expected a URDF as text in UTF-8, found other bytes at "
+            f"{error.start}."
+        ) from None
 
 
 def build_model(urdf: str) -> pin.Model:
     """Build the model of a URDF whose root link gets a free flyer."""
+    parse_urdf(urdf)
     try:
-        # Pinocchio's own parser prints to the terminal before it raises.
-        ET.fromstring(urdf)
         return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-    except (ET.ParseError, ValueError, RuntimeError) as error:
-        raise FileError(f"the URDF cannot be read: {error}") from None
+    except (ValueError, RuntimeError) as error:
+        reason = str(error).strip().rstrip(".")
+        raise FileError(f"the URDF cannot be read: {reason}.") from None
 
 
 def upper_body_model(urdf: str) -> pin.Model:

@@ -17,7 +17,8 @@ from ikns._kernels.body.tree import Tree
 from ikns.arrays import Array, Indices
 from ikns.body.skeleton.frames import LinkFrames
 from ikns.body.skeleton.model import build_model, read_urdf
-from ikns.errors import FileError, InvalidInput
+from ikns.body.skeleton.urdf import parse_urdf
+from ikns.errors import InvalidInput, naming
 from ikns.numerics.subspace import null_spaces
 
 #: How many of a robot's links an error names.
@@ -97,7 +98,8 @@ class Robot:
     @classmethod
     def load(cls, path: str | Path, frame: str) -> Robot:
         """Read a URDF file; `frame` is the link that does the task."""
-        return cls(read_urdf(Path(path)), frame)
+        with naming(str(path)):
+            return cls(read_urdf(Path(path)), frame)
 
     @property
     def tree(self) -> Tree:
@@ -160,10 +162,10 @@ def _with_one_angle_a_joint(urdf: str) -> tuple[str, set[str], set[str]]:
     Pinocchio stores a continuous joint as cosine and sine; here it is an angle. A
     floating or planar joint becomes revolute, and is refused where it moves the frame.
     """
-    try:
-        robot = ET.fromstring(urdf)
-    except ET.ParseError as error:
-        raise FileError(f"the URDF cannot be read: {error}.") from None
+    robot = parse_urdf(urdf)
+    for link in robot.findall("link"):
+        # Neither shapes nor masses change the kinematics.
+        link[:] = []
     continuous, refused = set(), set()
     for joint in robot.iter("joint"):
         name, kind = joint.get("name", ""), joint.get("type")

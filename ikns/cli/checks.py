@@ -1,0 +1,59 @@
+"""Checks of the values of options, the same for every command."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import Any
+
+from ikns.errors import InvalidInput
+
+
+def checked(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command that refuses values which no option can mean.
+
+    These are numbers that are not finite, and names that are not text in UTF-8, which
+    no file of results could hold. A value that the option has by default
+    is right.
+
+    Examples
+    --------
+    >>> def jump(height: float = 1.0) -> None:
+    ...     print(height)
+    >>> checked(jump)(height=2.0)
+    2.0
+    >>> checked(jump)(height=float("nan"))
+    Traceback (most recent call last):
+    ikns.errors.InvalidInput: expected a finite number for --height, found nan.
+    """
+    parameters = signature(command).parameters
+
+    @wraps(command)
+    def run(**values: Any) -> None:
+        for name, value in values.items():
+            parameter = parameters[name]
+            # An argument without a default is written without dashes.
+            option = f"--{name.replace('_', '-')}"
+            for each in value if isinstance(value, (list, tuple)) else [value]:
+                if parameter.default is Parameter.empty or each != parameter.default:
+                    _check(option, each)
+        command(**values)
+
+    return run
+
+
+def _check(option: str, value: Any) -> None:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InvalidInput(f"expected a finite number for {option}, found {value:g}.")
+    if isinstance(value, (str, Path)):
+        text = str(value)
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            shown = text.encode("utf-8", "backslashreplace").decode()
+            raise InvalidInput(
+                f"expected text in UTF-8 for {option}, found {shown}."
+            ) from None
