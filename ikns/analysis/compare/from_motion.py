@@ -39,6 +39,7 @@ def compare_motion(
     task: Literal["pose", "position"] = "pose",
     coordinates: str = "internal",
     max_hand_speed: float = 0.05,
+    min_duration: float = 0.0,
     **options: Any,
 ) -> NullSpaceComparison:
     """Compare a learned map with the null spaces of a person's arm.
@@ -63,8 +64,8 @@ def compare_motion(
         Of the shoulder, see :mod:`ikns.analysis.compare.coordinates`. In others than
         ``"internal"`` directions are learned again too; rotation vectors start from the
         mean posture of all samples.
-    max_hand_speed : float
-        See :func:`ikns.nullspace.map.still_mask`, m/s.
+    max_hand_speed, min_duration : float
+        See :func:`ikns.nullspace.map.still_mask`, m/s and s.
     **options
         Of :func:`ikns.analysis.compare.compare_samples`.
 
@@ -96,7 +97,9 @@ def compare_motion(
     whole = chain if analyzed is None else analyzed
     _check_chains(learned, chain, whole)
     names = chain_joints(whole)
-    gate = still_mask(motion, chain, max_hand_speed=max_hand_speed)
+    gate = still_mask(
+        motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration
+    )
     gate &= np.isfinite(motion.chain_angles(whole)).all(axis=1)
     still = np.flatnonzero(gate)
     labels, points = visited_points(

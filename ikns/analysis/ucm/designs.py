@@ -84,6 +84,7 @@ def within_trial(
     *,
     chain: str = "right_arm",
     task: str = "position",
+    min_samples: int | None = None,
 ) -> VarianceSplit:
     """Split the variance over samples of one recording, such as those of a held hand.
 
@@ -98,6 +99,8 @@ def within_trial(
         Which samples, as from :func:`ikns.nullspace.map.still_mask`.
     chain, task
         See :func:`across_trials`.
+    min_samples : int, optional
+        See `min_trials` of :func:`ikns.analysis.ucm.variance_split`.
 
     Returns
     -------
@@ -128,7 +131,7 @@ def within_trial(
         raise InvalidInput(
             f"expected which of {len(motion.time)} samples, found {chosen.shape}."
         )
-    return _split(skeleton, motion.angles[chosen], chain, task, None)
+    return _split(skeleton, motion.angles[chosen], chain, task, min_samples)
 
 
 def _split(

@@ -113,6 +113,7 @@ def variance_split(
     at: Literal["mean", "visited"] = "mean",
     min_trials: int | None = None,
     joint_names: Sequence[str] | None = None,
+    rtol: float = 1e-9,
 ) -> VarianceSplit:
     """Split joint variance over the first axis along and across a task's null space.
 
@@ -140,6 +141,8 @@ def variance_split(
         joints can have full rank. The split alone needs 2.
     joint_names : sequence of n str, optional
         For messages.
+    rtol : float
+        See :func:`ikns.numerics.subspace.null_spaces`.
 
     Returns
     -------
@@ -192,7 +195,7 @@ def variance_split(
             f"expected a task of fewer variables than the {n} joints, found {k}: "
             "nothing is left uncontrolled."
         )
-    basis, rank = null_spaces(J)
+    basis, rank = null_spaces(J, rtol=rtol)
     tried = rank[trials >= least]
     if tried.max() < k:
         raise InvalidInput(
