@@ -163,7 +163,7 @@ def run(
         as_json=as_json,
     )
     code = signal_exit_code()
-    if report.stopped and not dry_run:
+    if report.stopped:
         say(stop_line(report.stopped))
         code = STOPPED
     if code:
