@@ -31,6 +31,9 @@ from live.stream_faults import BEAT, Struck
 
 __all__ = ["PROCESS_FAULTS", "kill", "strike"]
 
+#: Stated: a finger whose loop hung is in its safe state, and a few packets later
+#: without torque, s.
+_LIMP = 0.5 + BEAT + 0.08
 #: Stated: a look at what was asked for, and a few packets to the servo, s.
 _LEAVE = BEAT + 0.08
 #: How often rows are given to the system, and to the disk, s, with some room to do it.
@@ -171,7 +174,7 @@ def kill(
     rng = np.random.default_rng(seed)
     number, context = _SIGNALS[name], get_context("forkserver")
     expected = "stopped" if number == signal.SIGKILL else "relaxed"
-    lost = math.nan
+    lost = limp = math.nan
     with tempfile.TemporaryDirectory() as scratch:
         session = Path(scratch) / "session" if session is None else session
         servo = Servo("xl430")
@@ -196,11 +199,16 @@ def kill(
             if number == signal.SIGSTOP:
                 time.sleep(1.0)
                 os.kill(child.pid, signal.SIGCONT)
-                time.sleep(0.1)
+                resumed = time.monotonic()
+                while servo.torque and time.monotonic() < resumed + 5.0:
+                    time.sleep(0.002)
+                limp = time.monotonic() - resumed
                 child.terminate()
             child.join(10)
             time.sleep(WATCHDOG + 0.1 if number == signal.SIGKILL else 0.0)
-            torque = servo.torque and not servo.watchdog_error
+            torque = servo.torque
+            if number == signal.SIGKILL:  # nothing is left that could switch it off
+                torque = torque and not servo.watchdog_error
             still = still_at(servo, struck) - struck
             outside = sum(not 1024 <= goal <= 3072 for _, goal in servo.goals)
         try:
@@ -210,7 +218,9 @@ def kill(
             wrong = session_holds(session)
         except Exception as error:
             wrong = str(error)
-    remarks = () if torque is False else ("the servo was left pushing.",)
+    remarks = ("the servo was left pushing.",) if torque else ()
+    if limp > _LIMP + canary.stall:
+        remarks += (f"limp, it was under torque for {limp:.2f} s.",)
     promised = {"safe": _LEAVE if number == signal.SIGTERM else WATCHDOG}
     outcome = Outcome(
         name,

@@ -27,6 +27,8 @@ __all__ = ["SERVO_FAULTS", "WATCHDOG", "still_at", "strike"]
 _SILENCE, _READ, WATCHDOG = 0.25, 0.04, 0.3 + 0.02
 #: How often the finger looks whether torque is on.
 _LOOK = 0.1
+#: How long the servo takes to answer, s, beyond the time of its bytes at 57600 baud.
+ANSWER_DELAYS = (0.0, 0.002, 0.004, 0.01)
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class _Playing:
     def __init__(self, replay: Replay, at: int, wire: Wire, fault: ServoFault) -> None:
         self._replay, self._at, self._wire, self._fault = replay, at, wire, fault
         self.struck_at = math.nan
-        self.ended = False
+        self.ended = self.torque_after = False
         self.name, self.labels = replay.name, replay.labels
         self.rate, self.speed, self.events = replay.rate, replay.speed, replay.events
         self.device: dict[str, float] = {}
@@ -89,6 +91,7 @@ class _Playing:
         if frame is not None:
             lasts = max(self._fault.seconds, 0.5)
             self.ended = frame.number > self._at + 100 * lasts + 20
+            self.torque_after = self._wire.servos[0].torque
         return frame
 
     def close(self) -> None:
@@ -109,18 +112,21 @@ def strike(name: str, seed: int, folder: Path) -> Outcome:
     subject, recording = person.load(folder)
     piece = person.piece(recording, int(rng.integers(len(recording.time) - 400)))
     safe_state = SAFE_STATES[rng.integers(len(SAFE_STATES))]
+    at = int(rng.integers(40, 90))
+    answer_delay = float(rng.choice(ANSWER_DELAYS))
     remarks: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
         session = Path(scratch) / "session"
         servo = Servo("xl430")
         with (
             Canary() as canary,
-            Wire(servo, link=Path(scratch) / "servo") as wire,
+            Wire(
+                servo, link=Path(scratch) / "servo", answer_delay=answer_delay
+            ) as wire,
             session_for(session, subject, folder / "person", recording) as writer,
         ):
             inner = DynamixelFinger(wire.port, safety=Safety(safe_state=safe_state))
             finger = Watched(inner, canary=canary)
-            at = int(rng.integers(40, 90))
             feed = _Playing(Replay(piece), at, wire, fault)
             try:
                 with Source(feed) as source:
@@ -129,6 +135,8 @@ def strike(name: str, seed: int, folder: Path) -> Outcome:
                 return Outcome(name, fault.ends, str(error), {}, {}, 0, "")
             if servo.torque:
                 remarks.append("the servo was left under torque.")
+            if fault.ends == "safe" and safe_state == "limp" and feed.torque_after:
+                remarks.append("the servo was limp, under torque.")
             limits, ends = inner.safety.limits, (1024, 3072)  # open, closed
             outside = sum(not ends[0] <= goal <= ends[1] for _, goal in servo.goals)
         wrong = session_holds(session, report.frames)

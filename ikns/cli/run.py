@@ -176,7 +176,7 @@ def run(
     if losses:
         raise DataLoss("; ".join(losses))
     code = signal_exit_code()
-    if report.stopped and not dry_run:
+    if report.stopped:
         say(stop_line(report.stopped))
         code = STOPPED
     elif report.problem:

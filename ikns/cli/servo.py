@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import signal
 import sys
 import time
 from pathlib import Path
@@ -84,7 +83,6 @@ def servo(
         middle = made.motor.position
         ends = (-math.inf, obstacle) if obstacle > middle else (obstacle, math.inf)
         made.motor.obstacles = ends
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
     with (
         contextlib.suppress(KeyboardInterrupt),  # the usual way to stop it
         Wire(made, link=link, faults=faults, answer_delay=answer_delay) as wire,

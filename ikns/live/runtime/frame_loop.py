@@ -219,7 +219,7 @@ class FrameLoop:
 
     def _stop_reason(self) -> str:
         """Return why the finger is stopped; what it says itself is more recent."""
-        if self._controller.machine.state != "safe":
+        if self._finger is None or self._controller.machine.state != "safe":
             return ""
         return (self._alert or self._stopped) + self._refusal
 

@@ -40,7 +40,7 @@ class LoopStatus:
     q : (nq,) array
         Configuration of the last frame; NaN before the first.
     stopped : str
-        Why the finger is in its safe state; empty unless it is.
+        Why the finger is in its safe state; empty unless it is, or without a finger.
     """
 
     time: float
