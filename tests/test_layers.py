@@ -1,4 +1,4 @@
-"""The house keeps its order: imports point down, and no file waits for itself."""
+"""Imports point down, and there is no circle of files."""
 
 import ast
 from collections.abc import Iterator

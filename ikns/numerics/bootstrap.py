@@ -9,8 +9,8 @@ A few seconds hold only a few blocks. Then a standard error from blocks is too s
 itself uncertain, and percentiles of the replicates are too narrow. So replicates only
 give the standard error; it is corrected for its bias and used with Student's quantile:
 for k blocks the error's variance is ``1 - 1/k + 1/(3 k^2)`` of what it should be and
-has 1.5 k degrees of freedom, as an estimate with Bartlett's window has whose lags reach
-one block (Priestley 1981, Spectral analysis and time series, table 6.2). This
+has 1.5 k degrees of freedom, like a Bartlett-window estimate with a bandwidth of one
+block (Priestley 1981, Spectral analysis and time series, table 6.2). This
 reproduces the critical values of Kiefer and Vogelsang (2005, Econometric Theory
 21:1130) to 7 %.
 """
@@ -41,13 +41,13 @@ def block_length(series: ArrayLike) -> int:
     makes that bias a tenth. Both sums run over lags up to twice the one beyond which
     autocorrelations are only noise, with a flat-top window (Politis and White 2004,
     Econometric Reviews 23:53; corrected by Patton, Politis and White 2009, 28:372).
-    Their own length, which grows with the cube root of N, has the least mean squared
-    error of the variance; intervals keep their level with longer blocks, while the
-    small number of blocks is allowed for (Sun, Phillips and Jin 2008, Econometrica
+    The length they recommend, which grows with the cube root of N, has the least mean
+    squared error of the variance; intervals keep their level with longer blocks, while
+    the small number of blocks is allowed for (Sun, Phillips and Jin 2008, Econometrica
     76:175).
 
-    The longest length of several columns counts. For a statistic that is not a mean,
-    pass the influence of each sample.
+    For several columns the longest block length is used. For a statistic that is not a
+    mean, pass the influence of each sample.
 
     >>> rng = np.random.default_rng(0)
     >>> block_length(rng.normal(size=1000)) < 10

@@ -19,7 +19,8 @@ class HandSlope(NamedTuple):
 
     `slope` (d, 3) is in m or rad, NaN where a signal has no range; `replicates` (B, d,
     3) are the same from resamples, `interval` (d, 2) of the slopes' lengths, empty and
-    NaN without; `blocks` how many fit into the samples, 0 without an interval.
+    NaN without resampling; `blocks` how many fit into the samples, 0 without an
+    interval.
     """
 
     slope: Array
@@ -57,8 +58,8 @@ def hand_slope(
 def slopes(c: Array, hand: Array, counts: Array | None = None) -> Array:
     """Regression slopes of the hand (N, m) on the control signals (N, d).
 
-    (d, m), or (B, d, m) for `counts` (B, N), how often each sample counts in each
-    resample: of each signal with the others constant; NaN where signals are collinear.
+    Shape (d, m), or (B, d, m) with `counts` (B, N), how often each resample draws each
+    sample. Each slope holds the other signals constant; NaN where they are collinear.
     """
     once = counts is None
     weight = np.ones((1, len(c))) if counts is None else counts

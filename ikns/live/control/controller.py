@@ -113,7 +113,7 @@ class Controller:
             self._device_time = -math.inf
         dt = device_time - self._device_time
         seen = markers.tobytes()
-        new = dt > 0 and seen != self._markers  # never with NaN
+        new = dt > 0 and seen != self._markers  # false for a NaN time
         if not new:
             dt = math.nan
         else:

@@ -16,6 +16,7 @@ from ikns.errors import InvalidInput
 from ikns.motion.marker_ik.kernel import KernelSolver
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.map.interpolator import NearestPoint
 
 Array = NDArray[np.float64]
 
@@ -180,6 +181,11 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
     numbers, indices = np.empty(0), np.empty(0, dtype=np.int64)
     if isinstance(interpolator, NaturalNeighborInterpolator):
         numbers, indices = interpolator.packed
+    elif not isinstance(interpolator, NearestPoint):
+        raise InvalidInput(
+            "expected a map between natural neighbors or nearest points, found "
+            f"{type(interpolator).__name__}, which the live kernel does not know."
+        )
     hands = [SIDES.index(side) for side in chain_sides(chain)]
     return ControlMap(
         points=np.array(learned.centers_, order="C"),

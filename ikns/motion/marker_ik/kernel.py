@@ -86,7 +86,7 @@ class KernelSolver:
 
     @property
     def work(self) -> Array:
-        """Memory to work in, of the thread that asks."""
+        """Scratch memory, one array for each thread."""
         if not hasattr(self._of_thread, "work"):
             self._of_thread.work = np.empty(scratch_size(self.problem))
         work: Array = self._of_thread.work
@@ -99,7 +99,7 @@ class KernelSolver:
         before: Array | None,
         frames: SolvedFrames,
     ) -> None:
-        """Solve the first frame of a span to before its last, in steps of 1 or -1.
+        """Solve the frames of ``range(*span)``; the step is 1 or -1.
 
         Markers are (T, M, 3), NaN where not seen. The first frame starts from the pose
         before, or from scratch; others from the one next to them. Iterations of -1

@@ -81,10 +81,10 @@ def scaled_gradients(
 
 
 def _estimated(space: Domain, angle: Array, values: Array) -> Array:
-    """Least-squares gradients: of the plane through a site's value that fits others.
+    """Least-squares gradients: of a linear fit to the neighbors' values.
 
     Each neighbor is weighted with the solid angle of the face between over the squared
-    distance. Values that are linear in space have their own gradients.
+    distance. Gradients of values that are linear in space are exact.
     """
     edges = space.diagram.edges
     mine = np.concatenate([edges[:, 0], edges[:, 1]])
