@@ -103,7 +103,9 @@ def run_command(argv: Sequence[str] | None = None) -> int:
         message = error.format_message()
         if not message:  # no arguments at all: the help was printed
             return 2
-        message = f"{message.rstrip('.')}; see ikns --help."
+        message = _range_sentence(error, given) or (
+            f"{message.rstrip('.')}; see ikns --help."
+        )
     except DataLoss as error:
         sys.stderr.write(f"ikns: {' '.join(str(error).split())}\n")
         return 1
@@ -132,6 +134,25 @@ def _refuse_empty(argv: Sequence[str]) -> None:
         if not (value if named == option else argument):
             where = f"for {named}" if named.startswith("--") else "as an argument"
             raise InvalidInput(f"expected a value {where}, found an empty one.")
+
+
+def _range_sentence(error: typer.TyperException, argv: Sequence[str]) -> str:
+    """Say which numbers an option takes and which it got; empty if it takes others."""
+    parameter = getattr(error, "param", None)
+    least, most = (getattr(parameter, name, None) for name in ("min", "max"))
+    if parameter is None or (least is None and most is None):
+        return ""
+    found = ""
+    for option, value in pairwise([*argv, ""]):
+        name, equals, rest = option.partition("=")
+        if name in parameter.opts:
+            found = rest if equals else value
+    bounds = " ".join(
+        f"{word} {bound:.12g}"
+        for word, bound in (("from", least), ("up to" if least is None else "to", most))
+        if bound is not None
+    )
+    return f"expected a number {bounds} for {parameter.opts[-1]}, found {found}."
 
 
 def _repeat(option: str, argv: Sequence[str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ from ikns.cli.checks import checked
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import notes, progress, show
 from ikns.cli.study_plan import plan
+from ikns.errors import InvalidInput
 
 study_app = typer.Typer(
     help="Declare a study, simulate it, plan its size.",
@@ -65,6 +67,10 @@ def run(
     """
     from ikns.experiments.study import read_study, run_study
 
+    if scheduler is not None and not re.fullmatch(r"\w+://[^\s/].*", scheduler):
+        raise InvalidInput(
+            f"expected --scheduler as tcp://HOST:PORT, found '{scheduler}'."
+        )
     study = read_study(folder)
     with _progress_or_lines() as report:
         done = run_study(

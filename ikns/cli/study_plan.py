@@ -40,9 +40,7 @@ def plan(
     ] = None,
     margin: Annotated[
         float | None,
-        typer.Option(
-            help="Margin of equivalence: RMSE of 100, or s.", min=0.0, max=1000000.0
-        ),
+        typer.Option(help="Margin of equivalence: RMSE of 100, or s."),
     ] = None,
     difference: Annotated[
         float,
@@ -66,24 +64,19 @@ def plan(
         float | None,
         typer.Option(
             help="Standard deviation of the difference between participants.",
-            min=0.0,
             max=1000000.0,
         ),
     ] = None,
     level_spread: Annotated[
         float | None,
         typer.Option(
-            help="Between levels within a participant; with --spread.",
-            min=0.0,
-            max=1000000.0,
+            help="Between levels within a participant; with --spread.", max=1000000.0
         ),
     ] = None,
     trial_spread: Annotated[
         float | None,
         typer.Option(
-            help="Between repeats of one condition; with --spread.",
-            min=0.0,
-            max=1000000.0,
+            help="Between repeats of one condition; with --spread.", max=1000000.0
         ),
     ] = None,
     pilot: Annotated[

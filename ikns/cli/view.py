@@ -32,9 +32,7 @@ def view(
         int | None,
         typer.Option(
             help="PCA point, from 1, at which the arm shows its null space; default: "
-            "the one with the widest range.",
-            min=1,
-            max=1000,
+            "the one with the widest range."
         ),
     ] = None,
     open_page: Annotated[
@@ -52,13 +50,13 @@ def view(
     inputs = [subject, recording]
     refuse_overwriting(out, force=force, inputs=inputs)
     if png is not None:
+        refuse_overwriting(png, force=force, inputs=inputs)
+        if png.resolve() == out.resolve():
+            raise InvalidInput(f"{png}: expected two files, found one for both.")
         if png.suffix.lower() != ".png":
             raise InvalidInput(
                 f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
             )
-        refuse_overwriting(png, force=force, inputs=inputs)
-        if png.resolve() == out.resolve():
-            raise InvalidInput(f"{png}: expected two files, found one for both.")
     person = ikns.Subject.load(subject)
     learned, row = person.null_space_map, None if point is None else point - 1
     simulated = is_simulated(person, subject, [] if recording is None else [recording])
