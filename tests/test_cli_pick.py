@@ -80,10 +80,10 @@ def test_an_object_by_ring_and_by_arm(
         ([], "needs --subject"),
         (["--conditions", "gamepad"], "found 'gamepad'"),
         (["--conditions", "ring", "--objects", "Z"], "found 'Z'"),
-        (["--conditions", "ring", "--objects", ""], "distinct objects"),
+        (["--conditions", "ring", "--objects", ""], "a value for --objects"),
         (["--conditions", "ring", "--limit", "0"], "limit above 0 s"),
         (["--conditions", "ring", "--finger", "gpio:1"], "unknown finger"),
-        (["--conditions", "ring", "--number", "-1"], "subject"),
+        (["--conditions", "ring", "--number", "-1"], "for --number, found -1"),
     ],
 )
 def test_bad_input_is_one_sentence(

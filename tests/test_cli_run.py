@@ -221,7 +221,7 @@ def test_a_replay_that_differs_says_so(files, tmp_path, capsys):
         (["--finger", "dynamixel:/dev/none"], "no such port"),
         (["--duration", "0"], "expected a duration above 0 s"),
         (["--resume"], "--resume needs the --session"),
-        (["--hold-speed", "-1"], "positive hold_speed"),
+        (["--hold-speed", "-1"], "for --hold-speed, found -1"),
         (["--session", "{tmp}/s", "--participant", "Jane Doe"], "letters and digits"),
         (["--session", "{tmp}"], "exists already; use --resume"),
         (["--session", "{tmp}/none", "--resume"], "that `ikns run` recorded"),

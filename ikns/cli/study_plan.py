@@ -27,6 +27,8 @@ _VALUE = {
     "tracking": ("RMSE", "of 100", "trajectories"),
     "picking": ("time", "s", "objects"),
 }
+#: Larger than any RMSE, and any time of a trial in s.
+_LARGEST_MARGIN = 1e6
 
 
 def plan(
@@ -113,6 +115,11 @@ def plan(
     from ikns.statistics.plan import plan_participants
 
     refuse_picture(figure, force=force, inputs=[study, pilot])
+    if margin is not None and margin > _LARGEST_MARGIN:
+        raise InvalidInput(
+            f"expected a --margin above 0 and up to {_LARGEST_MARGIN:g}, found "
+            f"{margin:g}."
+        )
     design = resolve_plan(
         study,
         experiment,
