@@ -56,6 +56,7 @@ WRONG = {
     "align": FROM_ZERO,
     "alpha": [*POSITIVE, "1"],
     "angles": READ_FILE,
+    "answer_delay": FROM_ZERO,
     "baud": COUNT,
     "calibrate recordings": ["{binary}", "{latin}"],
     "chain": CHOICE,

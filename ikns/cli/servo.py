@@ -49,7 +49,9 @@ def servo(
         float,
         typer.Option(
             help="Seconds between an instruction and its answer, beyond the time that "
-            "their bytes take on the line."
+            "their bytes take on the line.",
+            min=0,
+            max=1,
         ),
     ] = 0.0,
     obstacle: Annotated[
