@@ -217,7 +217,7 @@ def test_a_frame_with_uncertain_weights_does_not_count(subject, exploring):
         assert np.isnan(decision.solved.c).all()
         angles = decision.solved.q[7:][-len(chain_joints(subject.chain)) :]
         assert np.isnan(learned.control_signal(angles, decision.solved.hand_in_thorax))
-    assert len(within) > 10
+    assert within  # some frames are inside the hull, else nothing was tested
 
 
 def test_out_of_sight_is_not_valid(subject):
