@@ -22,7 +22,7 @@ from ikns.finger.emulator import Servo, Wire
 from ikns.finger.laws import LAWS
 
 #: Longer than anything here takes, seconds.
-TIMEOUT = 10.0
+TIMEOUT = 60.0
 
 
 def wait_for(condition, timeout=TIMEOUT):
