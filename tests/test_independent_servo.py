@@ -274,7 +274,7 @@ def test_robotis_own_sdk_understands_it(servo: ServoProcess) -> None:
 
 @contextmanager
 def connected(address: str) -> Iterator[Finger]:
-    """A finger in use; a busy machine may keep the servo from answering for a second."""
+    """A connected finger; a busy machine may keep the servo from answering for 1 s."""
     finger = open_finger(address)
     for last in (False, False, False, True):
         try:
