@@ -156,11 +156,26 @@ def run(
         if not report.frames:
             session = None
             sys.stderr.write("ikns: no frame came, so no session was kept.\n")
+    title = f"{source} to {'nothing (dry run)' if dry_run else finger}"
+    _show_report(report, title, session, losses, as_json=as_json)
+    if code := _exit_code(report, losses):
+        raise typer.Exit(code)
+
+
+def _show_report(
+    report: Report,
+    title: str,
+    session: Path | None,
+    losses: list[str],
+    *,
+    as_json: bool,
+) -> None:
+    """Print how a run went."""
     result = _result(report) | {"session": session, "losses": losses}
     show(
         result,
         table(
-            f"{source} to {'nothing (dry run)' if dry_run else finger}",
+            title,
             {"quantity": "s", "value": "s"},
             _rows(report),
         ),
@@ -173,17 +188,16 @@ def run(
         *([f"Wrote {session}"] if session else []),
         as_json=as_json,
     )
+
+
+def _exit_code(report: Report, losses: list[str]) -> int:
+    """Say what must not be missed, and return the exit code."""
     if losses:
         raise DataLoss("; ".join(losses))
-    code = signal_exit_code()
-    if report.stopped:
-        say(stop_line(report.stopped))
-        code = STOPPED
-    elif report.problem:
-        say(report.problem)
-        code = STOPPED
-    if code:
-        raise typer.Exit(code)
+    if report.stopped or report.problem:
+        say(stop_line(report.stopped) if report.stopped else report.problem)
+        return STOPPED
+    return signal_exit_code()
 
 
 def _most(rejections: dict[str, int]) -> list[tuple[str, int]]:

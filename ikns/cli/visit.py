@@ -33,7 +33,13 @@ from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.experiments.conduct import Conductor, Driver, Experiment, HeldInput
+    from ikns.experiments.conduct import (
+        Conductor,
+        Driver,
+        Experiment,
+        HeldInput,
+        VisitLog,
+    )
     from ikns.live.runtime import LoopStatus
 
 #: A virtual operator begins after this long, s.
@@ -77,7 +83,6 @@ def conduct(
         Command,
         Conductor,
         HeldInput,
-        VisitLog,
         run_visit,
     )
     from ikns.experiments.visits import visit_lock
@@ -97,15 +102,9 @@ def conduct(
             "seed": seed,
             "session": _relative(session, identity.folder) if subject else None,
         }
-        log = VisitLog(identity.folder, common | dict(about))
-        stack.push(lambda kind, *_: log.discard_unused() if kind else None)
-        if identity.study is not None:
-            from ikns.experiments.study import save_declaration
-
-            save_declaration(identity.folder.parents[1], identity.study)
-        experiment: Any = make_experiment(
-            log.attempts
-        )  # tracking's has a trial to follow
+        log = _open_log(stack, identity, common | dict(about))
+        # Tracking's has a trial to follow.
+        experiment: Any = make_experiment(log.attempts)
         virtual = "virtual" in conditions
         conductor = Conductor(
             experiment,
@@ -166,6 +165,21 @@ def conduct(
         raise DataLoss("; ".join(losses))
     if code := signal_exit_code():
         raise typer.Exit(code)
+
+
+def _open_log(
+    stack: ExitStack, identity: VisitIdentity, about: Mapping[str, Any]
+) -> VisitLog:
+    """Open the visit's log; a start that fails leaves none behind."""
+    from ikns.experiments.conduct import VisitLog
+
+    log = VisitLog(identity.folder, about)
+    stack.push(lambda kind, *_: log.discard_unused() if kind else None)
+    if identity.study is not None:
+        from ikns.experiments.study import save_declaration
+
+        save_declaration(identity.folder.parents[1], identity.study)
+    return log
 
 
 def _checked(
