@@ -116,23 +116,16 @@ def conduct(
         held = {name: HeldInput() for name in PAGE if name in conditions}
         drivers = _page_drivers(held)
         if virtual:
-            from ikns.experiments.conduct.virtual import virtual_input
-
-            drivers["virtual"] = lambda: nullcontext(
-                virtual_input(
-                    experiment.trial, rate=pages.rate, seed=[seed, identity.number]
-                )
+            drivers["virtual"] = lambda: _virtual_driver(
+                experiment, rate=pages.rate, seed=[seed, identity.number]
             )
         address = ""
         if subject is not None:
-            shown = [
-                stack.enter_context(
-                    watch_stops(
-                        lambda: conductor.submit(Command("arm")),
-                        how="; the panel can arm it again",
-                    )
-                )
-            ]
+            stops = watch_stops(
+                lambda: conductor.submit(Command("arm")),
+                how="; the panel can arm it again",
+            )
+            shown = [stack.enter_context(stops)]
             if arm.view:
                 address = _open_view(stack, subject, shown, simulated=simulated)
             drivers["ikns"] = lambda: arm_driver(
@@ -180,6 +173,14 @@ def _open_log(
 
         save_declaration(identity.folder.parents[1], identity.study)
     return log
+
+
+def _virtual_driver(
+    experiment: Any, *, rate: float, seed: Sequence[int]
+) -> AbstractContextManager[Driver]:
+    from ikns.experiments.conduct.virtual import virtual_input
+
+    return nullcontext(virtual_input(experiment.trial, rate=rate, seed=seed))
 
 
 def _checked(
