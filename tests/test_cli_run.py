@@ -183,7 +183,7 @@ def test_a_run_that_ends_in_its_safe_state_says_so_at_once(files, tmp_path, capf
     out, err = capfd.readouterr()
     result = json.loads(out)
     (safe,) = (c for c in result["transitions"] if c["after"] == "safe")
-    assert result["notices"] == [f"the finger is in its safe state: {safe['reason']}."]
+    assert result["notices"] == [f"FINGER STOPPED: {safe['reason']}."]
     assert result["notices"][0] in err
     stayed = result["transitions"][-1]["time"] - safe["time"]
     assert (

@@ -262,21 +262,6 @@ def test_an_emergency_stop_acts_at_once_and_stays(
     assert at.over
 
 
-def test_a_finger_is_armed_again_on_command_but_not_after_an_emergency(
-    tmp_path: Path,
-) -> None:
-    at = start(tmp_path / "v", "tracking")
-    armed = []
-    at.on_arm.append(lambda: armed.append(True))
-    ask(at, 0.1, "begin")
-    assert armed == []
-    assert ask(at, 0.2, "arm")["message"] == ""
-    assert armed == [True]
-    ask(at, 0.3, "emergency")
-    assert "was stopped" in ask(at, 0.4, "arm")["message"]
-    assert armed == [True]
-
-
 # --- any commands ---------------------------------------------------------------
 
 ASKED = st.sampled_from(

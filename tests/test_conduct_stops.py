@@ -76,6 +76,22 @@ def test_connecting_again_aborts_the_trial_and_opens_the_source_once(
     assert not at.take_reconnect()
 
 
+def test_a_finger_whose_source_is_there_is_armed_and_not_opened_again(
+    tmp_path: Path,
+) -> None:
+    at = start(tmp_path / "v")
+    armed = []
+    at.on_arm = [lambda: armed.append(True)]
+    ask(at, 0.1, "connect")
+    assert armed == []  # nothing has stopped
+    at.set_source_status(STOPPED)
+    assert ask(at, 0.2, "connect")["message"] == ""
+    assert armed == [True]
+    assert not at.take_reconnect()
+    assert "was stopped" in ask(at, 0.3, "emergency", "connect")["message"]
+    assert armed == [True]
+
+
 def test_after_an_emergency_stop_nothing_is_connected(tmp_path: Path) -> None:
     at = stopped(tmp_path / "v")
     shown = ask(at, 0.1, "emergency", "connect")

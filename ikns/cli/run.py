@@ -208,7 +208,7 @@ def _most(rejections: dict[str, int]) -> list[tuple[str, int]]:
 @contextmanager
 def _status_line(arm: threading.Event) -> Iterator[Callable[[LoopStatus], None]]:
     """Rewrite one line on stderr if it is a terminal; say there when it is stopped."""
-    with watch_stops(arm.set) as watch:
+    with watch_stops(arm.set, announce=False) as watch:
         if not sys.stderr.isatty():
             yield watch
             return

@@ -32,7 +32,7 @@ def stop_line(reason: str, *, width: int = 10_000) -> str:
 
 @contextmanager
 def watch_stops(
-    arm: Callable[[], None], *, how: str = ""
+    arm: Callable[[], None], *, how: str = "", announce: bool = True
 ) -> Iterator[Callable[[LoopStatus], None]]:
     """Yield a function that takes every status of a loop; it prints each stop once.
 
@@ -42,6 +42,8 @@ def watch_stops(
         Called when the key is pressed while the finger is stopped.
     how : str
         Where else the finger can be armed again, for the sentence.
+    announce : bool
+        Print each stop; False where the loop's own notices do.
     """
     said = ""
     with pressed_keys() as keys:
@@ -49,10 +51,10 @@ def watch_stops(
         def watch(status: LoopStatus) -> None:
             nonlocal said
             pressed = keys(0.0)
-            if status.stopped and not said:
+            if status.stopped and not said and announce:
                 sys.stderr.write(f"\nikns: {stop_line(status.stopped)}{how}.\n")
                 sys.stderr.flush()
-            elif status.stopped and _KEY in pressed:
+            elif status.stopped and said and _KEY in pressed:
                 arm()
             said = status.stopped
 

@@ -122,8 +122,8 @@ def conduct(
         address = ""
         if subject is not None:
             stops = watch_stops(
-                lambda: conductor.submit(Command("arm")),
-                how="; the panel can arm it again",
+                lambda: conductor.submit(Command("connect")),
+                how="; the panel can connect it again",
             )
             shown = [stack.enter_context(stops)]
             if arm.view:

@@ -57,7 +57,8 @@ class Conductor:
     on_emergency : list of callable
         Called by an emergency stop, in the thread that submits it.
     on_arm : list of callable
-        Called when the experimenter arms the finger again.
+        Called when the experimenter connects a stopped finger again; empty while there
+        is no source of the signal, which is then opened again instead.
 
     Examples
     --------
@@ -230,12 +231,11 @@ class Conductor:
             visit.set_page(name == "page_connected", now)
         elif visit.stopped:
             raise InvalidInput("the run was stopped; end it and start it again.")
-        elif name == "arm":
-            for call in self.on_arm:
-                call()
         elif name == "connect":
             visit.reconnect(now)
-            self._reconnect = True
+            self._reconnect = not self.on_arm  # the source is there: arm its finger
+            for call in self.on_arm:
+                call()
         elif name in self.experiment.commands:
             self.experiment.execute(name, text, now)
         elif name == "begin":

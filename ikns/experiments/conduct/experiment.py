@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Protocol
 
 #: Commands of every experiment. The server itself sends ``page_connected`` and
-#: ``page_disconnected``; ``connect`` opens the source of the signal again; ``arm`` lets
-#: a finger follow again that is in its safe state.
+#: ``page_disconnected``; ``connect`` lets a stopped finger follow again, and opens the
+#: source of the signal again if that is gone.
 COMMANDS = frozenset(
-    "begin abort skip repeat rest pause connect arm emergency end".split()
+    "begin abort skip repeat rest pause connect emergency end".split()
 ) | {"page_connected", "page_disconnected"}
 
 

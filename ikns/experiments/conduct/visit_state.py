@@ -129,7 +129,7 @@ class VisitState:
         self.log_event("trial begins", self.experiment.visit.current.key, now)
 
     def reconnect(self, now: float) -> None:
-        """Abort the running trial, if any: its source is opened again.
+        """Abort the running trial, if any: its signal begins anew.
 
         Raises
         ------

@@ -50,9 +50,7 @@ class Notices:
         if change.after == "active":
             self.was_active = True
         if change.after == "safe":
-            self._tell(
-                change.time, f"the finger is in its safe state: {change.reason}."
-            )
+            self._tell(change.time, f"FINGER STOPPED: {change.reason}.")
 
     def check(self, now: float) -> None:
         """Tell what is new; call it with every frame and at least every 20 ms."""
