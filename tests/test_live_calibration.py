@@ -344,6 +344,16 @@ def test_a_folder_that_does_not_fit_is_refused(tmp_path: Path):
             RecordingsFolder(tmp_path / "r", {}, resume=True)
 
 
+def test_one_program_at_a_time_records_takes(tmp_path: Path):
+    folder = RecordingsFolder(tmp_path / "r", {})
+    with folder.locked():
+        other = RecordingsFolder(tmp_path / "r", {}, resume=True)
+        with pytest.raises(InvalidInput, match="to record takes in one program"):
+            other.locked().__enter__()
+    with other.locked():
+        pass
+
+
 # --- clock --------------------------------------------------------------------------
 
 

@@ -421,6 +421,13 @@ def test_drift_has_the_stated_size_and_speed() -> None:
     assert speed == pytest.approx(2 * np.pi * cutoff * 2.0, rel=0.06)
 
 
+def test_a_rate_that_cannot_show_tremor_is_refused() -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(InvalidInput, match="above 24 Hz"):
+        tremor(rng, 10, 1, sd=1.0, rate=24.0)
+    assert tremor(rng, 10, 1, sd=1.0, rate=24.1).shape == (10, 1)
+
+
 def test_tremor_is_between_8_and_12_hz() -> None:
     x = tremor(np.random.default_rng(0), 20_000, 1, sd=1.0, rate=100.0)[:, 0]
     power = np.abs(np.fft.rfft(x)) ** 2

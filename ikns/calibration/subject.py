@@ -160,7 +160,8 @@ class Subject:
                 # Folders from before there was a choice do not say it.
                 interpolation=table.get("interpolation", "natural"),
             )
-            learned.radius_ = float(table["radius_m"])
+            radius = table["radius_m"]
+            learned.radius_ = None if radius is None else float(radius)
             if all("mean_rad" in point for point in points):
                 means = np.array([point["mean_rad"] for point in points], dtype=float)
                 if means.shape != learned.directions_[:, 0].shape:

@@ -7,7 +7,7 @@ import os
 import select
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -117,10 +117,12 @@ def record_live(
         min_static=min_static,
         min_still=min_still,
     )
-    with open_source(options.source) as source:
+    with ExitStack() as stack:
+        source = stack.enter_context(open_source(options.source))
         check_labels(source, marker_set, chain, generic=body)
         settings = {"marker_set": marker_set, "chain": chain, "rate": source.rate}
         folder = RecordingsFolder(options.recordings, settings, resume=options.resume)
+        stack.enter_context(folder.locked())
         ikns.warm_up()
         restore(judge, folder, steps)
         pending = folder.pending(steps)

@@ -6,7 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfilt
 
+from ikns.errors import InvalidInput
+
 Array = NDArray[np.float64]
+
+#: Physiological tremor of the arm, Hz.
+_TREMOR_BAND = (8.0, 12.0)
 
 
 def wander(
@@ -30,8 +35,19 @@ def wander(
 def tremor(
     rng: np.random.Generator, n: int, width: int, *, sd: float, rate: float
 ) -> Array:
-    """Physiological tremor: Gaussian noise in the band of 8 to 12 Hz, (n, width)."""
-    sos = butter(2, (8.0, 12.0), btype="bandpass", fs=rate, output="sos")
+    """Physiological tremor: Gaussian noise in the band of 8 to 12 Hz, (n, width).
+
+    Raises
+    ------
+    InvalidInput
+        When the rate cannot show the band.
+    """
+    if not rate > 2 * _TREMOR_BAND[1]:
+        raise InvalidInput(
+            f"expected a rate above {2 * _TREMOR_BAND[1]:g} Hz, which tremor of up to "
+            f"{_TREMOR_BAND[1]:g} Hz needs, found {rate:g}."
+        )
+    sos = butter(2, _TREMOR_BAND, btype="bandpass", fs=rate, output="sos")
     return _filtered(rng, n, width, sd, sos, settle=int(rate))
 
 

@@ -10,6 +10,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import numpy as np
 from ikns.errors import FileError, InvalidInput
 from ikns.live.calibration.protocol import ProtocolStep
 from ikns.live.calibration.verdict import Verdict
+from ikns.output.lock import hold_lock
 from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
 
@@ -66,6 +68,10 @@ class RecordingsFolder:
         except OSError as error:
             raise FileError(f"{path}: cannot be made: {error.strerror}.") from None
         self._write()
+
+    def locked(self) -> AbstractContextManager[None]:
+        """Keep other programs from recording into it; see :func:`hold_lock`."""
+        return hold_lock(self.path / ".lock", "to record takes")
 
     @property
     def accepted(self) -> dict[str, Path]:

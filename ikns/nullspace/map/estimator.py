@@ -109,7 +109,7 @@ class NullSpaceMap(BaseEstimator):
     all_centers_, all_counts_ : (n_points, 3), (n_points,) array
         All PCA points, including those left out.
     radius_ : float
-        Radius used, m.
+        Radius used, m. Of a map made from arrays: the parameter, None by default.
     interpolator_ : object
         Weights, hull and neighbors; see :mod:`ikns.nullspace.interpolation`.
 
@@ -217,7 +217,8 @@ class NullSpaceMap(BaseEstimator):
             self.labels_[r] = k
         self.cluster_means_ = np.array([q[r].mean(axis=0) for r in rows])
         self.n_components_, self.explained_variance_ratio_ = n_components, ratios
-        self.interpolator_, self.radius_ = interpolator, found.radius_
+        self.interpolator_ = interpolator
+        self.radius_: float | None = found.radius_
         return self
 
     @classmethod
@@ -257,6 +258,7 @@ class NullSpaceMap(BaseEstimator):
         made.n_features_in_ = places.shape[1]
         made.centers_, made.directions_, made.lower_, made.upper_ = places, z, m, M
         made.counts_ = np.full(len(places), counts, dtype=np.int64)
+        made.radius_ = made.radius
         made.interpolator_ = make_interpolator(places, made.outside, made.interpolation)
         return made
 
