@@ -51,6 +51,18 @@ def test_nothing_heavy_is_loaded_before_it_is_needed(line: str) -> None:
     assert HEAVY.isdisjoint(done.stderr.split())
 
 
+def test_what_runs_live_needs_no_statistics() -> None:
+    code = (
+        "import sys, ikns.calibration.subject, ikns.experiments.conduct, "
+        "ikns.live.runtime; print(*sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    slow = {"sklearn", "pandas", "scipy.stats", "scipy.signal"}
+    assert slow.isdisjoint(done.stdout.split())
+
+
 def commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:
     yield name, command
     for part, below in getattr(command, "commands", {}).items():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import savgol_filter
 
 from ikns.numerics.derivative import WINDOW, slope
 
@@ -97,3 +98,12 @@ def test_a_sample_is_seen_within_half_the_window_and_not_beyond(rate):
     expected = np.where(np.abs(k) <= half, -k, 0) * rate
     expected = expected / (half * (half + 1) * (2 * half + 1) / 3)
     np.testing.assert_allclose(slope(spike, time), expected, rtol=0, atol=1e-12 * rate)
+
+
+@given(st.integers(0, 10**6), st.integers(5, 90), st.integers(1, 4))
+def test_it_is_the_filter_of_savitzky_and_golay(seed, samples, columns):
+    values = np.random.default_rng(seed).normal(size=(samples, columns))
+    window = min(21, samples - 1 + samples % 2)
+    expected = savgol_filter(values, window, 2, deriv=1, delta=0.01, axis=0)
+    # Sums of 21 rounded products of values of about 3 over 0.01 s.
+    np.testing.assert_allclose(slope(values, TIME[:samples]), expected, atol=1e-9)

@@ -1,5 +1,7 @@
 """Scikit-learn's own conformance checks, none exempted and none skipped."""
 
+import warnings
+
 import pytest
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
@@ -13,8 +15,16 @@ def array_api(monkeypatch):
     monkeypatch.setenv("SCIPY_ARRAY_API", "1")
 
 
+# The map keeps the conventions without scikit-learn's base class, whose import takes
+# longer than most commands.
+with warnings.catch_warnings():
+    warnings.filterwarnings("ignore", ".*does not inherit", UserWarning)
+    all_checks = parametrize_with_checks([BoundingBoxKMeans(), NullSpaceMap()])
+
+
 # The checks fit a few dozen random samples, about which a map rightly warns.
 @pytest.mark.filterwarnings("ignore::ikns.nullspace.map.MapWarning")
-@parametrize_with_checks([BoundingBoxKMeans(), NullSpaceMap()])
+@pytest.mark.filterwarnings("ignore:.*does not inherit:UserWarning")
+@all_checks
 def test_estimators_keep_the_conventions_of_scikit_learn(estimator, check):
     check(estimator)

@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
@@ -137,7 +137,8 @@ def student_interval(
     if len(values) < 2 or not math.isfinite(estimate):
         return math.nan, math.nan
     degrees, widen = _small_sample(blocks)
-    half = student.ppf((1 + level) / 2, degrees) * widen * values.std(ddof=1)
+    quantile = stdtrit(degrees, (1 + level) / 2)  # Student's t
+    half = quantile * widen * values.std(ddof=1)
     return estimate - half, estimate + half
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from ikns.errors import InvalidInput
 from ikns.numerics.subspace import principal_angles
@@ -61,7 +61,8 @@ def chance_angles(
             return np.zeros(2)
     few, many = sorted((d, null_dim))
     if few == 1:
-        cosine = beta.ppf(1 - _SMALL, many / 2, (n - many) / 2)
+        # The quantile of a beta distribution.
+        cosine = betaincinv(many / 2, (n - many) / 2, 1 - _SMALL)
         return np.asarray(np.arccos(np.sqrt(cosine)))
     drawn = random_subspaces(few, n, _DRAWS, np.random.default_rng(seed))
     angles = principal_angles(drawn, np.eye(n)[:many])

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.experiments.tracking.profiles import Profile
@@ -85,6 +84,8 @@ def measure(record: TrackingRecord) -> Metrics:
     pointer = np.interp(even, time[kept], y[kept])
     target = record.profile.at(even)
     behind, correlation = lag(target, pointer, rate=RATE)
+    from scipy.signal import butter, sosfiltfilt  # slow to load
+
     smooth = butter(2, _VOLUNTARY_HZ, fs=RATE, output="sos")
     moved = sosfiltfilt(smooth, np.gradient(pointer, 1 / RATE))
     meant = sosfiltfilt(smooth, record.profile.speed(even))

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.nullspace.clustering import BoundingBoxKMeans
+
+if TYPE_CHECKING:
+    from ikns.nullspace.clustering import BoundingBoxKMeans
 
 DOMAINS = ("position", "velocity")
 OUTSIDES = ("nearest", "project", "nan")

@@ -18,11 +18,9 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.base import BaseEstimator
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ikns.arrays import Array, Mask
-from ikns.nullspace.clustering import BoundingBoxKMeans
+from ikns.nullspace.estimator_base import EstimatorBase
 from ikns.nullspace.map.assembly import assemble
 from ikns.nullspace.map.checks import (
     checked_map,
@@ -36,7 +34,7 @@ from ikns.nullspace.map.interpolator import Interpolation, make_interpolator
 from ikns.numerics.subspace import principal_components
 
 
-class NullSpaceMap(BaseEstimator):
+class NullSpaceMap(EstimatorBase):
     """Directions Z and ranges m, M at PCA points, and the control signal between them.
 
     Fitting: hand positions are clustered
@@ -151,14 +149,6 @@ class NullSpaceMap(BaseEstimator):
         self.interpolation = interpolation
         self.min_samples = min_samples
 
-    def __sklearn_tags__(self) -> Any:
-        """Tell scikit-learn that `y` holds joint vectors and is needed."""
-        tags = super().__sklearn_tags__()
-        tags.target_tags.required = True
-        tags.target_tags.multi_output = True
-        tags.target_tags.single_output = False
-        return tags
-
     def fit(
         self, X: ArrayLike, y: ArrayLike, *, velocity: ArrayLike | None = None
     ) -> Self:
@@ -180,6 +170,11 @@ class NullSpaceMap(BaseEstimator):
         NotEnoughData
             With fewer samples than points, too few usable points, or points in a plane.
         """
+        # Only here: a map that is read from a file does without.
+        from sklearn.utils.validation import validate_data
+
+        from ikns.nullspace.clustering import BoundingBoxKMeans
+
         x, q = validate_data(self, X, y, multi_output=True, y_numeric=True)
         x, q = np.asarray(x, float), np.asarray(q, float).reshape(len(x), -1)
         settings = checked_settings(self, q.shape)
@@ -299,11 +294,11 @@ class NullSpaceMap(BaseEstimator):
 
     def inside(self, x: ArrayLike) -> Mask:
         """Whether hand positions (..., 3) lie in the hull of the points, (...)."""
-        check_is_fitted(self)
+        self._check_fitted()
         places = checked_rows(x, self.n_features_in_, "hand positions")
         return self.interpolator_.inside(places)
 
     def _weights(self, x: ArrayLike) -> Array:
-        check_is_fitted(self)
+        self._check_fitted()
         places = checked_rows(x, self.n_features_in_, "hand positions")
         return self.interpolator_.weights(places)
