@@ -18,6 +18,9 @@ class EstimatorBase:
     A subclass stores each parameter of its constructor under the same name.
     """
 
+    #: Columns of what it was fitted to.
+    n_features_in_: int
+
     @classmethod
     def _parameter_names(cls) -> list[str]:
         return [name for name in inspect.signature(cls).parameters]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfilt
 
 from ikns.errors import InvalidInput
 
@@ -28,6 +27,8 @@ def wander(
     Its velocity has a standard deviation of ``2 pi cutoff sd``: the second moment of
     the Butterworth spectrum of order two is the square of its cut-off.
     """
+    from scipy.signal import butter  # slow to load
+
     sos = butter(2, cutoff, fs=rate, output="sos")
     return _filtered(rng, n, width, sd, sos, settle=int(3 * rate / cutoff))
 
@@ -47,6 +48,8 @@ def tremor(
             f"expected a rate above {2 * _TREMOR_BAND[1]:g} Hz, which tremor of up to "
             f"{_TREMOR_BAND[1]:g} Hz needs, found {rate:g}."
         )
+    from scipy.signal import butter
+
     sos = butter(2, _TREMOR_BAND, btype="bandpass", fs=rate, output="sos")
     return _filtered(rng, n, width, sd, sos, settle=int(rate))
 
@@ -63,6 +66,8 @@ def minimum_jerk(n: int) -> Array:
 def _filtered(
     rng: np.random.Generator, n: int, width: int, sd: float, sos: Array, settle: int
 ) -> Array:
+    from scipy.signal import sosfilt
+
     impulse = np.zeros(20 * settle)
     impulse[0] = 1.0
     gain = np.sqrt(np.sum(sosfilt(sos, impulse) ** 2))
