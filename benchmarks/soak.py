@@ -145,7 +145,9 @@ def main() -> None:
     seconds = 10.0 if given.quick else 60 * given.minutes
     with tempfile.TemporaryDirectory() as scratch:
         person.make(Path(scratch), 1)
-        write_c3d(Path(scratch, "points.c3d"), person.load(Path(scratch))[1])
+        # Without gaps, or the first long one stops the finger for the rest of the time.
+        seen = person.piece(person.load(Path(scratch))[1], 0)
+        write_c3d(Path(scratch, "points.c3d"), seen)
         found = soak(
             Path(scratch),
             seconds,
