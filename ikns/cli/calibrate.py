@@ -16,9 +16,12 @@ import ikns
 from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import AsJson, Force, MarkerSetName
 from ikns.cli.output import notes, progress, show, table
+from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
+#: Options of files only.
+_FILES_ONLY = ("static", "exploration", "rename", "labels", "cutoff")
 #: Options of a live calibration only.
 _LIVE_ONLY = (
     "source",
@@ -32,8 +35,10 @@ _LIVE_ONLY = (
 )
 
 
+@reads_markers
 def calibrate(
     context: typer.Context,
+    read: Read,
     out: Annotated[Path, typer.Option(help="Subject folder to write.")],
     static: Annotated[
         Path | None, typer.Option(help="Recording of the person standing still.")
@@ -170,8 +175,8 @@ def calibrate(
     assert exploration is not None
     with progress() as report:
         subject = ikns.calibrate(
-            ikns.read(static),
-            [ikns.read(path) for path in exploration],
+            read(static),
+            [read(path) for path in exploration],
             generic=generic,
             marker_set=marker_set,
             chain=chain,
@@ -203,11 +208,11 @@ def _check_input(context: typer.Context, *, live: bool) -> None:
         if (origin := context.get_parameter_source(name)) and origin.name != "DEFAULT"
     }
     if live:
-        files = [f"--{name}" for name in ("static", "exploration") if name in given]
+        files = [f"--{name}" for name in _FILES_ONLY if name in given]
         if files:
             raise InvalidInput(
-                f"--live records what {' and '.join(files)} would name; give one or "
-                "the other."
+                f"{' and '.join(files)} {'goes' if len(files) == 1 else 'go'} with "
+                "recordings from files, and --live records them; give one or the other."
             )
         if "source" not in given:
             raise InvalidInput("--live needs the --source of the markers.")
