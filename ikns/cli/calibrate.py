@@ -15,7 +15,7 @@ import typer
 import ikns
 from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import AsJson, Force, MarkerSetName
-from ikns.cli.output import notes, progress, show, table
+from ikns.cli.output import held_sentences, notes, progress, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
@@ -73,7 +73,10 @@ def calibrate(
     clavicle: Annotated[
         bool, typer.Option("--clavicle", help="Include the clavicle in the chain.")
     ] = False,
-    stature: Annotated[float | None, typer.Option(help="Standing height, m.")] = None,
+    stature: Annotated[
+        float | None,
+        typer.Option(help="Standing height, m; with --mass and --sex for --static."),
+    ] = None,
     mass: Annotated[float | None, typer.Option(help="Body mass, kg.")] = None,
     sex: Annotated[str | None, typer.Option(help="'female' or 'male'.")] = None,
     points: Annotated[int, typer.Option(help="PCA points.", min=1, max=1000)] = 10,
@@ -171,11 +174,10 @@ def calibrate(
             min_static=min_static,
             min_still=min_still,
         )
-    assert static is not None
     assert exploration is not None
     with progress() as report:
         subject = ikns.calibrate(
-            read(static),
+            None if static is None else read(static),
             [read(path) for path in exploration],
             generic=generic,
             marker_set=marker_set,
@@ -220,7 +222,9 @@ def _check_input(context: typer.Context, *, live: bool) -> None:
     alone = [f"--{n.replace('_', '-')}" for n in _LIVE_ONLY if n in given]
     if alone:
         raise InvalidInput(f"{' and '.join(alone)} needs --live.")
-    missing = [f"--{n}" for n in ("static", "exploration") if n not in given]
+    missing = [] if "exploration" in given else ["--exploration"]
+    if not given & {"static", "stature"}:
+        missing.insert(0, "--static (or --stature, --mass and --sex)")
     if missing:
         raise InvalidInput(
             f"expected {' and '.join(missing)}, or --live with a --source."
@@ -235,7 +239,8 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
     moved = sorted(seen, key=lambda item: -item[1])[:2]
     return [
         table(
-            "Segments, joint to joint",
+            "Segments, joint to joint"
+            + ", assumed from stature" * (static["source"] is None),
             {"segment": "s", "length mm": ".1f", "sd mm": ".1f"},
             [
                 [name, 1000 * length, 1000 * static["length_sd_m"][name]]
@@ -281,6 +286,7 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
         + "; most of all joints " * bool(moved)
         + " and ".join(f"{name} {angle:.0f} deg" for name, angle in moved)
         + ".",
+        *held_sentences(static["held"]),
         *notes(report["warnings"]),
     ]
 

@@ -57,7 +57,7 @@ def low_pass(recording: Recording, cutoff: float) -> Recording:
     # The ends are continued by their reflection, over two periods of the cut-off.
     longest = math.ceil(2 * rate / cutoff)
     markers = np.array(recording.markers)
-    seen = np.isfinite(markers).all(axis=2)
+    seen = np.asarray(np.isfinite(markers).all(axis=2))
     for m in range(markers.shape[1]):
         ends = np.flatnonzero(np.diff(np.r_[False, seen[:, m], False]))
         for first, after in ends.reshape(-1, 2):
