@@ -9,7 +9,14 @@ from ikns.recording.files import read
 
 @pytest.mark.parametrize(
     ("name", "count", "static"),
-    [("oxford24", 24, 2), ("plug_in_gait", 19, 0), ("ue_adl", 45, 10)],
+    [
+        ("oxford24", 24, 2),
+        ("plug_in_gait", 19, 0),
+        ("ue_adl", 45, 10),
+        ("halpe26", 9, 0),
+        ("body25", 9, 0),
+        ("opencap", 13, 0),
+    ],
 )
 def test_shipped_sets_fit_the_body(name, count, static):
     markers = MarkerSet.load(name)
@@ -17,15 +24,20 @@ def test_shipped_sets_fit_the_body(name, count, static):
     assert len(markers.markers) - len(markers.without_static().markers) == static
     skeleton = Skeleton.load(marker_set=name)
     positions = skeleton.markers_in_world(skeleton.neutral())
+    assert not set(markers.held) - set(skeleton.joint_names)
     # The generic adult, arms hanging: every marker within a body's reach of the notch.
     assert np.abs(positions).max() < 0.8
 
 
-@pytest.mark.parametrize("name", ["oxford24", "plug_in_gait", "ue_adl"])
+ALL = ["oxford24", "plug_in_gait", "ue_adl", "halpe26", "body25", "opencap"]
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_left_markers_mirror_the_right(name):
     by_label = {m.label: m for m in MarkerSet.load(name).markers}
+    assert any(label[0] in "Rr" for label in by_label)
     for label, marker in by_label.items():
-        if label.startswith("R") and "L" + label[1:] in by_label:
+        if label[0] in "Rr" and "L" + label[1:] in by_label:
             twin = by_label["L" + label[1:]]
             assert twin.link == marker.link.replace("right", "left")
             mirrored = np.array(marker.position) * [1, 1, -1]
@@ -67,7 +79,7 @@ def test_picking_sorts_and_leaves_gaps_for_missing_markers():
     assert np.isnan(picked[:, 2:]).all()
 
 
-@pytest.mark.parametrize("name", ["oxford24", "plug_in_gait", "ue_adl"])
+@pytest.mark.parametrize("name", ALL)
 def test_written_sets_read_back(name, tmp_path):
     markers = MarkerSet.load(name)
     markers.write(tmp_path / "worn.toml")
@@ -106,5 +118,5 @@ def test_damaged_sets_are_refused_with_a_sentence(text, said, tmp_path):
 
 
 def test_an_unknown_name_lists_the_known_ones():
-    with pytest.raises(FileError, match="oxford24, plug_in_gait, ue_adl"):
+    with pytest.raises(FileError, match="halpe26, opencap, oxford24, plug_in_gait"):
         MarkerSet.load("helen_hayes")

@@ -136,3 +136,134 @@ def test_an_unknown_task_is_refused():
     robot = Robot(Skeleton.load().urdf, "right_knuckle")
     with pytest.raises(InvalidInput, match="task must be"):
         robot.jacobian(np.zeros(9), task="tool")
+
+
+def planar(*mimics):
+    """URDF of four links of 1 m in a plane; `mimics` are elements by joint."""
+    links = "".join(f'<link name="l{k}"/>' for k in range(6))
+    joints = "".join(
+        f'<joint name="j{k}" type="revolute"><parent link="l{k}"/>'
+        f'<child link="l{k + 1}"/><origin xyz="{min(k, 1)} 0 0"/><axis xyz="0 0 1"/>'
+        '<limit lower="-4" upper="4" effort="1" velocity="1"/>'
+        f"{dict(mimics).get(k, '')}</joint>"
+        for k in range(4)
+    )
+    tip = (
+        '<joint name="tip" type="fixed"><parent link="l4"/><child link="l5"/>'
+        '<origin xyz="1 0 0"/></joint>'
+    )
+    return f'<robot name="planar">{links}{joints}{tip}</robot>'
+
+
+def planar_tip(angles):
+    """Where four links of 1 m end, by the cosines and sines of their directions."""
+    along = np.cumsum(angles, axis=-1)
+    return np.stack([np.cos(along).sum(-1), np.sin(along).sum(-1)], axis=-1)
+
+
+def test_a_joint_that_mimics_another_is_no_freedom():
+    # In a row: joint 3 follows 2, which follows 0.
+    robot = Robot(
+        planar(
+            (2, '<mimic joint="j0" multiplier="-0.5" offset="0.2"/>'),
+            (3, '<mimic joint="j2" multiplier="2"/>'),
+        ),
+        "l5",
+    )
+    assert robot.joint_names == ("j0", "j1")
+    q = np.random.default_rng(0).uniform(-1, 1, (20, 2))
+
+    def tip(q):
+        follower = 0.2 - 0.5 * q[:, 0]
+        return planar_tip(np.stack([q[:, 0], q[:, 1], follower, 2 * follower], axis=1))
+
+    np.testing.assert_allclose(robot.pose(q)[0][:, :2], tip(q), atol=1e-14)
+    step = 1e-6
+    numeric = np.stack(
+        [
+            (tip(q + step * unit) - tip(q - step * unit)) / (2 * step)
+            for unit in np.eye(2)
+        ],
+        axis=2,
+    )
+    # Central differences: rounding 1e-16 over the step, its square below that.
+    np.testing.assert_allclose(robot.jacobian(q)[:, :2], numeric, atol=1e-9)
+    # Two freedoms for a place in the plane leave none.
+    assert robot.null_spaces(q[0], task="position")[0].shape == (0, 2)
+    assert Robot(planar(), "l5").null_spaces(np.ones(4), task="position")[0].shape == (
+        2,
+        4,
+    )
+
+
+def test_a_full_turn_of_a_leader_must_be_one_of_its_followers():
+    half = Robot(planar((2, '<mimic joint="j0" multiplier="0.5"/>')), "l5")
+    assert half.endless.tolist() == [False, True, True]
+    # From -4 to 4 rad it is more than a turn.
+    assert Robot(planar(), "l5").endless.all()
+
+
+def test_a_joint_beside_the_way_leads_one_on_it():
+    urdf = planar((1, '<mimic joint="side"/>')).replace(
+        "</robot>",
+        '<link name="branch"/><joint name="side" type="prismatic"><parent link="l0"/>'
+        '<child link="branch"/><limit lower="0" upper="1" effort="1" velocity="1"/>'
+        "</joint></robot>",
+    )
+    robot = Robot(urdf, "l5")
+    assert robot.joint_names == ("j0", "side", "j2", "j3")
+    q = np.array([0.1, 0.2, 0.3, 0.4])
+    np.testing.assert_allclose(robot.pose(q)[0][:2], planar_tip(q), atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("mimics", "says"),
+    [
+        ([(1, '<mimic joint="none"/>')], "'j1' to mimic a revolute .* found 'none'"),
+        ([(1, '<mimic joint="tip"/>')], "'j1' to mimic a revolute .* found 'tip'"),
+        ([(1, '<mimic joint="j1"/>')], "a loop at the joint 'j1'"),
+        (
+            [(1, '<mimic joint="j2"/>'), (2, '<mimic joint="j1"/>')],
+            "a loop at the joint",
+        ),
+        ([(1, '<mimic joint="j0" multiplier="two"/>')], "multiplier of the mimic"),
+        ([(1, '<mimic joint="j0" offset="nan"/>')], "offset of the mimic"),
+    ],
+)
+def test_a_mimic_joint_that_follows_nothing_is_refused(mimics, says):
+    with pytest.raises(FileError, match=says):
+        Robot(planar(*mimics), "l5")
+
+
+def test_a_chain_may_start_at_a_link():
+    loader = robots_loader.PandaLoader()
+    frame, base = ARMS["PandaLoader"], "panda_link2"
+    whole = Robot.load(loader.df_path, frame)
+    arm = Robot.load(loader.df_path, frame, base=base)
+    assert arm.joint_names == whole.joint_names[-len(arm.joint_names) :]
+    q = np.random.default_rng(0).uniform(-1, 1, len(whole.joint_names))
+    model = loader.robot.model
+    data, full = model.createData(), pin.neutral(model)
+    for name, value in zip(whole.joint_names, q, strict=True):
+        full[model.joints[model.getJointId(name)].idx_q] = value
+    pin.framesForwardKinematics(model, data, full)
+    expected = data.oMf[model.getFrameId(base)].actInv(
+        data.oMf[model.getFrameId(frame)]
+    )
+    position, rotation = arm.pose(q[-len(arm.joint_names) :])
+    # As above, with one product more.
+    np.testing.assert_allclose(position, expected.translation, atol=1e-13)
+    np.testing.assert_allclose(rotation, expected.rotation, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("base", "says"),
+    [
+        ("l9", "has no link 'l9' to start from, but l0"),
+        ("l5", "from the base to 'l1'|has no link 'l1' on 'l5'"),
+        ("l1", "from the base to 'l1', found none"),
+    ],
+)
+def test_a_chain_that_does_not_lead_to_the_frame_is_refused(base, says):
+    with pytest.raises(InvalidInput, match=says):
+        Robot(planar(), "l1", base=base)

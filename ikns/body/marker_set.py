@@ -67,16 +67,20 @@ class MarkerSet:
     source: str = ""
 
     @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of the sets that come with the package."""
+        return tuple(sorted(p.stem for p in (urdf_folder() / "markers").glob("*.toml")))
+
+    @classmethod
     def load(cls, name_or_path: str | Path) -> MarkerSet:
         """Read a marker set by its name (``oxford24``) or from a TOML file."""
         path = Path(name_or_path)
         if path.suffix != ".toml":
             path = urdf_folder() / "markers" / f"{name_or_path}.toml"
             if not path.is_file():
-                known = sorted(p.stem for p in path.parent.glob("*.toml"))
                 raise FileError(
                     f"there is no marker set '{name_or_path}'; known are "
-                    f"{', '.join(known)}, or the path of a .toml file."
+                    f"{', '.join(cls.names())}, or the path of a .toml file."
                 )
         try:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -99,8 +103,8 @@ class MarkerSet:
                 f"placement_sd_mm; found a fault at {error}."
             ) from None
 
-    def write(self, path: str | Path) -> None:
-        """Write the set as a TOML file that :meth:`load` reads back."""
+    def toml(self) -> str:
+        """Return the text of a TOML file that :meth:`load` reads back."""
         import tomli_w
 
         table = {
@@ -110,7 +114,11 @@ class MarkerSet:
             "held": list(self.held),
             "markers": {m.label: _write_marker(m) for m in self.markers},
         }
-        Path(path).write_text(tomli_w.dumps(table), encoding="utf-8")
+        return tomli_w.dumps(table)
+
+    def write(self, path: str | Path) -> None:
+        """Write the set as a TOML file that :meth:`load` reads back."""
+        Path(path).write_text(self.toml(), encoding="utf-8")
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from ikns.calibration.report import (
     points_report,
     static_report,
 )
+from ikns.calibration.scaled_body import scaled_body
 from ikns.calibration.scaling import ScalingReport, scale
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData, naming
@@ -33,7 +34,7 @@ _SHOWN = 3000
 
 
 def calibrate(
-    static: Recording,
+    static: Recording | None,
     explorations: Sequence[Recording],
     *,
     generic: Skeleton | None = None,
@@ -54,8 +55,9 @@ def calibrate(
 
     Parameters
     ----------
-    static : Recording
-        The person standing or sitting still.
+    static : Recording, optional
+        The person standing or sitting still. Without one, `generic` is taken for the
+        person's body, with the spread of people of one stature.
     explorations : sequence of Recording
         The hand held at the PCA points while the arm moves freely.
     generic : Skeleton, optional
@@ -110,10 +112,17 @@ def calibrate(
         raise InvalidInput(f"expected min_still of at least 0 s, found {min_still:g}.")
     names = ", ".join(recording.source for recording in explorations)
     body = Skeleton.load() if generic is None else generic
-    with naming(static.source):
-        skeleton, scaling = scale(
-            body, static, marker_set=marker_set, min_duration=min_static
-        )
+    if static is None:
+        if generic is None:
+            raise InvalidInput(
+                "expected a static trial, or a body from stature, mass and sex."
+            )
+        skeleton, scaling = scaled_body(body, explorations, marker_set=marker_set)
+    else:
+        with naming(static.source):
+            skeleton, scaling = scale(
+                body, static, marker_set=marker_set, min_duration=min_static
+            )
     solver = MarkerIK(skeleton)
     motions = tuple(
         solver.track(
@@ -170,7 +179,11 @@ def calibrate(
         "points": points_report(learned, rate=explorations[0].rate),
         "extrinsic": extrinsic_report(skeleton, pairs, chain),
         "warnings": [
-            *_left_out(static, scaling, marker_set, explorations),
+            *(
+                [_assumed(scaling)]
+                if static is None
+                else _left_out(static, scaling, marker_set, explorations)
+            ),
             *(
                 f"{recording.source}: {fault}"
                 for recording in explorations
@@ -182,6 +195,16 @@ def calibrate(
     step = len(x) // _SHOWN + 1
     shown = np.column_stack([x, learned.labels_ + 1.0])[::step]
     return Subject(skeleton, learned, chain, report, motions, shown)
+
+
+def _assumed(scaling: ScalingReport) -> str:
+    """Say what is not known without a static trial."""
+    arm = [sd for name, sd in scaling.length_sd.items() if name.endswith("arm")]
+    return (
+        "no static trial: segments have the lengths of an average person of this "
+        f"stature, and people differ from that by {1000 * min(arm):.0f} to "
+        f"{1000 * max(arm):.0f} mm (standard deviation of an arm's segments)."
+    )
 
 
 def _left_out(

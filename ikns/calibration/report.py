@@ -22,10 +22,10 @@ from ikns.recording.recording import Recording
 _MOST_CHANGE = 0.02
 
 
-def static_report(static: Recording, scaling: ScalingReport) -> dict[str, Any]:
-    """Results of the static trial."""
+def static_report(static: Recording | None, scaling: ScalingReport) -> dict[str, Any]:
+    """Results of the static trial; without one, what is assumed of the body."""
     return {
-        "source": static.source,
+        "source": None if static is None else static.source,
         "duration_s": scaling.duration,
         "converged": bool(scaling.converged),
         "lengths_m": scaling.lengths,

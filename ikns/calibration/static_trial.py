@@ -44,7 +44,8 @@ def static_posture(
             f"{min_duration:g} s, found {duration:.2f} s."
         )
     target = _mean_posture(static, worn)
-    worn = replace(worn, held=worn.held + _absent_joints(static, worn, target))
+    absent = absent_joints(static.source, worn, seen_markers(target))
+    worn = replace(worn, held=worn.held + absent)
     return generic.with_nominal_markers(worn), target, duration
 
 
@@ -79,11 +80,11 @@ def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
     return mean
 
 
-def _absent_joints(
-    static: Recording, worn: MarkerSet, target: Array
-) -> tuple[str, ...]:
-    """Joints of an arm without any marker; one segment without markers is an error."""
-    seen = seen_markers(target)
+def absent_joints(source: str, worn: MarkerSet, seen: Mask) -> tuple[str, ...]:
+    """Joints of an arm without any marker; one segment without markers is an error.
+
+    `seen` (M,) says which markers of the set the recordings of this `source` show.
+    """
     links = {m.link for m in worn.markers}
     shown = {m.link for m, s in zip(worn.markers, seen, strict=True) if s}
     absent: tuple[str, ...] = ()
@@ -96,7 +97,7 @@ def _absent_joints(
     if bare:
         wanted = [m.label for m in worn.markers if m.link == bare[0]]
         raise MarkerMismatch(
-            f"{static.source}: the segment {bare[0]} has no marker; expected at least "
+            f"{source}: the segment {bare[0]} has no marker; expected at least "
             f"one of {', '.join(wanted)} of {worn.name}."
         )
     return tuple(joint for joint in absent if joint not in worn.held)

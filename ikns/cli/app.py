@@ -18,6 +18,7 @@ from ikns.cli.compare import compare
 from ikns.cli.control import control
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
+from ikns.cli.markers import markers_app
 from ikns.cli.pick import pick
 from ikns.cli.replay import replay
 from ikns.cli.robot import robot
@@ -59,6 +60,7 @@ for command in (
 ):
     app.command()(checked(command))
 app.add_typer(study_app, name="study")
+app.add_typer(markers_app, name="markers")
 
 
 def _version(wanted: bool) -> None:

@@ -15,10 +15,13 @@ import typer
 import ikns
 from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import AsJson, Force, MarkerSetName
-from ikns.cli.output import notes, progress, show, table
+from ikns.cli.output import held_sentences, notes, progress, show, table
+from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
+#: Options of files only.
+_FILES_ONLY = ("static", "exploration", "rename", "labels", "cutoff")
 #: Options of a live calibration only.
 _LIVE_ONLY = (
     "source",
@@ -32,8 +35,10 @@ _LIVE_ONLY = (
 )
 
 
+@reads_markers
 def calibrate(
     context: typer.Context,
+    read: Read,
     out: Annotated[Path, typer.Option(help="Subject folder to write.")],
     static: Annotated[
         Path | None, typer.Option(help="Recording of the person standing still.")
@@ -68,7 +73,10 @@ def calibrate(
     clavicle: Annotated[
         bool, typer.Option("--clavicle", help="Include the clavicle in the chain.")
     ] = False,
-    stature: Annotated[float | None, typer.Option(help="Standing height, m.")] = None,
+    stature: Annotated[
+        float | None,
+        typer.Option(help="Standing height, m; with --mass and --sex for --static."),
+    ] = None,
     mass: Annotated[float | None, typer.Option(help="Body mass, kg.")] = None,
     sex: Annotated[str | None, typer.Option(help="'female' or 'male'.")] = None,
     points: Annotated[int, typer.Option(help="PCA points.", min=1, max=1000)] = 10,
@@ -166,12 +174,11 @@ def calibrate(
             min_static=min_static,
             min_still=min_still,
         )
-    assert static is not None
     assert exploration is not None
     with progress() as report:
         subject = ikns.calibrate(
-            ikns.read(static),
-            [ikns.read(path) for path in exploration],
+            None if static is None else read(static),
+            [read(path) for path in exploration],
             generic=generic,
             marker_set=marker_set,
             chain=chain,
@@ -203,11 +210,11 @@ def _check_input(context: typer.Context, *, live: bool) -> None:
         if (origin := context.get_parameter_source(name)) and origin.name != "DEFAULT"
     }
     if live:
-        files = [f"--{name}" for name in ("static", "exploration") if name in given]
+        files = [f"--{name}" for name in _FILES_ONLY if name in given]
         if files:
             raise InvalidInput(
-                f"--live records what {' and '.join(files)} would name; give one or "
-                "the other."
+                f"{' and '.join(files)} {'goes' if len(files) == 1 else 'go'} with "
+                "recordings from files, and --live records them; give one or the other."
             )
         if "source" not in given:
             raise InvalidInput("--live needs the --source of the markers.")
@@ -215,7 +222,9 @@ def _check_input(context: typer.Context, *, live: bool) -> None:
     alone = [f"--{n.replace('_', '-')}" for n in _LIVE_ONLY if n in given]
     if alone:
         raise InvalidInput(f"{' and '.join(alone)} needs --live.")
-    missing = [f"--{n}" for n in ("static", "exploration") if n not in given]
+    missing = [] if "exploration" in given else ["--exploration"]
+    if not given & {"static", "stature"}:
+        missing.insert(0, "--static (or --stature, --mass and --sex)")
     if missing:
         raise InvalidInput(
             f"expected {' and '.join(missing)}, or --live with a --source."
@@ -230,7 +239,8 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
     moved = sorted(seen, key=lambda item: -item[1])[:2]
     return [
         table(
-            "Segments, joint to joint",
+            "Segments, joint to joint"
+            + ", assumed from stature" * (static["source"] is None),
             {"segment": "s", "length mm": ".1f", "sd mm": ".1f"},
             [
                 [name, 1000 * length, 1000 * static["length_sd_m"][name]]
@@ -276,6 +286,7 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
         + "; most of all joints " * bool(moved)
         + " and ".join(f"{name} {angle:.0f} deg" for name, angle in moved)
         + ".",
+        *held_sentences(static["held"]),
         *notes(report["warnings"]),
     ]
 

@@ -23,6 +23,7 @@ from ikns.cli.comparison_tables import (
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
+from ikns.cli.reading import Read, reads_markers
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
@@ -31,7 +32,9 @@ if TYPE_CHECKING:
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
 
+@reads_markers
 def compare(
+    read: Read,
     recording: RecordingFile,
     subject: SubjectFolder,
     task: Annotated[
@@ -84,9 +87,7 @@ def compare(
     with progress() as report:
         solver = ikns.MarkerIK(calibrated.skeleton)
         tracked = [
-            solver.track(
-                ikns.read(path), chain=own, progress=partial(report, path.name)
-            )
+            solver.track(read(path), chain=own, progress=partial(report, path.name))
             for path in (recording, reaches)
             if path is not None
         ]

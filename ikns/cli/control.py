@@ -11,10 +11,13 @@ import typer
 import ikns
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
 from ikns.cli.output import progress, show, table
+from ikns.cli.reading import Read, reads_markers
 from ikns.output.file import refuse_overwriting, write_csv
 
 
+@reads_markers
 def control(
+    read: Read,
     recording: RecordingFile,
     subject: SubjectFolder,
     out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("control.csv"),
@@ -36,7 +39,7 @@ def control(
 
     refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
-    frames = ikns.read(recording)
+    frames = read(recording)
     with progress() as report:
         motion = ikns.MarkerIK(calibrated.skeleton).track(
             frames, chain=calibrated.chain, progress=partial(report, recording.name)

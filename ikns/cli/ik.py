@@ -11,11 +11,14 @@ import typer
 import ikns
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
 from ikns.cli.output import progress, show, table
+from ikns.cli.reading import Read, reads_markers
 from ikns.errors import naming
 from ikns.output.file import refuse_overwriting, write_csv
 
 
+@reads_markers
 def ik(
+    read: Read,
     recording: RecordingFile,
     subject: SubjectFolder,
     out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("motion.csv"),
@@ -31,7 +34,7 @@ def ik(
 
     refuse_overwriting(out, force=force, inputs=[recording, subject])
     skeleton = ikns.Subject.load(subject).skeleton
-    frames = ikns.read(recording)
+    frames = read(recording)
     with progress() as report, naming(frames.source):
         motion = ikns.MarkerIK(skeleton).track(
             frames, progress=lambda done, total: report("joint angles", done, total)

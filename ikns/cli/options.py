@@ -21,5 +21,8 @@ RecordingFile = Annotated[
 ]
 MarkerSetName = Annotated[
     str,
-    typer.Option(help="oxford24, plug_in_gait, ue_adl, or the path of a .toml file."),
+    typer.Option(
+        help="A name that `ikns markers list` shows, such as plug_in_gait, or the path "
+        "of a .toml file."
+    ),
 ]

@@ -87,6 +87,20 @@ def notes(sentences: Iterable[str]) -> list[str]:
     return [f"Note: {sentence}" for sentence in sentences]
 
 
+def held_sentences(joints: Sequence[str]) -> list[str]:
+    """Say which joints stay where they are; one name for both sides.
+
+    >>> held_sentences(["right_wrist_flexion", "left_wrist_flexion", "right_elbow"])
+    ['Held, as no marker shows them: wrist_flexion, right_elbow.']
+    """
+    said: dict[str, None] = {}
+    for joint in joints:
+        side, _, name = joint.partition("_")
+        other = {"right": "left", "left": "right"}.get(side)
+        said[name if f"{other}_{name}" in joints else joint] = None
+    return [f"Held, as no marker shows them: {', '.join(said)}."] if said else []
+
+
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
     """Show bars on stderr if it is a terminal; call with (step, done, total)."""

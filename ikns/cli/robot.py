@@ -31,9 +31,20 @@ def robot(
         ),
     ],
     frame: Annotated[str, typer.Option(help="Link that does the task.")],
+    start: Annotated[
+        str | None,
+        typer.Option(
+            "--from", help="Link where the chain starts, such as a torso [the root]."
+        ),
+    ] = None,
     task: Annotated[
-        Literal["both", "pose", "position"], typer.Option(help="What was held.")
+        Literal["both", "pose", "position"],
+        typer.Option(help="What was held; both as far as the joints leave freedom."),
     ] = "both",
+    up: Annotated[
+        Literal["x", "y", "z"],
+        typer.Option(help="Axis of the first link that points up."),
+    ] = "z",
     points: Annotated[int, typer.Option(help="PCA points.", min=1, max=1000)] = 10,
     radius: Annotated[
         float | None,
@@ -62,22 +73,23 @@ def robot(
     """Learn directions from a robot's joint angles and compare them with its Jacobian.
 
     The robot holds its frame at several places and moves in its null space, as a person
-    does in the calibration.
+    does in the calibration. Angles of joints that turn for ever may jump by full turns;
+    joints that mimic others follow them and need no column.
     """
-    from ikns.analysis.compare import compare_robot
+    from ikns.analysis.compare import compare_robot, free_tasks
     from ikns.nullspace.map import MapWarning, robot_null_space_samples
     from ikns.recording.files.joint_angles import read_joint_angles
 
     refuse_picture(figure, force=force, inputs=[urdf, angles])
-    arm = ikns.Robot.load(urdf, frame)
+    arm = ikns.Robot.load(urdf, frame, base=start)
     time, q = read_joint_angles(angles, arm.joint_names)
     with naming(str(angles)), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
         held = robot_null_space_samples(arm, time, q, max_hand_speed=speed)
-        learned = ikns.NullSpaceMap(n_points=points, radius=radius).fit(*held)
-        tasks: tuple[Literal["pose", "position"], ...] = (
-            ("pose", "position") if task == "both" else (task,)
-        )
+        tasks = free_tasks(arm, held[1]) if task == "both" else (task,)
+        learned = ikns.NullSpaceMap(
+            n_points=points, radius=radius, up=["xyz".index(up) == k for k in range(3)]
+        ).fit(*held)
         found = [
             compare_robot(
                 learned, arm, time, q, task=one, max_hand_speed=speed, seed=seed
@@ -85,6 +97,11 @@ def robot(
             for one in tasks
         ]
     warned = [str(warning.message) for warning in caught]
+    if task == "both" and "pose" not in tasks:
+        warned.append(
+            f"the {len(arm.joint_names)} joints leave no null space while position and "
+            "orientation are held, so that only the position is compared."
+        )
     if figure is not None:
         from ikns.view.comparison import comparison_figure
 
@@ -99,6 +116,7 @@ def robot(
             "robot": urdf,
             "angles": angles,
             "frame": frame,
+            "from": start,
             "joints": arm.joint_names,
             "simulated": simulated,
             "samples": len(time),

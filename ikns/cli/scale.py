@@ -21,11 +21,17 @@ def scale(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a URDF scaled from anthropometric tables."""
+    """Write a URDF scaled from anthropometric tables.
+
+    People of one stature differ from it by the standard deviations printed.
+    """
+    from ikns.calibration.scaled_body import length_sd_at_stature
+
     refuse_overwriting(out, force=force, inputs=[])
     skeleton = ikns.Skeleton.from_anthropometry(stature=stature, mass=mass, sex=sex)
     write_text(out, skeleton.urdf, force=force)
     lengths = skeleton.segment_lengths
+    spread = length_sd_at_stature(lengths)
     show(
         {
             "urdf": out,
@@ -33,11 +39,15 @@ def scale(
             "mass_kg": mass,
             "sex": sex,
             "segment_lengths_m": lengths,
+            "segment_length_sd_m": spread,
         },
         table(
             f"{stature:g} m, {mass:g} kg, {sex}",
-            {"segment": "s", "length mm": ".1f"},
-            [[name, 1000 * length] for name, length in lengths.items()],
+            {"segment": "s", "length mm": ".1f", "sd mm": ".1f"},
+            [
+                [name, 1000 * length, 1000 * spread[name]]
+                for name, length in lengths.items()
+            ],
         ),
         f"Wrote {out}",
         as_json=as_json,

@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-import ikns
 from ikns.cli.options import AsJson, RecordingFile
 from ikns.cli.output import show, table
+from ikns.cli.reading import Read, reads_markers
 
 if TYPE_CHECKING:
     from ikns.live.stream import LslOutlet
 
 
+@reads_markers
 def stream(
+    read: Read,
     recording: RecordingFile,
     name: Annotated[
         str | None, typer.Option(help="Name of the stream; the file's by default.")
@@ -56,7 +58,7 @@ def stream(
         raise InvalidInput(f"expected a speed above 0, found {speed:g}.")
     if seed < 0:
         raise InvalidInput(f"expected a seed of 0 or more, found {seed}.")
-    frames = ikns.read(recording)
+    frames = read(recording)
     if len(frames.time) < 2:
         raise InvalidInput(
             f"{recording}: expected two frames or more to have a rate, found "

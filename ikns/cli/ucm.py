@@ -12,11 +12,14 @@ import ikns
 from ikns.cli.options import AsJson, Force, SubjectFolder
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
+from ikns.cli.reading import Read, reads_markers
 from ikns.cli.ucm_designs import over_points, over_time
 from ikns.errors import InvalidInput
 
 
+@reads_markers
 def ucm(
+    read: Read,
     recordings: Annotated[
         list[Path],
         typer.Argument(
@@ -68,7 +71,7 @@ def ucm(
     with progress() as report:
         motions = [
             solver.track(
-                ikns.read(path),
+                read(path),
                 chain=calibrated.chain,
                 progress=partial(report, path.name),
             )

@@ -13,6 +13,7 @@ import typer
 import ikns
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import progress, show, table
+from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput
 from ikns.output.file import refuse_overwriting, write_bytes, write_text
 
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
     from ikns.view.scene import Scene
 
 
+@reads_markers
 def view(
+    read: Read,
     subject: Annotated[Path, typer.Argument(help="Folder that ikns calibrate wrote.")],
     recording: Annotated[
         Path | None,
@@ -61,7 +64,7 @@ def view(
     learned, row = person.null_space_map, None if point is None else point - 1
     simulated = is_simulated(person, subject, [] if recording is None else [recording])
     name = subject.resolve().name
-    frames = None if recording is None else ikns.read(recording)
+    frames = None if recording is None else read(recording)
 
     from ikns.view.scene import map_scene, recording_scene, scene_html, scene_picture
 

@@ -111,6 +111,11 @@ def chain_of(
             raise InvalidInput(
                 "volumes are known for skeletons only, found pairs of a robot's."
             )
+        if not np.array_equal(body.coupling, np.eye(len(body.joint_names))):
+            raise InvalidInput(
+                "expected joints that move one by one, found some of "
+                f"{', '.join(body.joint_names)} that others mimic."
+            )
         joint, way = body.end[0], list[int]()
         while joint > 0:
             way.insert(0, joint)

@@ -16,7 +16,7 @@ from ikns.analysis.compare.coordinates import (
     shoulder_coordinates,
 )
 from ikns.analysis.compare.from_motion import compare_motion, motion_crosstalk
-from ikns.analysis.compare.from_robot import compare_robot
+from ikns.analysis.compare.from_robot import compare_robot, free_tasks
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.maps import compare
 from ikns.analysis.compare.reaching import Crosstalk, crosstalk, find_reaches
@@ -39,6 +39,7 @@ __all__ = [
     "compare_visited",
     "crosstalk",
     "find_reaches",
+    "free_tasks",
     "learned_directions",
     "motion_crosstalk",
     "shoulder_coordinates",

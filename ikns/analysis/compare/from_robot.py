@@ -16,7 +16,8 @@ from ikns.analysis.compare.map_samples import (
 from ikns.analysis.compare.samples import NullSpaceComparison
 from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput
-from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.map import NullSpaceMap, held_angles, held_frame
+from ikns.numerics.turns import nearest_turn
 
 
 def compare_robot(
@@ -39,7 +40,7 @@ def compare_robot(
     time : (T,) array
         s, increasing.
     q : (T, n) array
-        Joint angles, rad.
+        Joint angles, rad; a full turn more or less is the same posture.
     max_hand_speed : float
         Gate on the frame's speed, m/s.
     """
@@ -50,11 +51,18 @@ def compare_robot(
             f"expected joint angles (T, {n}) and a map of {n} joints, found "
             f"{angles.shape} and {learned.directions_.shape[2]}."
         )
-    x, R = robot.pose(angles)
-    speed = np.linalg.norm(np.gradient(x, t, axis=0), axis=1)
-    still = np.flatnonzero(np.isfinite(x).all(axis=1) & (speed < max_hand_speed))
+    x, held = held_frame(robot, t, angles, max_hand_speed=max_hand_speed)
+    R = robot.pose(angles)[1]
+    angles = held_angles(robot, angles, held)
+    still = np.flatnonzero(held)
     labels, points = visited_points(learned, x[still], n, max_hand_speed=max_hand_speed)
     used = still[labels >= 0]
+    means: Any = getattr(learned, "cluster_means_", None)
+    for k, point in enumerate(points if means is not None else ()):
+        # The same turn as in the recording that the map was learned from.
+        rows = np.ix_(still[labels == k], np.flatnonzero(robot.endless))
+        mean = angles[rows].mean(axis=0)
+        angles[rows] += nearest_turn(mean, means[point, robot.endless]) - mean
 
     def jacobian(q: Any) -> Any:
         return robot.jacobian(q, task=task)
@@ -74,3 +82,25 @@ def compare_robot(
     return compare_map_samples(
         samples, points, variance=learned.variance, options=options
     )
+
+
+def free_tasks(robot: Robot, q: ArrayLike) -> tuple[Literal["pose", "position"], ...]:
+    """Tasks of a robot that leave a null space at joint positions (T, n), rad or m.
+
+    Redundant in the pose, a robot is so in the position too.
+
+    Raises
+    ------
+    InvalidInput
+        When there is none.
+    """
+    n = len(robot.joint_names)
+    tasks: tuple[Literal["pose", "position"], ...] = ("pose", "position")
+    found = tuple(t for t in tasks if robot.null_spaces(q, task=t)[1].max() < n)
+    if not found:
+        raise InvalidInput(
+            f"expected joints that can move while '{robot.frame}' is held, but the {n} "
+            f"joints from the base to it ({', '.join(robot.joint_names)}) leave no "
+            "null space, not even of its position."
+        )
+    return found

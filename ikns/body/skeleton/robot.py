@@ -6,27 +6,26 @@ arm can take the place of a person's.
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from ikns._kernels.body.tree import Tree
-from ikns.arrays import Array, Indices
+from ikns._kernels.body.tree import REVOLUTE, Tree
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.skeleton.frames import LinkFrames
 from ikns.body.skeleton.model import build_model, read_urdf
-from ikns.body.skeleton.urdf import parse_urdf
+from ikns.body.skeleton.robot_urdf import Mimic, prepared, some
 from ikns.errors import InvalidInput, naming
 from ikns.numerics.subspace import null_spaces
-
-#: How many of a robot's links an error names.
-_NAMED = 12
 
 
 class Robot:
     """The kinematics of a robot from its base to one of its links.
+
+    A joint that mimics another is no freedom of its own: it moves with the one that
+    leads it, which is a joint of the robot even where it lies beside the way.
 
     Parameters
     ----------
@@ -34,6 +33,9 @@ class Robot:
         URDF text. Meshes it names are not opened.
     frame : str
         The link that does the task.
+    base : str, optional
+        The link where the chain starts, such as a torso; poses are seen from it.
+        Default: the root of the URDF.
 
     Attributes
     ----------
@@ -43,14 +45,21 @@ class Robot:
         out.
     lower, upper : (n,) array
         Limits, rad (m for prismatic joints); infinite for continuous joints.
+    revolute : (n,) boolean array
+        Whether a joint's position is an angle that means the same a full turn later.
+    endless : (n,) boolean array
+        Which of these can make a full turn.
+    coupling : (p, n) array
+        Positions of the p joints on the way are ``coupling @ q`` and the offsets of
+        those that mimic others; the identity where none does.
 
     Raises
     ------
     FileError
         When the text is not a URDF.
     InvalidInput
-        When it has no such link, or no joint moves it, or one that does is neither
-        revolute nor prismatic.
+        When it has no such link, or the base is not on the way to it, or no joint moves
+        it, or one that does is neither revolute nor prismatic.
 
     Examples
     --------
@@ -64,42 +73,57 @@ class Robot:
     array([0., 2., 0.])
     """
 
-    def __init__(self, urdf: str, frame: str) -> None:
-        text, continuous, refused = _with_one_angle_a_joint(urdf)
-        model = build_model(text)
+    def __init__(self, urdf: str, frame: str, *, base: str | None = None) -> None:
+        text = prepared(urdf, base=base)
+        model = build_model(text.urdf)
         links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
         if frame not in links:
-            more = ", ..." if len(links) > _NAMED else ""
+            start = "" if base is None else f" on '{base}'"
             raise InvalidInput(
-                f"the robot '{model.name}' has no link '{frame}', but "
-                f"{', '.join(links[:_NAMED])}{more}."
+                f"the robot '{model.name}' has no link '{frame}'{start}, but "
+                f"{some(links)}."
             )
         self.frame = frame
         self._frames = LinkFrames(model)
         carrier, rotation, translation = self._frames.in_tree(frame)
         self.end: tuple[int, Array, Array] = (carrier, rotation, translation)
-        moving = self._frames.joints_to(carrier)
-        self.joint_names: tuple[str, ...] = tuple(model.names[j + 1] for j in moving)
-        unfit = [name for name in self.joint_names if name in refused]
-        if unfit or not moving:
+        names = [model.names[j + 1] for j in self._frames.joints_to(carrier)]
+        leading = [text.mimics.get(name, Mimic(name, 1.0, 0.0)) for name in names]
+        self.joint_names: tuple[str, ...] = tuple(
+            dict.fromkeys(mimic.leader for mimic in leading)
+        )
+        unfit = [n for n in (*names, *self.joint_names) if n in text.refused]
+        if unfit or not names:
             found = f"joint '{unfit[0]}'" if unfit else "none"
             raise InvalidInput(
                 f"expected revolute or prismatic joints from the base to '{frame}', "
                 f"found {found}."
             )
-        columns = np.array([model.joints[j + 1].idx_q for j in moving])
-        free = np.isin(self.joint_names, list(continuous))
+        self.coupling: Array = np.zeros((len(names), len(self.joint_names)))
+        for row, mimic in zip(self.coupling, leading, strict=True):
+            row[self.joint_names.index(mimic.leader)] = mimic.factor
+        self._offsets = np.array([mimic.offset for mimic in leading])
+        self._way, self._alone = tuple(names), not set(names) & set(text.mimics)
+        self._places = np.array([self._frames.joint_names.index(n) for n in names])
+        ids = [model.getJointId(name) for name in self.joint_names]
+        columns = np.array([model.joints[j].idx_q for j in ids])
+        free = np.isin(self.joint_names, list(text.continuous))
         self.lower: Array = np.where(free, -np.inf, model.lowerPositionLimit[columns])
         self.upper: Array = np.where(free, np.inf, model.upperPositionLimit[columns])
-        self._places = np.array(
-            [self._frames.joint_names.index(name) for name in self.joint_names]
-        )
+        kinds = self.tree.kind[
+            [model.getJointId(name) - 1 for name in self.joint_names]
+        ]
+        # A full turn of a leader must be full turns of all that follow it.
+        whole = (self.coupling == self.coupling.round()).all(axis=0)
+        self.revolute: Mask = np.asarray((kinds == REVOLUTE) & whole)
+        turn = 2 * np.pi * (1 - 1e-3)  # URDF files round pi
+        self.endless: Mask = self.revolute & (self.upper - self.lower >= turn)
 
     @classmethod
-    def load(cls, path: str | Path, frame: str) -> Robot:
+    def load(cls, path: str | Path, frame: str, *, base: str | None = None) -> Robot:
         """Read a URDF file; `frame` is the link that does the task."""
         with naming(str(path)):
-            return cls(read_urdf(Path(path)), frame)
+            return cls(read_urdf(Path(path)), frame, base=base)
 
     @property
     def tree(self) -> Tree:
@@ -124,9 +148,10 @@ class Robot:
         task : {"pose", "position"}
             Rows: linear velocity (m/rad), and for ``"pose"`` angular velocity below.
         """
-        return self._frames.jacobian_of(
-            self._all(q), (self.frame,), self.joint_names, task
+        on_the_way = self._frames.jacobian_of(
+            self._all(q), (self.frame,), self._way, task
         )
+        return on_the_way if self._alone else on_the_way @ self.coupling
 
     def null_spaces(
         self, q: ArrayLike, *, task: str = "pose", rtol: float = 1e-9
@@ -152,31 +177,6 @@ class Robot:
                 f"found an array {given.shape}."
             )
         every = np.zeros((*given.shape[:-1], len(self._frames.joint_names)))
-        every[..., self._places] = given
+        on_the_way = given if self._alone else given @ self.coupling.T + self._offsets
+        every[..., self._places] = on_the_way
         return every
-
-
-def _with_one_angle_a_joint(urdf: str) -> tuple[str, set[str], set[str]]:
-    """Text whose joints all have one position, and which were continuous or refused.
-
-    Pinocchio stores a continuous joint as cosine and sine; here it is an angle. A
-    floating or planar joint becomes revolute, and is refused where it moves the frame.
-    """
-    robot = parse_urdf(urdf)
-    for link in robot.findall("link"):
-        # Neither shapes nor masses change the kinematics.
-        link[:] = []
-    continuous, refused = set(), set()
-    for joint in robot.iter("joint"):
-        name, kind = joint.get("name", ""), joint.get("type")
-        if kind == "continuous":
-            continuous.add(name)
-        elif kind in ("floating", "planar"):
-            refused.add(name)
-        else:
-            continue
-        joint.set("type", "revolute")
-        for old in joint.findall("limit"):
-            joint.remove(old)
-        ET.SubElement(joint, "limit", lower="-1", upper="1", effort="1", velocity="1")
-    return ET.tostring(robot, encoding="unicode"), continuous, refused

@@ -93,6 +93,13 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
             )
         if self.radius is not None and not self.radius > 0:
             raise InvalidInput(f"expected a radius above 0 m, found {self.radius}.")
+        if self.up is not None:
+            up = np.asarray(self.up, dtype=np.float64)
+            if up.shape != x.shape[1:] or not (np.isfinite(up).all() and up.any()):
+                raise InvalidInput(
+                    f"expected an upward direction of {x.shape[1]} numbers, found "
+                    f"{up.tolist()}."
+                )
         if len(x) < self.n_clusters:
             raise NotEnoughData(
                 f"found n_samples={len(x)}, expected at least one for each of the "

@@ -8,6 +8,8 @@ from ikns.nullspace.map.analytic import analytic_map
 from ikns.nullspace.map.checks import MapWarning
 from ikns.nullspace.map.estimator import NullSpaceMap
 from ikns.nullspace.map.samples import (
+    held_angles,
+    held_frame,
     null_space_samples,
     robot_null_space_samples,
     still_mask,
@@ -17,6 +19,8 @@ __all__ = [
     "MapWarning",
     "NullSpaceMap",
     "analytic_map",
+    "held_angles",
+    "held_frame",
     "null_space_samples",
     "robot_null_space_samples",
     "still_mask",

@@ -83,6 +83,9 @@ class NullSpaceMap(EstimatorBase):
     min_samples : int, optional
         Points with fewer samples are left out, with a warning. Default: a tenth of an
         equal share, N / (10 n_points); half a second of 5 s at each point.
+    up : (3,) array, optional
+        Upward direction, for the ninth and the tenth point, which lie above and below
+        the others. Default: Y, as in the thorax frame; a robot's is mostly Z.
 
     Attributes
     ----------
@@ -136,6 +139,7 @@ class NullSpaceMap(EstimatorBase):
         reference: ArrayLike | None = None,
         interpolation: Interpolation = "natural",
         min_samples: int | None = None,
+        up: ArrayLike | None = None,
     ) -> None:
         self.n_points = n_points
         self.n_dof = n_dof
@@ -148,6 +152,7 @@ class NullSpaceMap(EstimatorBase):
         self.reference = reference
         self.interpolation = interpolation
         self.min_samples = min_samples
+        self.up = up
 
     def fit(
         self, X: ArrayLike, y: ArrayLike, *, velocity: ArrayLike | None = None
@@ -182,7 +187,7 @@ class NullSpaceMap(EstimatorBase):
         moves = q if centered else checked_velocities(velocity, q)
 
         found = BoundingBoxKMeans(
-            self.n_points, max_iter=self.max_iter, radius=self.radius
+            self.n_points, max_iter=self.max_iter, radius=self.radius, up=self.up
         ).fit(x)
         used = usable_points(found, settings.min_samples)
         centers = found.cluster_centers_[used]

@@ -9,6 +9,7 @@ from ikns.arrays import Array, Mask
 from ikns.body.skeleton import Robot
 from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
+from ikns.numerics.turns import nearest_turn, without_turns
 
 
 def still_mask(
@@ -130,7 +131,7 @@ def robot_null_space_samples(
     time : (T,) array
         s, increasing.
     q : (T, n) array
-        Joint positions, rad.
+        Joint positions, rad; a full turn more or less is the same posture.
     max_hand_speed : float
         A frame slower than this counts as held, m/s.
 
@@ -139,7 +140,7 @@ def robot_null_space_samples(
     x : (N, 3) array
         Positions of the frame in the base, m.
     q : (N, n) array
-        Joint vectors there, rad.
+        Joint vectors there, rad, without jumps of a full turn (:func:`held_angles`).
 
     Raises
     ------
@@ -147,12 +148,39 @@ def robot_null_space_samples(
         When the frame is never held.
     """
     angles = np.asarray(q, dtype=np.float64)
-    place, _ = robot.pose(angles)
-    velocity = np.gradient(place, np.asarray(time, dtype=np.float64), axis=0)
-    held = np.linalg.norm(velocity, axis=1) < max_hand_speed
+    place, held = held_frame(robot, time, angles, max_hand_speed=max_hand_speed)
     if not held.any():
         raise NotEnoughData(
             f"expected samples with '{robot.frame}' slower than {max_hand_speed:g} "
             "m/s, found none."
         )
-    return place[held], angles[held]
+    return place[held], held_angles(robot, angles, held)[held]
+
+
+def held_frame(
+    robot: Robot, time: ArrayLike, q: ArrayLike, *, max_hand_speed: float
+) -> tuple[Array, Mask]:
+    """Positions of a robot's frame (T, 3), m, and when it is held, (T,).
+
+    Arguments as :func:`robot_null_space_samples` takes them.
+    """
+    place, _ = robot.pose(q)
+    velocity = np.gradient(place, np.asarray(time, dtype=np.float64), axis=0)
+    return place, np.asarray(np.linalg.norm(velocity, axis=1) < max_hand_speed)
+
+
+def held_angles(robot: Robot, q: ArrayLike, held: Mask) -> Array:
+    """Joint positions (T, n) of a robot with one angle for one posture, rad or m.
+
+    An angle is known up to full turns only. A joint that cannot make one is brought
+    within its limits; any other is followed from row to row and, as a frame is `held`
+    again, brought back (:func:`ikns.numerics.turns.without_turns`).
+    """
+    angles = np.array(q, dtype=np.float64)
+    for j in np.flatnonzero(robot.revolute):
+        angles[:, j] = (
+            without_turns(angles[:, j], held)
+            if robot.endless[j]
+            else nearest_turn(angles[:, j], (robot.lower[j] + robot.upper[j]) / 2)
+        )
+    return angles

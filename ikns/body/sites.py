@@ -1,0 +1,162 @@
+"""Places on the body where markers sit, with the labels that they usually have.
+
+A table, ``sites.toml`` beside the URDF; what ``ikns markers new`` asks for.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from ikns.body.marker_set import Marker
+from ikns.body.model_file import urdf_folder
+from ikns.errors import InvalidInput
+
+#: Link of a side by the table's short name.
+_SIDED = ("clavicle", "upper_arm", "forearm", "hand")
+#: Letter that stands for a side before or behind a label: ``RELB``, ``r_lelbow``,
+#: ``ELB_R``.
+_LETTERS = {"r": "right", "l": "left"}
+
+
+@dataclass(frozen=True)
+class Site:
+    """A place on the body.
+
+    Without a position it is anywhere on the segment, and measured.
+    """
+
+    name: str
+    about: str
+    link: str
+    position: tuple[float, float, float] | None  # in the link's frame, m
+    placement_sd: tuple[float, float, float] | None  # m
+    labels: tuple[str, ...]  # usual ones, without a letter for the side
+    side: str  # "right", "left" or ""
+
+    def marker(self, label: str, *, static_only: bool) -> Marker:
+        """Return a marker here; the position must be known."""
+        assert self.position is not None
+        assert self.placement_sd is not None
+        return Marker(label, self.link, self.position, self.placement_sd, static_only)
+
+
+@cache
+def sites() -> Mapping[str, Site]:
+    """All places by name, those of the sides as ``right_...`` and ``left_...``."""
+    path = urdf_folder() / "sites.toml"
+    table = tomllib.loads(path.read_text(encoding="utf-8"))["sites"]
+    found = {}
+    for name, row in table.items():
+        for side in ("right", "left") if row.get("side") else ("",):
+            site = _site(f"{side}_{name}" if side else name, row, side)
+            found[site.name] = site
+    return found
+
+
+def _site(name: str, row: Mapping[str, Any], side: str) -> Site:
+    link = str(row["link"])
+    position = spread = None
+    if "position_mm" in row:
+        x, y, z = (float(value) / 1000 for value in row["position_mm"])
+        position = (x, y, 0.0 - z if side == "left" else z)
+        sd = row["placement_sd_mm"]
+        sx, sy, sz = (
+            float(value) / 1000 for value in (sd if isinstance(sd, list) else 3 * [sd])
+        )
+        spread = (sx, sy, sz)
+    return Site(
+        name,
+        f"{side} {row['about']}".strip(),
+        f"{side}_{link}" if side and link in _SIDED else link,
+        position,
+        spread,
+        tuple(row["labels"]),
+        side,
+    )
+
+
+def site(name: str) -> Site:
+    """Return a place by its name; an unknown one names those that are alike."""
+    key = re.sub(r"[\s-]+", "_", name.strip()).casefold()
+    known = sites()
+    if key not in known:
+        alike = difflib.get_close_matches(key, known, n=3, cutoff=0.4)
+        raise InvalidInput(
+            f"there is no place '{name.strip()}' on the body, but "
+            f"{', '.join(alike or list(known)[:3])} and others; see ikns markers sites."
+        )
+    return known[key]
+
+
+def usual_site(label: str, answered: Mapping[str, str] | None = None) -> Site | None:
+    """Return where a marker of this label usually sits; None where that is open.
+
+    `answered` are places by label: what was said of the same label on the other side
+    comes first.
+
+    >>> usual_site("Anna:RELB").name, usual_site("LUAR3").name, usual_site("XYZ")
+    ('right_lateral_epicondyle', 'left_upper_arm', None)
+    >>> usual_site("LKNOB", {"RKNOB": "right_knuckle_3"}).name
+    'left_knuckle_3'
+    """
+    bare = label.rpartition(":")[2].strip()
+    if twin := _mirrored(bare, answered or {}):
+        return twin
+    middle = [s for s in sites().values() if not s.side]
+    if found := _named(bare, middle):
+        return found
+    for side, rest in _readings(bare):
+        own = [s for s in sites().values() if s.side == side]
+        if found := _named(rest, own):
+            return found
+    return None
+
+
+def _named(label: str, among: Iterable[Site]) -> Site | None:
+    """Find the place of this label; with a number behind it, one of a cluster."""
+    stem = label.rstrip("0123456789").rstrip("_.- ")
+    for place in among:
+        known = {name.casefold() for name in place.labels}
+        if label.casefold() in known and (place.position or stem == label):
+            return place
+    for place in among:
+        known = {name.casefold() for name in place.labels}
+        if place.position is None and stem.casefold() in known:
+            return place
+    return None
+
+
+def _readings(label: str) -> list[tuple[str, str]]:
+    """Side and rest of a label, as it may be read."""
+    found = []
+    for pattern in (
+        r"(?P<side>[rl])[_. ]?(?P<rest>.+)",
+        r"(?P<rest>.+)[_.](?P<side>[rl])",
+    ):
+        if match := re.fullmatch(pattern, label, re.IGNORECASE):
+            found.append((_LETTERS[match["side"].casefold()], match["rest"]))
+    return found
+
+
+def _mirrored(label: str, answered: Mapping[str, str]) -> Site | None:
+    """Mirror what was said of this label on the other side."""
+    said = {
+        k.rpartition(":")[2].casefold(): name.partition(" ")[0]
+        for k, name in answered.items()
+    }
+    swap = {"r": "l", "l": "r"}
+    key = label.casefold()
+    for twin in (swap.get(key[:1], "") + key[1:], key[:-1] + swap.get(key[-1:], "")):
+        name = said.get(twin, "")
+        side, _, rest = name.partition("_")
+        other = {"right": "left", "left": "right"}.get(side)
+        if len(twin) == len(key) and twin != key:
+            if found := sites().get(f"{other}_{rest}"):
+                return found
+    return None

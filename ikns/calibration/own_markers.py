@@ -1,0 +1,221 @@
+"""A marker set of one's own, from one static trial and where each marker sits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ikns.arrays import Array
+from ikns.body.marker_set import Marker, MarkerSet
+from ikns.body.sites import Site, site
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.observed import with_unshown_held
+from ikns.calibration.size_fit import SizeFit, fit_sizes, size_factors
+from ikns.calibration.static_trial import static_posture
+from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.recording.recording import Recording
+
+#: How far markers of a cluster are put from where they were the first time, per axis,
+#: m: as `oxford24` has it, more along a limb.
+_CLUSTER_SD = (0.020, 0.040, 0.020)
+#: Digits of a written place, m: a tenth of a millimeter.
+_DIGITS = 4
+#: Words that say that a marker is worn in the static trial only, or not used.
+_STATIC, _SKIP = "static", "skip"
+
+
+@dataclass(frozen=True)
+class PlacedLabel:
+    """Where a label sits, as a person said."""
+
+    label: str
+    site: Site
+    static_only: bool
+
+
+@dataclass(frozen=True)
+class OwnMarkerSet:
+    """A new marker set, and what its static trial says of it."""
+
+    marker_set: MarkerSet
+    placed: tuple[PlacedLabel, ...]
+    skipped: tuple[str, ...]  # labels of the trial that the set leaves out
+    assumed: tuple[str, ...]  # segments whose markers are all measured: see below
+
+
+def read_answers(answers: Mapping[str, str]) -> tuple[PlacedLabel, ...]:
+    """Read where labels sit: the name of a place, ``static`` behind it, or ``skip``.
+
+    >>> read_answers({"RMEPI": "right medial epicondyle static"})[0].static_only
+    True
+    """
+    placed = []
+    for label, said in answers.items():
+        words = said.split()
+        if words == [_SKIP]:
+            continue
+        static_only = len(words) > 1 and words[-1] == _STATIC
+        try:
+            where = site(" ".join(words[:-1] if static_only else words))
+        except InvalidInput as error:
+            raise InvalidInput(f"{label}: {error}") from None
+        placed.append(PlacedLabel(label, where, static_only))
+    return tuple(placed)
+
+
+def own_marker_set(
+    generic: Skeleton,
+    static: Recording,
+    answers: Mapping[str, str],
+    *,
+    name: str,
+    min_duration: float = 1.0,
+) -> OwnMarkerSet:
+    """Make a marker set from a static trial.
+
+    Markers on landmarks keep the place that the landmark has on the generic body, and
+    so fit other people too. With them the body is scaled and its posture found; where
+    the other markers then are on their segments is measured. Joints that the set does
+    not show are held.
+
+    Parameters
+    ----------
+    generic : Skeleton
+        The generic adult, or the body of the person from stature, mass and sex.
+    static : Recording
+        The person standing still, every marker in sight.
+    answers : mapping
+        Place by label (:func:`read_answers`); other labels are left out.
+    name : str
+        Of the set.
+    min_duration : float
+        Shortest static trial to accept, s.
+
+    Returns
+    -------
+    OwnMarkerSet
+        A segment is `assumed` when none of its markers is a landmark: then its posture
+        in the static trial, which nothing shows, is taken to be that of hanging arms,
+        and its angles are counted from there.
+
+    Raises
+    ------
+    MarkerMismatch
+        When the trial does not show a label, or no marker is on a landmark.
+    InvalidInput
+        When a place is unknown, or two labels are on one landmark.
+    """
+    placed = read_answers(answers)
+    _check(placed, static)
+    landmarks = MarkerSet(
+        name,
+        tuple(
+            p.site.marker(p.label, static_only=p.static_only)
+            for p in placed
+            if p.site.position is not None
+        ),
+    )
+    landmarks = with_unshown_held(generic, landmarks.all_tracked())
+    reference, target, _ = static_posture(
+        generic, static, marker_set=landmarks, min_duration=min_duration
+    )
+    fit = fit_sizes(reference, target)
+    measured = _measured(reference, fit, static, placed)
+    by_label = {m.label: m for m in (*landmarks.markers, *measured)}
+    worn = MarkerSet(
+        name,
+        tuple(replace(by_label[p.label], static_only=p.static_only) for p in placed),
+        source=f"made by ikns markers new from {static.source}",
+    )
+    return OwnMarkerSet(
+        with_unshown_held(generic, worn),
+        placed,
+        tuple(label for label in static.labels if label not in by_label),
+        _assumed(placed),
+    )
+
+
+def _check(placed: tuple[PlacedLabel, ...], static: Recording) -> None:
+    for one in placed:
+        if one.label not in static.labels:
+            raise MarkerMismatch(
+                f"{static.source}: expected a marker {one.label}, found "
+                f"{', '.join(static.labels[:8])} and so on."
+            )
+        column = static.labels.index(one.label)
+        if not np.isfinite(static.markers[:, column]).all(axis=1).any():
+            raise MarkerMismatch(
+                f"{static.source}: the marker {one.label} is never seen; leave it out, "
+                "or take a static trial that shows it."
+            )
+    known = [one for one in placed if one.site.position is not None]
+    for one in known:
+        twins = [p.label for p in known if p.site == one.site]
+        if len(twins) > 1:
+            raise InvalidInput(
+                f"expected one marker on {one.site.name}, found {' and '.join(twins)}; "
+                "put one of them on the segment, or skip it."
+            )
+    if len({p.site.link for p in known}) < 2:
+        raise MarkerMismatch(
+            f"{static.source}: expected landmarks on two segments or more, to find the "
+            f"body from, found {', '.join(p.label for p in known) or 'none'}."
+        )
+
+
+def _measured(
+    reference: Skeleton,
+    fit: SizeFit,
+    static: Recording,
+    placed: tuple[PlacedLabel, ...],
+) -> list[Marker]:
+    """Markers that are no landmarks, where they sit on the generic body."""
+    loose = [one for one in placed if one.site.position is None]
+    if not loose:
+        return []
+    # All markers of one trial are averaged in one way, the landmarks with them.
+    start = Marker("", "thorax", (0.0, 0.0, 0.0), _CLUSTER_SD)
+    everything = replace(
+        reference.marker_set,
+        markers=(
+            *reference.marker_set.markers,
+            *(replace(start, label=p.label, link=p.site.link) for p in loose),
+        ),
+    )
+    _, target, _ = static_posture(
+        reference, static, marker_set=everything, min_duration=0.0
+    )
+    factors = size_factors(fit.log_sizes)
+    person = reference.resized(factors)
+    seen = target[-len(loose) :]
+    places = []
+    for one, place in zip(loose, seen, strict=True):
+        at_link, rotation = _link_in_world(person, fit.q, one.site.link)
+        places.append(rotation.T @ (place - at_link))
+    worn = replace(reference.marker_set, markers=everything.markers[-len(loose) :]).at(
+        np.array(places)
+    )
+    back = {link: 1 / factor for link, factor in factors.items()}
+    on_generic = person.with_markers(worn).resized(back).marker_positions
+    return list(worn.at(on_generic.round(_DIGITS)).markers)
+
+
+def _link_in_world(body: Skeleton, q: Array, link: str) -> tuple[Array, Array]:
+    """Origin (3,) m and axes (3, 3) of a link in the world."""
+    probe = tuple(
+        Marker(f"{axis}", link, (x, y, z), (1.0, 1.0, 1.0))
+        for axis, (x, y, z) in enumerate(np.vstack([np.zeros(3), np.eye(3)]).tolist())
+    )
+    corners = body.with_markers(MarkerSet("frame", probe)).markers_in_world(q)
+    return corners[0], (corners[1:] - corners[0]).T
+
+
+def _assumed(placed: tuple[PlacedLabel, ...]) -> tuple[str, ...]:
+    links = dict.fromkeys(one.site.link for one in placed)
+    return tuple(
+        link
+        for link in links
+        if all(p.site.position is None for p in placed if p.site.link == link)
+    )

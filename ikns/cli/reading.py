@@ -1,0 +1,133 @@
+"""Options of all commands that read marker files, and the reading itself."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import ikns
+from ikns.errors import InvalidInput
+
+#: What a command calls to read a marker file.
+Read = Callable[[Path], "ikns.Recording"]
+
+_OPTIONS = {
+    "rename": (
+        Annotated[
+            list[str] | None,
+            typer.Option(
+                metavar="OLD=NEW",
+                help="Another label for a marker of the recordings; again for more.",
+            ),
+        ],
+        None,
+    ),
+    "labels": (
+        Annotated[
+            Path | None,
+            typer.Option(help="Text file with a line OLD=NEW for each such marker."),
+        ],
+        None,
+    ),
+    "cutoff": (
+        Annotated[
+            float | None,
+            typer.Option(
+                help="Low-pass the positions at so many Hz; for keypoints, 4 to 8.",
+                min=0.0,
+                max=1000.0,
+            ),
+        ],
+        None,
+    ),
+}
+
+
+def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options to a command that takes a parameter ``read``.
+
+    The command calls ``read(path)`` instead of :func:`ikns.read`. Where it ends in an
+    error, labels of ``--rename`` that no file has had are named too, as one of them is
+    the likely reason; where it does not, on stderr.
+    """
+    own = signature(command, eval_str=True)
+    parameters = [p for p in own.parameters.values() if p.name != "read"]
+    place = next(
+        (k for k, p in enumerate(parameters) if p.name in ("force", "as_json")),
+        len(parameters),
+    )
+    parameters[place:place] = [
+        Parameter(
+            name, Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=kind
+        )
+        for name, (kind, default) in _OPTIONS.items()
+    ]
+
+    @wraps(command)
+    def run(**values: Any) -> None:
+        given = {name: values.pop(name, None) for name in _OPTIONS}
+        if given["cutoff"] is not None and not given["cutoff"] > 0:
+            raise InvalidInput(
+                f"expected a --cutoff above 0 Hz, found {given['cutoff']:g}."
+            )
+        names = _names(given["rename"] or [], given["labels"])
+        said = set(given["rename"] or [])
+        seen: list[str] = []
+
+        def read(path: Path) -> ikns.Recording:
+            recording = ikns.read(path)
+            seen.extend(recording.labels)
+            if names:
+                from ikns.recording.labels import renamed
+
+                recording = renamed(recording, names)
+            if given["cutoff"] is not None:
+                from ikns.recording.low_pass import low_pass
+
+                recording = low_pass(recording, given["cutoff"])
+            return recording
+
+        try:
+            command(read=read, **values)
+        except ikns.IknsError as error:
+            if seen and (sentence := _unused(names, said, seen)):
+                raise type(error)(f"{str(error).rstrip('.')}; {sentence}") from None
+            raise
+        if seen and (sentence := _unused(names, said, seen)):
+            sys.stderr.write(f"ikns: {sentence}\n")
+
+    # Typer reads the options from here.
+    run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run
+
+
+def _names(rename: list[str], labels: Path | None) -> dict[str, str]:
+    if not rename and labels is None:
+        return {}
+    from ikns.recording.labels import name_pairs, read_name_pairs
+
+    names = {} if labels is None else read_name_pairs(labels)
+    return names | name_pairs(rename, where="--rename")
+
+
+def _unused(names: dict[str, str], said: set[str], seen: list[str]) -> str:
+    """Say which labels given on the command line no recording had."""
+    if not said:
+        return ""
+    from ikns.recording.labels import name_pairs, unused_names
+
+    lost = unused_names(seen, name_pairs(said, where="--rename"))
+    if not lost:
+        return ""
+    known = ", ".join(dict.fromkeys(seen[:6]))
+    return (
+        f"no recording has the label {', '.join(lost)} of --rename; there are {known} "
+        "and so on."
+    )
