@@ -14,7 +14,7 @@ import typer
 
 import ikns
 from ikns.cli.live_calibration import LiveOptions, record_live
-from ikns.cli.options import AsJson, Force, MarkerSetName
+from ikns.cli.options import AsJson, Force, MarkerSetName, SubjectPrefix
 from ikns.cli.output import notes, progress, show, table
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
@@ -113,6 +113,7 @@ def calibrate(
             help="Least duration of still samples at a point, s.", min=0.0, max=3600.0
         ),
     ] = 0.5,
+    subject_prefix: SubjectPrefix = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -170,8 +171,8 @@ def calibrate(
     assert exploration is not None
     with progress() as report:
         subject = ikns.calibrate(
-            ikns.read(static),
-            [ikns.read(path) for path in exploration],
+            ikns.read(static, subject_prefix=subject_prefix),
+            [ikns.read(path, subject_prefix=subject_prefix) for path in exploration],
             generic=generic,
             marker_set=marker_set,
             chain=chain,
@@ -203,6 +204,10 @@ def _check_input(context: typer.Context, *, live: bool) -> None:
         if (origin := context.get_parameter_source(name)) and origin.name != "DEFAULT"
     }
     if live:
+        if "subject_prefix" in given:
+            raise InvalidInput(
+                "--subject-prefix is for files; a live --source takes ?subject=NAME."
+            )
         files = [f"--{name}" for name in ("static", "exploration") if name in given]
         if files:
             raise InvalidInput(

@@ -20,7 +20,7 @@ from ikns.cli.comparison_tables import (
     point_table,
     pooled_table,
 )
-from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
+from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder, SubjectPrefix
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.errors import NotEnoughData, naming
@@ -66,6 +66,7 @@ def compare(
     seed: Annotated[
         int, typer.Option(help="Of the resamples.", min=0, max=2**32 - 1)
     ] = 0,
+    subject_prefix: SubjectPrefix = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -85,7 +86,9 @@ def compare(
         solver = ikns.MarkerIK(calibrated.skeleton)
         tracked = [
             solver.track(
-                ikns.read(path), chain=own, progress=partial(report, path.name)
+                ikns.read(path, subject_prefix=subject_prefix),
+                chain=own,
+                progress=partial(report, path.name),
             )
             for path in (recording, reaches)
             if path is not None

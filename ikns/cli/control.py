@@ -9,7 +9,15 @@ from typing import Annotated, Literal
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
+from ikns.cli.options import (
+    AsJson,
+    Force,
+    From,
+    RecordingFile,
+    SubjectFolder,
+    SubjectPrefix,
+    To,
+)
 from ikns.cli.output import progress, show, table
 from ikns.output.file import refuse_overwriting, write_csv
 
@@ -24,6 +32,9 @@ def control(
             help="c from the posture, as in the paper, or from null-space motion."
         ),
     ] = "position",
+    subject_prefix: SubjectPrefix = None,
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -36,7 +47,7 @@ def control(
 
     refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
-    frames = ikns.read(recording)
+    frames = ikns.read(recording, subject_prefix=subject_prefix, start=from_, end=to)
     with progress() as report:
         motion = ikns.MarkerIK(calibrated.skeleton).track(
             frames, chain=calibrated.chain, progress=partial(report, recording.name)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, RecordingFile
+from ikns.cli.options import AsJson, RecordingFile, SubjectPrefix
 from ikns.cli.output import show, table
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def stream(
             "--everywhere", help="Serve other machines too; markers are personal data."
         ),
     ] = False,
+    subject_prefix: SubjectPrefix = None,
     as_json: AsJson = False,
 ) -> None:
     """Serve a recording as a live LSL MoCap stream, on this machine only."""
@@ -56,7 +57,7 @@ def stream(
         raise InvalidInput(f"expected a speed above 0, found {speed:g}.")
     if seed < 0:
         raise InvalidInput(f"expected a seed of 0 or more, found {seed}.")
-    frames = ikns.read(recording)
+    frames = ikns.read(recording, subject_prefix=subject_prefix)
     if len(frames.time) < 2:
         raise InvalidInput(
             f"{recording}: expected two frames or more to have a rate, found "

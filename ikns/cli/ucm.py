@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force, SubjectFolder
+from ikns.cli.options import AsJson, Force, SubjectFolder, SubjectPrefix
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.ucm_designs import over_points, over_time
@@ -47,6 +47,7 @@ def ucm(
     figure: Annotated[
         Path | None, typer.Option(help="Picture to write: .png, .svg or .pdf.")
     ] = None,
+    subject_prefix: SubjectPrefix = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -68,7 +69,7 @@ def ucm(
     with progress() as report:
         motions = [
             solver.track(
-                ikns.read(path),
+                ikns.read(path, subject_prefix=subject_prefix),
                 chain=calibrated.chain,
                 progress=partial(report, path.name),
             )

@@ -87,6 +87,13 @@ class Robot:
                 f"expected revolute or prismatic joints from the base to '{frame}', "
                 f"found {found}."
             )
+        kinds = {
+            name: joint.shortname()
+            for name, joint in zip(model.names, model.joints, strict=True)
+        }
+        self.sliding: tuple[str, ...] = tuple(
+            name for name in self.joint_names if kinds[name].startswith("JointModelP")
+        )
         columns = np.array([model.joints[j + 1].idx_q for j in moving])
         free = np.isin(self.joint_names, list(continuous))
         self.lower: Array = np.where(free, -np.inf, model.lowerPositionLimit[columns])
