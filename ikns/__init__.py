@@ -4,7 +4,8 @@ Public names, in the order in which data pass. They load on first use, so import
 package costs next to nothing.
 
 Recording: markers over time
-    read                         read a C3D, TRC or Vicon CSV file
+    read                         read a file of markers: C3D, TRC, CSV, TSV or XDF
+    write                        write a recording as C3D, TRC or CSV
     write_c3d                    write a recording as C3D
     Recording                    time, markers and labels; NaN where not seen
 

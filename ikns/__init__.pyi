@@ -1,6 +1,7 @@
 # Public names, in the order of the docstring of __init__.py.
 # Recording
 from .recording.files import read as read
+from .recording.files import write as write
 from .recording.files import write_c3d as write_c3d
 from .recording.recording import Recording as Recording
 

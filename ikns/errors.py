@@ -13,8 +13,8 @@ class IknsError(Exception):
     >>> try:
     ...     ikns.read("walk.mp4")
     ... except ikns.IknsError as error:
-    ...     print(error)
-    walk.mp4: expected a marker file that ends in .c3d, .trc, .csv, found .mp4.
+    ...     print(error)  # doctest: +ELLIPSIS
+    walk.mp4: expected a marker file that ends in .c3d, .trc, ..., found .mp4.
     """
 
 
@@ -40,6 +40,20 @@ class InvalidInput(IknsError, ValueError):
 
 class StreamError(IknsError, OSError):
     """A live source does not answer, sends unexpected data, or disconnected."""
+
+
+class RecordingWarning(UserWarning):
+    """A reader repaired or left out something in a file.
+
+    Attributes
+    ----------
+    source, note : str
+        The file, and what was done, in one sentence.
+    """
+
+    def __init__(self, source: object, note: str) -> None:
+        super().__init__(f"{source}: {note}")
+        self.source, self.note = str(source), note
 
 
 @contextmanager

@@ -4,13 +4,14 @@ import struct
 import subprocess
 import sys
 import textwrap
+import warnings
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ikns.errors import IknsError
+from ikns.errors import IknsError, RecordingWarning
 from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
 
@@ -52,11 +53,14 @@ def survives(folder, ending, content):
     path = folder / f"trial.{ending}"
     path.write_bytes(content)
     complaint = ""
-    try:
-        read(path)
-    except IknsError as error:
-        complaint = str(error)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", RecordingWarning)
+        try:
+            read(path)
+        except IknsError as error:
+            complaint = str(error)
     assert complaint.isprintable()
+    assert all(str(warning.message).isprintable() for warning in told)
 
 
 @pytest.mark.parametrize("ending", ["c3d", "csv", "trc"])

@@ -169,12 +169,11 @@ def test_wrong_units_are_refused(tmp_path, ending, write, unit, factor):
         (lambda text, _: text.replace("mm", "inch"), "found unit 'inch'"),
         (lambda text, _: text.replace("100", "nan"), "found nan"),
         (lambda text, _: text.replace("100", "-100"), "found -100"),
-        (lambda text, _: text.replace("RELB", "RFIN"), "found RFIN more than once"),
         (lambda text, sep: text.replace(f"3{sep}0", f"x{sep}0"), "found 'x'"),
         (lambda text, sep: text.replace(f"\n3{sep}0", f"\n1{sep}0"), "increase"),
         (lambda text, sep: text.replace(f"\n3{sep}0", f"\n3{sep}0{sep}7"), "columns"),
     ],
-    ids=["unit", "nan rate", "rate", "duplicate", "text", "order", "columns"],
+    ids=["unit", "nan rate", "rate", "text", "order", "columns"],
 )
 def test_damage_is_refused_with_the_reason(tmp_path, ending, write, change, complaint):
     separator = "\t" if ending == "trc" else ","
@@ -268,10 +267,7 @@ def test_trc_times_that_are_not_at_the_rate_are_kept(tmp_path):
     ("text", "complaint"),
     [
         ("one\ntwo\n", "whose first word is PathFileType, found 'one'"),
-        (trc().replace("\t", ","), "found columns separated by commas"),
         ("\n".join(trc().split("\n")[:3]), "expected 5 header lines, found 3"),
-        ("\n".join(trc().split("\n")[:8]), "expected 4 frames as its header says"),
-        (trc(NumMarkers=7), "expected 7 markers as its header says, found 3 labels"),
         (trc(NumFrames="many"), "expected a number for NumFrames, found 'many'"),
         (trc().replace("Units", "Unit"), "expected Units in line 2"),
         (trc().replace("RELB\t\t", "RELB\tRWRA\t"), "above its X"),

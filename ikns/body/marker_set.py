@@ -6,6 +6,7 @@ millimeters in the file and meters here, for the generic body.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +18,9 @@ import numpy as np
 from ikns.arrays import Array, Indices
 from ikns.body.model_file import urdf_folder
 from ikns.errors import FileError, MarkerMismatch
+
+#: Added to a label by a reader when a file gives it to several markers.
+_NUMBER = re.compile(r" #\d+$")
 
 _FORMAT = 1
 
@@ -129,7 +133,8 @@ class MarkerSet:
         """Find each marker among a recording's labels, (M,); -1 where it is missing.
 
         A subject prefix is ignored (``ADL001:RSHO1`` is ``RSHO1``), as is case, and an
-        alias counts as the label.
+        alias counts as the label. ``RSHO #1`` and ``RSHO #2`` are markers that a file
+        names alike.
 
         Raises
         ------
@@ -139,15 +144,15 @@ class MarkerSet:
         places: dict[str, list[int]] = {}
         for column, label in enumerate(labels):
             key = label.rsplit(":", 1)[-1].strip().casefold()
-            places.setdefault(key, []).append(column)
+            for name in {key, _NUMBER.sub("", key)}:
+                places.setdefault(name, []).append(column)
         found = np.full(len(self.markers), -1, dtype=np.int64)
         for i, marker in enumerate(self.markers):
             names = [marker.label, *marker.aliases]
             matches = [c for n in names for c in places.get(n.casefold(), [])]
             if len(matches) > 1:
                 raise MarkerMismatch(
-                    f"marker {marker.label} must match one label, found "
-                    f"{', '.join(labels[c] for c in matches)}; keep one subject."
+                    _several(marker.label, [labels[c] for c in matches])
                 )
             if matches:
                 found[i] = matches[0]
@@ -194,6 +199,16 @@ class MarkerSet:
             for marker, p in zip(self.markers, positions, strict=True)
         )
         return replace(self, markers=moved)
+
+
+def _several(marker: str, labels: Sequence[str]) -> str:
+    """Say that a marker matches several labels, and what would settle it."""
+    subjects = [label.rpartition(":")[0] for label in labels]
+    cure = "give one of them another name"
+    if len({subject.casefold() for subject in subjects}) == len(labels):
+        known = ", ".join(subject for subject in subjects if subject)
+        cure = f"choose one subject with --subject-prefix ({known})"
+    return f"marker {marker} must match one label, found {', '.join(labels)}; {cure}."
 
 
 def _read_marker(label: str, table: Mapping[str, Any]) -> Marker:

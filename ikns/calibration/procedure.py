@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from ikns.body.chains import chain_joints
+from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference
@@ -182,7 +182,7 @@ def calibrate(
             *(
                 [_assumed(scaling)]
                 if static is None
-                else _left_out(static, scaling, marker_set, explorations)
+                else _left_out(static, scaling, marker_set, explorations, chain)
             ),
             *(
                 f"{recording.source}: {fault}"
@@ -212,18 +212,17 @@ def _left_out(
     scaling: ScalingReport,
     marker_set: str | Path,
     explorations: Sequence[Recording],
+    chain: str,
 ) -> list[str]:
-    """Name markers seen in an exploration, but not in the static trial."""
+    """Name markers, of the chain or seen later, that the static trial lacks.
+
+    The other arm's may be missing from all of them: nobody asked for it.
+    """
     worn = MarkerSet.load(marker_set)
-    seen = np.zeros(len(worn.labels), dtype=bool)
+    own = ("thorax", *chain_sides(chain))
+    counts = np.array([marker.link.startswith(own) for marker in worn.markers])
     for recording in explorations:
         markers = worn.pick(recording.labels, recording.markers)
-        seen |= np.isfinite(markers).all(axis=2).any(axis=0)
-    lost = {label for label, s in zip(worn.labels, seen, strict=True) if s}
-    lost &= set(scaling.unused) & set(scaling.dropped)
-    if not lost:
-        return []
-    return [
-        f"{static.source}: expected every marker in sight, found none of "
-        f"{', '.join(sorted(lost))}: left out, as their places are unknown."
-    ]
+        counts |= np.isfinite(markers).all(axis=2).any(axis=0)
+    named = [label for label, count in zip(worn.labels, counts, strict=True) if count]
+    return scaling.sentences(static.source, only=named)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,6 +43,26 @@ class ScalingReport:
     held: tuple[str, ...]  # joints that the markers cannot observe
     duration: float  # length of the static trial, s
     converged: bool  # whether the fit met its tolerance
+
+    def sentences(self, source: str, *, only: Iterable[str] | None = None) -> list[str]:
+        """Name the markers that were left out as nobody saw them; one sentence, if any.
+
+        Parameters
+        ----------
+        source : str
+            Name of the static trial.
+        only : iterable of str, optional
+            Name no other markers.
+        """
+        lost = set(self.unused) & set(self.dropped)
+        if only is not None:
+            lost &= set(only)
+        if not lost:
+            return []
+        return [
+            f"{source}: expected every marker in sight, found none of "
+            f"{', '.join(sorted(lost))}: left out, as their places are unknown."
+        ]
 
 
 def scale(

@@ -16,10 +16,12 @@ from ikns.cli.calibrate import calibrate
 from ikns.cli.checks import checked
 from ikns.cli.compare import compare
 from ikns.cli.control import control
+from ikns.cli.convert import convert
 from ikns.cli.demo import demo
 from ikns.cli.ik import ik
 from ikns.cli.markers import markers_app
 from ikns.cli.pick import pick
+from ikns.cli.repairs import repairs, tell
 from ikns.cli.replay import replay
 from ikns.cli.robot import robot
 from ikns.cli.run import run
@@ -46,6 +48,7 @@ for command in (
     calibrate,
     ik,
     control,
+    convert,
     compare,
     robot,
     ucm,
@@ -93,6 +96,14 @@ def run_command(argv: Sequence[str] | None = None) -> int:
         command.
     """
     given = list(sys.argv[1:] if argv is None else argv)
+    with repairs() as repaired:
+        code = _run(given)
+    if code != 2:  # bad input: one sentence
+        tell(repaired)
+    return code
+
+
+def _run(given: list[str]) -> int:
     try:
         _refuse_empty(given)
         # Not standalone: typer then raises errors instead of printing several lines.

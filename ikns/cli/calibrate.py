@@ -21,7 +21,14 @@ from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
 #: Options of files only.
-_FILES_ONLY = ("static", "exploration", "rename", "labels", "cutoff")
+_FILES_ONLY = (
+    "static",
+    "exploration",
+    "subject_prefix",
+    "rename",
+    "labels",
+    "cutoff",
+)
 #: Options of a live calibration only.
 _LIVE_ONLY = (
     "source",
@@ -210,7 +217,7 @@ def _check_input(context: typer.Context, *, live: bool) -> None:
         if (origin := context.get_parameter_source(name)) and origin.name != "DEFAULT"
     }
     if live:
-        files = [f"--{name}" for name in _FILES_ONLY if name in given]
+        files = [f"--{name.replace('_', '-')}" for name in _FILES_ONLY if name in given]
         if files:
             raise InvalidInput(
                 f"{' and '.join(files)} {'goes' if len(files) == 1 else 'go'} with "

@@ -36,7 +36,7 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
         for name, value in values.items():
             parameter = parameters[name]
             # An argument without a default is written without dashes.
-            option = f"--{name.replace('_', '-')}"
+            option = f"--{name.rstrip('_').replace('_', '-')}"
             for each in value if isinstance(value, (list, tuple)) else [value]:
                 if parameter.default is Parameter.empty or each != parameter.default:
                     _check(option, each)

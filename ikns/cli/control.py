@@ -9,7 +9,14 @@ from typing import Annotated, Literal
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
+from ikns.cli.options import (
+    AsJson,
+    Force,
+    From,
+    RecordingFile,
+    SubjectFolder,
+    To,
+)
 from ikns.cli.output import progress, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.output.file import refuse_overwriting, write_csv
@@ -27,6 +34,8 @@ def control(
             help="c from the posture, as in the paper, or from null-space motion."
         ),
     ] = "position",
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -39,7 +48,7 @@ def control(
 
     refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
-    frames = read(recording)
+    frames = read(recording, start=from_, end=to)
     with progress() as report:
         motion = ikns.MarkerIK(calibrated.skeleton).track(
             frames, chain=calibrated.chain, progress=partial(report, recording.name)

@@ -9,41 +9,88 @@ from typing import Annotated
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
-from ikns.cli.output import progress, show, table
+from ikns.cli.options import AsJson, Force, From, MarkerSetName, RecordingFile, To
+from ikns.cli.output import notes, progress, show, table
 from ikns.cli.reading import Read, reads_markers
-from ikns.errors import naming
-from ikns.output.file import refuse_overwriting, write_csv
+from ikns.errors import InvalidInput, naming
+from ikns.output.file import refuse_overwriting
 
 
 @reads_markers
 def ik(
     read: Read,
     recording: RecordingFile,
-    subject: SubjectFolder,
-    out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("motion.csv"),
+    subject: Annotated[
+        Path | None, typer.Option(help="Folder that `ikns calibrate` wrote.")
+    ] = None,
+    static: Annotated[
+        Path | None,
+        typer.Option(help="Instead of a subject: the person standing still."),
+    ] = None,
+    marker_set: MarkerSetName = "oxford24",
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="File to write, may be repeated: .csv, .mot or .sto with joint "
+            "angles, .trc or .c3d with the fitted markers. Default: motion.csv."
+        ),
+    ] = None,
+    min_static: Annotated[
+        float,
+        typer.Option(help="Shortest static trial accepted, s.", min=0.0, max=3600.0),
+    ] = 1.0,
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Write joint angles (deg), the pose of the thorax and residuals per frame.
 
-    Cells of a joint are empty in frames in which a segment next to it is out of sight,
-    cells of the thorax in frames that do not show it.
+    The body is that of a subject, or scaled from --static with --marker-set. Cells of a
+    joint are empty in frames in which a segment next to it is out of sight, cells of
+    the thorax in frames that do not show it; .mot and .sto, which have no empty cells,
+    are without such frames.
     """
+    from ikns.motion.export import check_motion_file, write_motion
     from ikns.motion.table import motion_table
 
-    refuse_overwriting(out, force=force, inputs=[recording, subject])
-    skeleton = ikns.Subject.load(subject).skeleton
-    frames = read(recording)
+    outputs = out or [Path("motion.csv")]
+    for path in outputs:
+        refuse_overwriting(path, force=force, inputs=[recording, subject, static])
+        check_motion_file(path)
+    if len({path.resolve() for path in outputs}) < len(outputs):
+        raise InvalidInput("expected different files for each --out, found one twice.")
+    if (subject is None) == (static is None):
+        raise InvalidInput(
+            "expected --subject, a folder of `ikns calibrate`, or --static, a "
+            f"recording, found {'neither' if subject is None else 'both'}."
+        )
+    left_out: list[str] = []
+    if static is None:
+        assert subject is not None
+        skeleton = ikns.Subject.load(subject).skeleton
+    else:
+        still = read(static)
+        with naming(still.source):
+            skeleton, scaling = ikns.scale(
+                ikns.Skeleton.load(),
+                still,
+                marker_set=marker_set,
+                min_duration=min_static,
+            )
+        left_out = scaling.sentences(still.source)
+    frames = read(recording, start=from_, end=to)
     with progress() as report, naming(frames.source):
         motion = ikns.MarkerIK(skeleton).track(
             frames, progress=lambda done, total: report("joint angles", done, total)
         )
+    told = [write_motion(path, motion, skeleton, force=force) for path in outputs]
+    said = [*left_out, *(sentence for sentence in told if sentence)]
+    csv = next((path for path in outputs if path.suffix.lower() == ".csv"), None)
     found = motion_table(motion)
-    write_csv(out, found.columns, found.rows, force=force)
     summary = found.summary
     show(
-        {"recording": recording, "csv": out} | summary,
+        {"recording": recording, "csv": csv, "files": outputs, "notes": said} | summary,
         f"{recording}: {summary['frames_converged']} of {summary['frames']} frames "
         f"solved, median marker residual {1000 * summary['residual_median_m']:.1f} mm",
         table(
@@ -54,7 +101,8 @@ def ik(
                 for name, (low, high) in found.range_deg.items()
             ],
         ),
-        f"Wrote {out}",
+        *notes(said),
+        f"Wrote {', '.join(map(str, outputs))}",
         as_json=as_json,
     )
 

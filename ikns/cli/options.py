@@ -16,8 +16,23 @@ Force = Annotated[
 SubjectFolder = Annotated[
     Path, typer.Option("--subject", help="Folder that `ikns calibrate` wrote.")
 ]
+#: Endings of recordings, for help texts.
+MARKER_FILES = ".c3d, .trc, .csv (Vicon, Motive), .tsv (Qualisys) or .xdf"
 RecordingFile = Annotated[
-    Path, typer.Argument(help="Recording to read: .c3d, .trc or Vicon .csv.")
+    Path, typer.Argument(help=f"Recording to read: {MARKER_FILES}.")
+]
+SubjectPrefix = Annotated[
+    str | None,
+    typer.Option(help="Of several people in a file: Ann, for labels like Ann:RSHO."),
+]
+From = Annotated[
+    str | None,
+    typer.Option(
+        "--from", help="Start there: seconds, or the name of an event in a C3D file."
+    ),
+]
+To = Annotated[
+    str | None, typer.Option("--to", help="Stop there: seconds, or an event likewise.")
 ]
 MarkerSetName = Annotated[
     str,

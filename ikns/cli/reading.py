@@ -14,10 +14,20 @@ import typer
 import ikns
 from ikns.errors import InvalidInput
 
-#: What a command calls to read a marker file.
-Read = Callable[[Path], "ikns.Recording"]
+#: What a command calls to read a marker file, with ``start`` and ``end`` of
+#: :func:`ikns.read` if it likes.
+Read = Callable[..., "ikns.Recording"]
 
 _OPTIONS = {
+    "subject_prefix": (
+        Annotated[
+            str | None,
+            typer.Option(
+                help="Of several people in a file: Ann, for labels like Ann:RSHO."
+            ),
+        ],
+        None,
+    ),
     "rename": (
         Annotated[
             list[str] | None,
@@ -80,8 +90,9 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
         said = set(given["rename"] or [])
         seen: list[str] = []
 
-        def read(path: Path) -> ikns.Recording:
-            recording = ikns.read(path)
+        def read(path: Path, **part: Any) -> ikns.Recording:
+            prefix = given["subject_prefix"]
+            recording = ikns.read(path, subject_prefix=prefix, **part)
             seen.extend(recording.labels)
             if names:
                 from ikns.recording.labels import renamed

@@ -27,7 +27,8 @@ def robot(
     angles: Annotated[
         Path,
         typer.Argument(
-            help="CSV with the columns time_s and JOINT_rad (or JOINT_deg, JOINT_m)."
+            help="CSV with the columns time_s and JOINT_rad (or JOINT_deg, JOINT_m), "
+            "or OpenSim's .mot or .sto."
         ),
     ],
     frame: Annotated[str, typer.Option(help="Link that does the task.")],
@@ -82,7 +83,7 @@ def robot(
 
     refuse_picture(figure, force=force, inputs=[urdf, angles])
     arm = ikns.Robot.load(urdf, frame, base=start)
-    time, q = read_joint_angles(angles, arm.joint_names)
+    time, q = read_joint_angles(angles, arm.joint_names, sliding=arm.sliding)
     with naming(str(angles)), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
         held = robot_null_space_samples(arm, time, q, max_hand_speed=speed)

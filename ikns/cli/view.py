@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force
+from ikns.cli.options import MARKER_FILES, AsJson, Force, From, To
 from ikns.cli.output import progress, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput
@@ -27,7 +27,7 @@ def view(
     subject: Annotated[Path, typer.Argument(help="Folder that ikns calibrate wrote.")],
     recording: Annotated[
         Path | None,
-        typer.Argument(help="Recording to play: .c3d, .trc or Vicon .csv."),
+        typer.Argument(help=f"Recording to play: {MARKER_FILES}."),
     ] = None,
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("view.html"),
     png: Annotated[Path | None, typer.Option(help="Picture to write too.")] = None,
@@ -41,6 +41,8 @@ def view(
     open_page: Annotated[
         bool, typer.Option("--open", help="Show the page in the browser.")
     ] = False,
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -64,7 +66,7 @@ def view(
     learned, row = person.null_space_map, None if point is None else point - 1
     simulated = is_simulated(person, subject, [] if recording is None else [recording])
     name = subject.resolve().name
-    frames = None if recording is None else read(recording)
+    frames = None if recording is None else read(recording, start=from_, end=to)
 
     from ikns.view.scene import map_scene, recording_scene, scene_html, scene_picture
 

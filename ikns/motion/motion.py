@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
 from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.motion.labeled import data_frame, dataset
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +147,56 @@ class Motion:
         """
         velocity = self.hand_velocity_in_thorax[:, self._sides(chain)]
         return np.linalg.norm(velocity, axis=2).max(axis=1)
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas DataFrame with one row per frame; needs pandas.
+
+        Its index is ``time_s``; the columns are ``<joint>_rad``,
+        ``<side>_hand_<axis>_m`` in the thorax frame, ``residual_m`` and ``converged``.
+        """
+        columns = {
+            f"{name}_rad": angle
+            for name, angle in zip(self.joint_names, self.angles.T, strict=True)
+        }
+        for hand, side in enumerate(SIDES):
+            for axis, name in enumerate("xyz"):
+                columns[f"{side}_hand_{name}_m"] = self.hand_in_thorax[:, hand, axis]
+        return data_frame(
+            self.time,
+            columns | {"residual_m": self.residual, "converged": self.converged},
+        )
+
+    def to_xarray(self) -> Any:
+        """Return an xarray Dataset along time, joint, side and axis; needs xarray.
+
+        Variables are ``angles`` and ``velocities`` of the joints, ``hand_in_thorax``,
+        ``hand_rotation_in_thorax``, ``hand_velocity_in_thorax``, ``residual`` and
+        ``converged``, each with its unit.
+        """
+        hand = ("time", "side", "axis")
+        velocities = self.v[:, -len(self.joint_names) :]
+        return dataset(
+            {
+                "time": self.time,
+                "joint": list(self.joint_names),
+                "side": list(SIDES),
+                "axis": list("xyz"),
+                "column": list("xyz"),
+            },
+            {
+                "angles": (("time", "joint"), self.angles, "rad"),
+                "velocities": (("time", "joint"), velocities, "rad/s"),
+                "hand_in_thorax": (hand, self.hand_in_thorax, "m"),
+                "hand_rotation_in_thorax": (
+                    (*hand, "column"),
+                    self.hand_rotation_in_thorax,
+                    "1",
+                ),
+                "hand_velocity_in_thorax": (hand, self.hand_velocity_in_thorax, "m/s"),
+                "residual": (("time",), self.residual, "m"),
+                "converged": (("time",), self.converged, "1"),
+            },
+        )
 
     def _while_in_sight(self, chain: str, values: Array) -> Array:
         columns = [self.joint_names.index(name) for name in chain_joints(chain)]

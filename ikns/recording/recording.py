@@ -31,6 +31,8 @@ class Recording:
         Marker names as the file has them, each once.
     source : str
         Name of the recording, for messages.
+    notes : sequence of str
+        What a reader repaired or left out, one sentence each.
 
     Raises
     ------
@@ -50,6 +52,7 @@ class Recording:
     markers: Array
     labels: tuple[str, ...]
     source: str
+    notes: tuple[str, ...]
 
     def __init__(
         self,
@@ -57,6 +60,7 @@ class Recording:
         markers: ArrayLike,
         labels: Sequence[str],
         source: str = "recording",
+        notes: Sequence[str] = (),
     ) -> None:
         time_s = np.array(time, dtype=np.float64)
         markers_m = np.array(markers, dtype=np.float64)
@@ -92,6 +96,7 @@ class Recording:
         object.__setattr__(self, "markers", markers_m)
         object.__setattr__(self, "labels", names)
         object.__setattr__(self, "source", source)
+        object.__setattr__(self, "notes", tuple(notes))
 
     @property
     def rate(self) -> float:
@@ -115,4 +120,6 @@ class Recording:
                 f"{', '.join(self.labels)}."
             )
         columns = [self.labels.index(label) for label in labels]
-        return Recording(self.time, self.markers[:, columns], labels, self.source)
+        return Recording(
+            self.time, self.markers[:, columns], labels, self.source, self.notes
+        )

@@ -113,6 +113,9 @@ class Robot:
         kinds = self.tree.kind[
             [model.getJointId(name) - 1 for name in self.joint_names]
         ]
+        self.sliding: tuple[str, ...] = tuple(
+            np.array(self.joint_names)[kinds != REVOLUTE]
+        )
         # A full turn of a leader must be full turns of all that follow it.
         whole = (self.coupling == self.coupling.round()).all(axis=0)
         self.revolute: Mask = np.asarray((kinds == REVOLUTE) & whole)

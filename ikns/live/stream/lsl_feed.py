@@ -13,10 +13,11 @@ import numpy as np
 
 from ikns.errors import StreamError
 from ikns.live.stream.frame import Event, Frame
-from ikns.live.stream.lsl_layout import LslLayout, read_lsl_layout
+from ikns.live.stream.lsl_layout import read_lsl_layout
 from ikns.live.stream.lsl_library import lsl
 from ikns.live.stream.lsl_numbers import Numbers
 from ikns.live.stream.lsl_search import Wanted, find_stream, find_successor
+from ikns.recording.files.lsl_channels import MarkerChannels
 
 #: Longest call into liblsl, s, so that Ctrl-C is handled.
 _SLICE = 0.2
@@ -34,7 +35,7 @@ _ALIVE_TIMEOUT = 2.0
 class _Open:
     found: Any
     inlet: Any
-    layout: LslLayout
+    layout: MarkerChannels
     rate: float
     clock_offset: float
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import FileError
-from ikns.recording.files.c3d_layout import C3dLayout, floats, read_layout
+from ikns.recording.files.c3d_layout import BLOCK, C3dLayout, floats, read_layout
 from ikns.recording.files.conversion import (
     checked_rate,
     is_unlabeled,
@@ -101,7 +101,10 @@ def _points(path: Path, layout: C3dLayout, rate: float) -> NDArray[np.float32]:
     words = 4 * n_points + n_analog
     frame_bytes = words * (4 if scale < 0 else 2)
     available = layout.size - layout.data_start
-    n_frames = _frame_count(layout, available // frame_bytes)
+    n_frames = _frame_count(layout)
+    open_end = n_frames is None
+    if n_frames is None:
+        n_frames = max(available // frame_bytes, _WORD)
     if n_frames * frame_bytes > available:
         raise FileError(
             f"{path}: expected {n_frames} frames of {frame_bytes} bytes as its header "
@@ -110,6 +113,9 @@ def _points(path: Path, layout: C3dLayout, rate: float) -> NDArray[np.float32]:
     with path.open("rb") as file:
         file.seek(layout.data_start)
         raw = file.read(n_frames * frame_bytes)
+    if open_end:
+        n_frames -= _padding(raw, frame_bytes, available)
+        raw = raw[: n_frames * frame_bytes]
     if scale < 0:
         frames = floats(raw, layout.machine).reshape(n_frames, words)
         return frames[:, : 4 * n_points].reshape(n_frames, n_points, 4)
@@ -118,12 +124,24 @@ def _points(path: Path, layout: C3dLayout, rate: float) -> NDArray[np.float32]:
     return frames[:, : 4 * n_points].reshape(n_frames, n_points, 4) * np.float32(scale)
 
 
-def _frame_count(layout: C3dLayout, fitting: int) -> int:
+def _padding(raw: bytes, frame_bytes: int, available: int) -> int:
+    """Return how many frames at the end are zeros that fill the last block of a file.
+
+    They look like frames in which nobody is seen. Where the frames fill their last
+    block, ezc3d adds a whole one.
+    """
+    if available % BLOCK:
+        return 0
+    last = raw[len(raw) - BLOCK // frame_bytes * frame_bytes :]
+    return (len(last) - len(last.rstrip(b"\0"))) // frame_bytes
+
+
+def _frame_count(layout: C3dLayout) -> int | None:
     """Return the number of frames, also where it does not fit into 16 bits.
 
     Then Vicon writes first and last frame as pairs of words, others write a
     floating-point count, and some only the largest word: then all frames to the end of
-    the file count.
+    the file count, and the answer is None.
     """
     *_, first, last = layout.header
     count = layout.number("POINT:FRAMES", last - first + 1)
@@ -135,7 +153,9 @@ def _frame_count(layout: C3dLayout, fitting: int) -> int:
         if start and end - start + 1 >= _WORD:
             count = end - start + 1
         else:
-            count = layout.number("POINT:LONG_FRAMES", max(fitting, _WORD))
+            count = layout.number("POINT:LONG_FRAMES", 0)
+            if not count:
+                return None
     return int(count) if math.isfinite(count) and count > 0 else 0
 
 

@@ -21,7 +21,8 @@ from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
 
-_BLOCK = 512
+#: Bytes of a block, of which a C3D file is made.
+BLOCK = 512
 _KEY = 0x50
 _INTEL, _DEC, _MIPS = 84, 85, 86
 _CHAR, _BYTE, _INT, _FLOAT = -1, 1, 2, 4
@@ -65,14 +66,14 @@ def read_layout(path: Path) -> C3dLayout:
     """Read header and parameters of a C3D file."""
     size = existing_file(path)
     with path.open("rb") as file:
-        head = file.read(_BLOCK)
+        head = file.read(BLOCK)
         if len(head) < 2 or head[1] != _KEY or head[0] == 0:
             raise FileError(
                 f"{path}: expected a C3D file, whose second byte is 0x50, found a file "
                 f"that starts with {head[:4].hex(' ')}."
             )
-        section_start = (head[0] - 1) * _BLOCK
-        if len(head) < _BLOCK or section_start + 4 > size:
+        section_start = (head[0] - 1) * BLOCK
+        if len(head) < BLOCK or section_start + 4 > size:
             raise _cut(path, section_start + 4, size)
         file.seek(section_start)
         machine = file.read(4)[3]
@@ -83,7 +84,7 @@ def read_layout(path: Path) -> C3dLayout:
             )
         order = ">" if machine == _MIPS else "<"
         words = struct.unpack(f"{order}4H2x4sH2x4s", head[2:24])
-        data_start = (words[5] - 1) * _BLOCK
+        data_start = (words[5] - 1) * BLOCK
         if data_start <= section_start:
             raise FileError(
                 f"{path}: expected data after the parameters of a C3D file, found the "

@@ -68,7 +68,7 @@ def write_c3d(path: str | Path, recording: Recording, *, force: bool = False) ->
     if path.exists() and not force:
         raise FileError(f"{path}: the file exists already and was left as it is.")
     _check_labels(recording)
-    first, rate = _first_frame_and_rate(recording)
+    first, rate = frame_numbers(recording)
     try:
         # A temporary folder next to the target is on the same disk, so the move is
         # atomic, and it is removed in any case.
@@ -96,13 +96,13 @@ def _check_labels(recording: Recording) -> None:
         )
 
 
-def _first_frame_and_rate(recording: Recording) -> tuple[int, float]:
+def frame_numbers(recording: Recording) -> tuple[int, float]:
     """Return the number of the first frame, 1 at 0 s, and the frames per second."""
     time, rate = recording.time, recording.rate
     if len(time) < 2:
         raise InvalidInput(
             f"{recording.source}: expected at least 2 frames to know the frame rate "
-            f"that a C3D file states, found {len(time)}."
+            f"that the file states, found {len(time)}."
         )
     counted = (time - time[0]) * rate
     # A lost frame is a long step, a drifting clock a growing difference.
@@ -110,14 +110,14 @@ def _first_frame_and_rate(recording: Recording) -> tuple[int, float]:
     drift = np.abs(counted - np.arange(len(time))).max()
     if max(lost, drift) >= 0.5:
         raise InvalidInput(
-            f"{recording.source}: expected a constant frame rate, as a C3D file has, "
-            f"found times up to {max(lost, drift):.1f} frames off; resample it first."
+            f"{recording.source}: expected a constant frame rate, as frame numbers "
+            f"need, found times up to {max(lost, drift):.1f} frames off; resample it."
         )
     first = round(float(time[0]) * rate) + 1
     if not 1 <= first <= _LAST_FRAME - len(time):
         raise InvalidInput(
             f"{recording.source}: expected to start between 0 and "
-            f"{_LAST_FRAME / rate:.0f} s, as a C3D file can state, found {time[0]:g} s."
+            f"{_LAST_FRAME / rate:.0f} s, as frame numbers say, found {time[0]:g} s."
         )
     return first, rate
 

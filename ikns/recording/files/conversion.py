@@ -28,8 +28,14 @@ METERS = {
     for short in (unit, f"{name}er", f"{name}ers", f"{name}re", f"{name}res")
 }
 
-#: Nexus writes ``*12`` and Qualisys ``uname*12`` for a trajectory without a name.
-_UNLABELED = re.compile(r"(?:.*:)?(?:uname)?\*\d+", re.IGNORECASE)
+#: Letters of a unit's name that are enough: some writers cut it off after four.
+_UNIT_LETTERS = 4
+
+#: Nexus writes ``*12``, Qualisys ``uname*12`` and Motive ``Unlabeled 12`` for a
+#: trajectory without a name.
+_UNLABELED = re.compile(
+    r"(?:.*:)?(?:(?:uname)?\*\d+|unlabell?ed[ _]*\d*)", re.IGNORECASE
+)
 
 #: Frames per second that a marker system can have.
 _RATES = (0.1, 1e5)
@@ -70,15 +76,18 @@ def shown(text: str) -> str:
 def meters_per(path: Path, unit: str) -> float:
     """Return how many meters one unit is.
 
-    >>> meters_per(Path("walk.trc"), "MM")
-    0.001
+    >>> meters_per(Path("walk.trc"), "MM"), meters_per(Path("walk.c3d"), "mete")
+    (0.001, 1.0)
     """
-    try:
-        return METERS[unit.strip().lower()]
-    except KeyError:
+    name = unit.strip(" \t()[]").lower()
+    meant = {METERS[name]} if name in METERS else set()
+    if not meant and len(name) >= _UNIT_LETTERS:
+        meant = {value for known, value in METERS.items() if known.startswith(name)}
+    if len(meant) != 1:
         raise FileError(
             f"{path}: expected positions in mm, cm or m, found unit {shown(unit)}."
-        ) from None
+        )
+    return meant.pop()
 
 
 def checked_rate(path: Path, rate: float) -> float:
@@ -122,13 +131,19 @@ def mark_gaps(markers: Array) -> Mask:
 
 
 def to_recording(
-    path: Path, time: Array, markers: Array, labels: Sequence[str], *, unit: str
+    path: Path,
+    time: Array,
+    markers: Array,
+    labels: Sequence[str],
+    *,
+    unit: str,
+    notes: Sequence[str] = (),
 ) -> Recording:
     """Return markers (T, M, 3) in meters as a recording, gaps as NaN; changed in place.
 
     A point with a missing coordinate becomes NaN, and so does one at exactly zero, as
-    many systems write "not seen". The file's unit is named where the extent is not that
-    of a person in a room.
+    many systems write "not seen". Labels that stand several times are numbered. The
+    file's unit is named where the extent is not that of a person in a room.
     """
     if not len(labels):
         raise FileError(f"{path}: expected at least one named marker, found none.")
@@ -145,12 +160,60 @@ def to_recording(
             f"{path}: expected positions, but none of its {len(labels)} markers "
             f"is seen in any of its {len(time)} frames."
         )
+    labels, columns, doubled = _distinct(labels, markers)
+    if doubled:
+        markers = markers[:, columns]
     try:
-        recording = Recording(time, markers, labels, str(path))
+        recording = Recording(
+            time, markers, labels, str(path), notes=(*notes, *doubled)
+        )
     except InvalidInput as error:
         raise FileError(str(error)) from None
     _check_extent(path, recording, unit)
     return recording
+
+
+def _distinct(
+    labels: Sequence[str], markers: Array
+) -> tuple[list[str], list[int], list[str]]:
+    """Make every label stand once: labels, the columns that they name, and notes.
+
+    Markers of one name that differ are numbered, ``RKNE #1`` and ``RKNE #2``: chance
+    must not decide which of them is meant. A marker set that needs the name refuses
+    them, see :meth:`ikns.body.marker_set.MarkerSet.columns`.
+    """
+    places: dict[str, list[int]] = {}
+    for column, label in enumerate(labels):
+        places.setdefault(label, []).append(column)
+    names: dict[int, str] = {}
+    notes = []
+    for label, columns in places.items():
+        if len(columns) == 1:
+            names[columns[0]] = label
+            continue
+        kept: list[int] = []
+        for column in columns:
+            own = markers[:, column]
+            if not np.isnan(own).all() and not any(
+                np.array_equal(own, markers[:, other], equal_nan=True) for other in kept
+            ):
+                kept.append(column)
+        if len(kept) < 2:
+            names[(kept or columns)[0]] = label
+            notes.append(f"{label} stands {len(columns)} times, the same or unseen.")
+            continue
+        number, called = 0, []
+        for column in kept:
+            number += 1
+            while f"{label} #{number}" in places:
+                number += 1
+            called.append(f"{label} #{number}")
+            names[column] = called[-1]
+        notes.append(
+            f"{len(kept)} markers are named {label}, read as {', '.join(called)}; "
+            "which of them is meant cannot be known."
+        )
+    return [names[i] for i in sorted(names)], sorted(names), notes
 
 
 def _check_extent(path: Path, recording: Recording, unit: str) -> None:

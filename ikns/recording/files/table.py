@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,12 @@ import numpy as np
 from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
+
+#: How Microsoft's library prints NaN.
+_NOT_A_NUMBER = re.compile(r"-?1\.#(?:QNAN|SNAN|IND)\d*")
+
+#: A line and its number in the file, from 1.
+Row = tuple[int, str]
 
 
 def text_lines(path: Path) -> list[str]:
@@ -21,8 +28,34 @@ def text_lines(path: Path) -> list[str]:
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
+def separated_rows(path: Path, rows: list[Row]) -> tuple[list[Row], list[int]]:
+    """Return rows with tabs between the cells, and how many each has at most filled.
+
+    Rows without tabs are separated by blanks; then no cell can be empty. Commas are
+    decimal where no row has a point.
+    """
+    text = [line for _, line in rows]
+    if not any("." in line for line in text) and any("," in line for line in text):
+        text = [line.replace(",", ".") for line in text]
+    # Blanks within a cell are the same: a tab that became blanks.
+    if any(len(cell.split()) > 1 for line in text[:1] for cell in line.split("\t")):
+        text = ["\t".join(line.split()) for line in text]
+        widths = [line.count("\t") + 1 for line in text]
+        uneven = next((i for i, width in enumerate(widths) if width != widths[0]), None)
+        if uneven is not None:
+            raise FileError(
+                f"{path}: expected {widths[0]} numbers in line {rows[uneven][0]} as in "
+                f"line {rows[0][0]}, found {widths[uneven]}: with blanks between the "
+                f"columns a marker that was not seen cannot be told; export it again "
+                f"with tabs."
+            )
+    else:
+        widths = [line.rstrip().count("\t") + 1 for line in text]
+    return [(n, line) for (n, _), line in zip(rows, text, strict=True)], widths
+
+
 def number_table(
-    path: Path, rows: list[tuple[int, str]], n_columns: int, *, delimiter: str
+    path: Path, rows: list[Row], n_columns: int, *, delimiter: str
 ) -> Array:
     """Return the numbers of rows (line number, line); empty cells are NaN.
 
@@ -37,7 +70,11 @@ def number_table(
             f"{len(rows)} rows are far shorter, so the file is damaged."
         )
     lines = [_fitted(path, number, line, n_columns, delimiter) for number, line in rows]
-    text = "\n" + "\n".join(lines).replace(" ", "") + "\n"
+    text = "\n" + "\n".join(lines) + "\n"
+    # Blanks around a number mean nothing; between two they are a missing delimiter.
+    if " " in text:
+        text = re.sub(f" *([{delimiter}\n]) *", r"\1", text)
+    text = _NOT_A_NUMBER.sub("nan", text) if "#" in text else text
     # Twice, because neighboring gaps share a delimiter.
     for _ in range(2):
         text = text.replace(2 * delimiter, f"{delimiter}nan{delimiter}")
@@ -65,13 +102,11 @@ def _fitted(path: Path, number: int, line: str, n_columns: int, delimiter: str) 
     return line
 
 
-def _refuse_first_non_number(
-    path: Path, rows: list[tuple[int, str]], delimiter: str
-) -> None:
+def _refuse_first_non_number(path: Path, rows: list[Row], delimiter: str) -> None:
     for number, line in rows:
         for cell in line.split(delimiter):
             try:
-                float(cell.replace(" ", "") or "nan")
+                float(cell.strip() or "nan")
             except ValueError:
                 raise FileError(
                     f"{path}: expected numbers in line {number}, found {shown(cell)}."

@@ -17,17 +17,17 @@ from ikns.recording.files.conversion import (
     shown,
     to_recording,
 )
-from ikns.recording.files.table import number_table, text_lines
+from ikns.recording.files.table import Row, number_table
 from ikns.recording.recording import Recording
 
 
-def read_vicon_csv(path: Path) -> Recording:
+def read_vicon_csv(path: Path, lines: list[str]) -> Recording:
     """Read the trajectories of a Vicon Nexus CSV export.
 
     Frame 1 is at 0 s, as in the C3D and TRC files of the same trial. Other sections
     (devices, model outputs, joints) are ignored.
     """
-    head, rows = _trajectories(path)
+    head, rows = _trajectories(path, lines)
     rate = checked_rate(path, _number(head[0]))
     label_row, components, units = (line.split(",") for line in head[1:])
     if [cell.strip() for cell in components[:2]] != ["Frame", "Sub Frame"]:
@@ -61,9 +61,8 @@ def read_vicon_csv(path: Path) -> Recording:
     return to_recording(path, time, markers, list(named.values()), unit=unit)
 
 
-def _trajectories(path: Path) -> tuple[list[str], list[tuple[int, str]]]:
+def _trajectories(path: Path, lines: list[str]) -> tuple[list[str], list[Row]]:
     """Return four header lines and the numbered lines of frames, without blanks."""
-    lines = text_lines(path)
     filled = [(i + 1, line) for i, line in enumerate(lines) if line.strip(" ,\t")]
     titles = [line.strip(" ,\t\"'") for _, line in filled]
     if "Trajectories" not in titles:

@@ -1,0 +1,72 @@
+"""``ikns convert``: one file into another format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ikns.cli.options import MARKER_FILES, AsJson, Force, From, SubjectPrefix, To
+from ikns.cli.output import show
+from ikns.output.file import refuse_overwriting
+
+
+def convert(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help=f"Markers, {MARKER_FILES}; or joint angles, .mot, .sto or .csv."
+        ),
+    ],
+    target: Annotated[
+        Path,
+        typer.Argument(
+            help="File to write: .c3d, .trc or .csv for markers, .mot, .sto or .csv "
+            "for joint angles."
+        ),
+    ],
+    subject_prefix: SubjectPrefix = None,
+    from_: From = None,
+    to: To = None,
+    stream: Annotated[
+        str | None, typer.Option(help="Of several with markers in an .xdf file.")
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write a recording, or joint angles, in another format; or a part of it.
+
+    Labels and times stay as they are; --subject-prefix takes the prefix off.
+    """
+    from ikns.recording.files.convert import convert_file
+
+    refuse_overwriting(target, force=force, inputs=[source])
+    found = convert_file(
+        source,
+        target,
+        subject_prefix=subject_prefix,
+        start=from_,
+        end=to,
+        stream=stream,
+        force=force,
+    )
+    lost = (
+        f", without {found.left_out} frames in which a coordinate is missing"
+        if found.left_out
+        else ""
+    )
+    show(
+        {
+            "source": source,
+            "target": target,
+            "kind": found.kind,
+            "frames": found.frames,
+            "names": found.names,
+            "duration_s": found.duration,
+            "frames_left_out": found.left_out,
+        },
+        f"Wrote {target}: {found.kind}, {len(found.names)} of them in {found.frames} "
+        f"frames, {found.duration:.2f} s{lost}",
+        as_json=as_json,
+    )
