@@ -23,6 +23,8 @@ FILES_OUT = {
     "scale": ["out"],
     "ik": ["out"],
     "control": ["out"],
+    "convert": ["target"],
+    "markers new": ["out"],
     "compare": ["figure"],
     "robot": ["figure"],
     "ucm": ["figure"],
@@ -46,6 +48,12 @@ PERSON = {"subject": "person"}
 READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "scale": (["--stature", "1.75", "--mass", "70", "--sex", "male"], {}),
     "ik": ([], {"recording": "free.c3d", **PERSON}),
+    "convert": ([], {"source": "free.c3d"}),
+    "markers list": ([], {}),
+    "markers show": ([], {}),
+    "markers sites": ([], {}),
+    "markers check": ([], {"static": "static.c3d"}),
+    "markers new": ([], {"static": "static.c3d", "sites": "sites.txt"}),
     "control": ([], {"recording": "free.c3d", **PERSON}),
     "compare": ([], {"recording": "points.c3d", "reaches": "free.c3d", **PERSON}),
     "robot": (["--frame", "tip"], {"urdf": "model.urdf", "angles": "free.csv"}),
@@ -64,6 +72,10 @@ READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "study plan": ([], {"study": "study", "pilot": "pilot"}),
     "stream": ([], {"recording": "free.c3d"}),
 }
+
+
+#: Paths that a command reads instead of one of those.
+INSTEAD = {"ik": ["static"]}
 
 
 def leaves(command: Any, name: str = "") -> Iterator[tuple[str, Any]]:
@@ -93,7 +105,7 @@ def test_it_is_known_which_paths_a_command_reads_and_which_it_writes(name: str) 
         for outputs in (FILES_OUT, FOLDERS_OUT, NEW_OUT)
         for option in outputs.get(name, [])
     ]
-    read = list(READS[name][1])
+    read = [*READS[name][1], *INSTEAD.get(name, [])]
     assert sorted(written + read) == sorted(paths(COMMANDS[name]))
     forced = "force" in options(COMMANDS[name])
     assert forced == (
@@ -110,7 +122,7 @@ def desk(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("study", "pilot", "session"):
         (place / name / "visits").mkdir(parents=True)
         (place / name / "study.toml").write_text("declared")
-    for name in ("model.urdf", "free.csv"):
+    for name in ("model.urdf", "free.csv", "sites.txt"):
         (place / name).write_text("needed")
     return place
 
@@ -140,7 +152,7 @@ DISGUISES: dict[str, Callable[[Path, Path], None]] = {
     "chain": chain_of_links,
     "hard link": lambda target, source: os.link(source, target),
 }
-SUFFIX = {"figure": ".png", "png": ".png", "export": ".csv"}
+SUFFIX = {"target": ".c3d", "figure": ".png", "png": ".png", "export": ".csv"}
 READERS = [
     (name, output, option)
     for name, outputs in FILES_OUT.items()

@@ -17,10 +17,16 @@ RIGHT = {
     "calibrate": "--static {static} --exploration {points} --out new",
     "ik": "{free} --subject {person} --out new.csv",
     "control": "{free} --subject {person} --out new.csv",
+    "convert": "{free} new.trc",
+    "markers list": "",
+    "markers show": "oxford24",
+    "markers sites": "",
+    "markers check": "oxford24 {static}",
+    "markers new": "{static} --guess --out new.toml",
     "compare": "{points} --subject {person}",
     "robot": "{urdf} {angles} --frame tip",
     "ucm": "{points} --subject {person}",
-    "view": "{person} --out new.html",
+    "view": "{person} {free} --out new.html",
     "run": "--subject {person} --source replay:{free} --dry-run --session new",
     "replay": "{session}",
     "stream": "{free} --wait 0.1",
@@ -64,6 +70,8 @@ WRONG = {
     "control out": WRITE_FILE,
     "coordinates": CHOICE,
     "countdown": FROM_ZERO,
+    "convert source": READ_FILE,
+    "convert stream": ["", "no-such-stream"],
     "cutoff": POSITIVE,
     "difference": NOT_FINITE,
     "duration": FROM_ZERO,
@@ -79,7 +87,9 @@ WRONG = {
     "hold_speed": FROM_ZERO,
     "host": [*TEXT, "no.such.host.invalid", "999.1.1.1"],
     "id": [*NOT_WHOLE, "-1", "255"],
+    "from_": ["", "nan", "1e999", "1e300", "no-such-event"],
     "ik out": WRITE_FILE,
+    "ik static": READ_FILE,
     "intervals": [*NOT_WHOLE, "-1"],
     "jobs": [*NOT_WHOLE, "-2", "0"],
     "labels": READ_FILE,
@@ -119,6 +129,10 @@ WRONG = {
     "reaches": READ_FILE,
     "recording": READ_FILE,
     "recordings": READ_FILE,
+    "markers check marker_set": ["", "nan", "{nowhere}", "{folder}", "{binary}"],
+    "markers new name": [""],
+    "markers new out": [*WRITE_FILE, "x.exe"],
+    "markers show marker_set": ["", "nan", "{nowhere}", "{folder}", "{binary}"],
     "rename": ["", "x", "=", "A=", "=B", "A=B=C"],
     "repeats": COUNT,
     "replay session": READ_FOLDER,
@@ -144,10 +158,14 @@ WRONG = {
     "stick": CHOICE,
     "stream fault": ["x", "drop=nan", "drop=2", "late=0.1:inf", "drop=-1", "drop"],
     "study run folder": READ_FOLDER,
+    "sites": READ_FILE,
     "study": READ_FOLDER,
     "subject": READ_FOLDER,
     "surrogates": COUNT,
+    "subject_prefix": ["", ":", "nobody"],
+    "target": [*WRITE_FILE, "x.exe", "x"],
     "task": CHOICE,
+    "to": ["", "nan", "-inf", "-1", "no-such-event"],
     "training": [*NOT_WHOLE, "-1"],
     "trial_spread": FROM_ZERO,
     "urdf": READ_FILE,
@@ -158,11 +176,13 @@ WRONG = {
 }
 FLAGS = {
     *("as_json", "auto", "browser", "clavicle", "dry_run", "everywhere", "force"),
-    *("live", "loop", "open_page", "quick", "realtime", "resume", "simulated"),
+    *("guess", "live", "loop", "open_page", "quick", "realtime", "resume", "simulated"),
     *("smooth", "view"),
 }
 #: Options that count only together with others.
 WITH = {
+    "ik marker_set": "--static {static}",
+    "ik min_static": "--static {static}",
     "calibrate source": "--live",
     "calibrate static_seconds": "--live --source replay:{free}",
     "calibrate free_seconds": "--live --source replay:{free}",
@@ -205,6 +225,10 @@ TOGETHER = [
     "scale --stature 1.7 --mass 70 --sex male",
     "ik",
     "ik {free}",
+    "markers list extra",
+    "markers sites extra",
+    "ik {free} --subject {person} --marker-set oxford24 --out new.csv",
+    "ik {free} --subject {person} --static {static} --out new.csv",
     "ik {free} {points} --subject {person} --out new.csv",
     "calibrate --out new",
     "calibrate --out new --static {static}",
@@ -330,6 +354,8 @@ def _uses() -> list[list[str]]:
                     ):
                         if name != each.name and f"--{name}" not in extra:
                             extra += [f"--{name}", right]
+                if command == "ik" and "--static" in extra:
+                    words = _without(words, "--subject")
                 if "--live" in extra:
                     words = _without(_without(words, "--static"), "--exploration")
                 if argument:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force, From, MarkerSetName, RecordingFile, To
+from ikns.cli.options import AsJson, Force, From, OptionalMarkerSet, RecordingFile, To
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput, naming
@@ -27,7 +27,7 @@ def ik(
         Path | None,
         typer.Option(help="Instead of a subject: the person standing still."),
     ] = None,
-    marker_set: MarkerSetName = "oxford24",
+    marker_set: OptionalMarkerSet = None,
     out: Annotated[
         list[Path] | None,
         typer.Option(
@@ -65,6 +65,10 @@ def ik(
             "expected --subject, a folder of `ikns calibrate`, or --static, a "
             f"recording, found {'neither' if subject is None else 'both'}."
         )
+    if subject is not None and marker_set is not None:
+        raise InvalidInput(
+            "--marker-set goes with --static; a subject has markers of its own."
+        )
     left_out: list[str] = []
     if static is None:
         assert subject is not None
@@ -75,7 +79,7 @@ def ik(
             skeleton, scaling = ikns.scale(
                 ikns.Skeleton.load(),
                 still,
-                marker_set=marker_set,
+                marker_set=marker_set or "oxford24",
                 min_duration=min_static,
             )
         left_out = scaling.sentences(still.source)

@@ -41,3 +41,10 @@ MarkerSetName = Annotated[
         "of a .toml file."
     ),
 ]
+OptionalMarkerSet = Annotated[
+    str | None,
+    typer.Option(
+        help="A name that `ikns markers list` shows, such as plug_in_gait, or the path "
+        "of a .toml file."
+    ),
+]

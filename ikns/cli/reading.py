@@ -15,8 +15,8 @@ import ikns
 from ikns.errors import InvalidInput
 
 #: What a command calls to read a marker file, with ``start`` and ``end`` of
-#: :func:`ikns.read` if it likes.
-Read = Callable[..., "ikns.Recording"]
+#: :func:`ikns.read` if it likes; it returns the recording.
+Read = Callable[..., Any]
 
 _OPTIONS = {
     "subject_prefix": (
