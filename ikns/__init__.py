@@ -21,6 +21,7 @@ Motion: joints over time
     Motion                       joint angles, velocities and hand poses
 
 Map: the null space and its range where the hand is
+    check_recordings             what is wrong with recordings, before they are used
     calibrate                    static trial and explorations in, a subject out
     Subject                      skeleton, map and report of a person
     NullSpaceMap                 the map, learned from still samples

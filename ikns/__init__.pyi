@@ -17,6 +17,7 @@ from .motion.marker_ik import MarkerIK as MarkerIK
 from .motion.motion import Motion as Motion
 
 # Map
+from .calibration.judge.recordings import check_recordings as check_recordings
 from .calibration import calibrate as calibrate
 from .calibration.subject import Subject as Subject
 from .nullspace.map import NullSpaceMap as NullSpaceMap

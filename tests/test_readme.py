@@ -53,6 +53,7 @@ def test_every_command_line_shown_is_one_that_the_program_knows(
     shown = [line.split() for line in "".join(blocks("console")).splitlines()]
     assert {line[1] for line in shown} == {
         "calibrate",
+        "check",
         "compare",
         "control",
         "ik",

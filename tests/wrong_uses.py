@@ -13,6 +13,7 @@ __all__ = ["ALL", "options", "undescribed"]
 #: Uses that are right but for what is appended. Braces name files of the test.
 RIGHT = {
     "demo": "--out new",
+    "check": "{free} --subject {person}",
     "scale": "--stature 1.7 --mass 70 --sex male --out new.urdf",
     "calibrate": "--static {static} --exploration {points} --out new",
     "ik": "{free} --subject {person} --out new.csv",

@@ -23,6 +23,9 @@ from ikns.errors import FileError, MarkerMismatch
 _NUMBER = re.compile(r" #\d+$")
 
 _FORMAT = 1
+#: How far the farthest marker of a set is from its segment's origin, mm: more than the
+#: skin's thickness, less than a body.
+_FARTHEST = (2.0, 1500.0)
 
 
 @dataclass(frozen=True)
@@ -100,12 +103,20 @@ class MarkerSet:
         try:
             markers = tuple(_read_marker(k, v) for k, v in table["markers"].items())
             held = tuple(table.get("held", ()))
-            return cls(table["name"], markers, held, table.get("source", ""))
+            loaded = cls(table["name"], markers, held, table.get("source", ""))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise FileError(
                 f"{path}: every marker needs link, position_mm (3 numbers) and "
                 f"placement_sd_mm; found a fault at {error}."
             ) from None
+        farthest = 1000 * max((max(map(abs, m.position)) for m in markers), default=0)
+        if not (farthest == 0 or _FARTHEST[0] < farthest < _FARTHEST[1]):
+            raise FileError(
+                f"{path}: expected positions on a body in mm, found none farther than "
+                f"{farthest:.3g} mm from its segment: position_mm may be in another "
+                "unit, such as meters."
+            )
+        return loaded
 
     def toml(self) -> str:
         """Return the text of a TOML file that :meth:`load` reads back."""

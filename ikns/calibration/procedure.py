@@ -14,17 +14,19 @@ from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference
+from ikns.calibration.judge.exploration import judge_exploration
+from ikns.calibration.judge.finding import refused
+from ikns.calibration.judge.subjects import other_subject
 from ikns.calibration.report import (
     exploration_report,
     extrinsic_report,
-    marker_fault,
     points_report,
     static_report,
 )
 from ikns.calibration.scaled_body import scaled_body
 from ikns.calibration.scaling import ScalingReport, scale
 from ikns.calibration.subject import Subject
-from ikns.errors import InvalidInput, NotEnoughData, naming
+from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.recording.recording import Recording
@@ -89,10 +91,11 @@ def calibrate(
     Raises
     ------
     MarkerMismatch
-        When a segment of the chain has no marker in a recording.
+        When a segment of the chain has no marker in a recording, or a recording must
+        not be used: names exchanged, another unit, another person.
     NotEnoughData
-        When the static trial is too short, no sample is still, or the usable points
-        are fewer than 4 or in one plane.
+        When the static trial is too short or the person moves in it, no sample is
+        still, or the usable points are fewer than 4 or in one plane.
     InvalidInput
         When a parameter is out of its range.
 
@@ -123,6 +126,11 @@ def calibrate(
             skeleton, scaling = scale(
                 body, static, marker_set=marker_set, min_duration=min_static
             )
+    warned = [
+        sentence
+        for recording in explorations
+        for sentence in _judged(static, recording, skeleton, chain)
+    ]
     solver = MarkerIK(skeleton)
     motions = tuple(
         solver.track(
@@ -184,11 +192,7 @@ def calibrate(
                 if static is None
                 else _left_out(static, scaling, marker_set, explorations, chain)
             ),
-            *(
-                f"{recording.source}: {fault}"
-                for recording in explorations
-                if (fault := marker_fault(skeleton, recording, chain))
-            ),
+            *warned,
             *(str(warning.message) for warning in caught),
         ],
     }
@@ -205,6 +209,21 @@ def _assumed(scaling: ScalingReport) -> str:
         f"stature, and people differ from that by {1000 * min(arm):.0f} to "
         f"{1000 * max(arm):.0f} mm (standard deviation of an arm's segments)."
     )
+
+
+def _judged(
+    static: Recording | None, recording: Recording, skeleton: Skeleton, chain: str
+) -> list[str]:
+    """Return warnings of a recording, or refuse it."""
+    worn = skeleton.marker_set
+    # Without a static trial the person's own distances are not known.
+    known = None if static is None else skeleton
+    findings = judge_exploration(recording, worn, skeleton, skeleton=known, chain=chain)
+    if static is not None:
+        findings += other_subject(static, recording, worn)
+    if faults := refused(findings):
+        raise MarkerMismatch(faults[0].sentence)
+    return [finding.sentence for finding in findings if finding.severity == "warn"]
 
 
 def _left_out(

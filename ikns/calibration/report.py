@@ -11,15 +11,9 @@ from ikns.arrays import Mask
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.scaling import ScalingReport
-from ikns.motion.marker_ik.visibility import say_apart, segment_pairs
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.recording.recording import Recording
-
-#: Most that the distance of two markers of a segment may differ from the static trial,
-#: median, m. Real people's differ by 2 to 4 mm, for moments by up to 24
-#: (benchmarks/stray_marker.py).
-_MOST_CHANGE = 0.02
 
 
 def static_report(static: Recording | None, scaling: ScalingReport) -> dict[str, Any]:
@@ -104,24 +98,3 @@ def extrinsic_report(
         "thorax_rotation_deg": float(np.degrees(np.linalg.norm(span[3:6]))),
         "joints_deg": {joint: angle for joint, angle in angles if joint not in own},
     }
-
-
-def marker_fault(skeleton: Skeleton, recording: Recording, chain: str) -> str:
-    """Say which marker of a chain is not where it was; empty where none is.
-
-    Told by the distances within segments, their median over the recording.
-    """
-    markers = skeleton.marker_set.pick(recording.labels, recording.markers)
-    pairs, worn = segment_pairs(skeleton, chain)
-    first, second = np.moveaxis(markers[:, pairs], 2, 0)
-    apart = np.linalg.norm(first - second, axis=2)
-    change = np.zeros(len(pairs))
-    seen = np.isfinite(apart).any(axis=0)
-    change[seen] = np.nanmedian(apart[:, seen], axis=0) - worn[seen]
-    if not (np.abs(change) > _MOST_CHANGE).any():
-        return ""
-    k = int(np.abs(change).argmax())
-    return (
-        f"{say_apart(skeleton, pairs[k], change[k])} than in the static trial: a "
-        "marker moved or carries another's name."
-    )

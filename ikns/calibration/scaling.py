@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +13,17 @@ from numpy.typing import NDArray
 from ikns.arrays import Array
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.finding import Finding, refused, worst_first
+from ikns.calibration.judge.static import body_size, judge_posture, movement
+from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.size_fit import (
+    SizeFit,
     fit_sizes,
     length_deviations,
     size_factors,
 )
 from ikns.calibration.static_trial import seen_markers, static_posture
+from ikns.errors import MarkerMismatch, NotEnoughData
 from ikns.recording.recording import Recording
 
 #: A marker that the static trial does not show is kept only where its nominal place is
@@ -43,9 +49,10 @@ class ScalingReport:
     held: tuple[str, ...]  # joints that the markers cannot observe
     duration: float  # length of the static trial, s
     converged: bool  # whether the fit met its tolerance
+    warnings: tuple[str, ...] = ()  # what the judge found and did not refuse
 
     def sentences(self, source: str, *, only: Iterable[str] | None = None) -> list[str]:
-        """Name the markers that were left out as nobody saw them; one sentence, if any.
+        """Say what the judge warns of, and which markers were left out as never seen.
 
         Parameters
         ----------
@@ -58,11 +65,20 @@ class ScalingReport:
         if only is not None:
             lost &= set(only)
         if not lost:
-            return []
+            return [*self.warnings]
         return [
+            *self.warnings,
             f"{source}: expected every marker in sight, found none of "
-            f"{', '.join(sorted(lost))}: left out, as their places are unknown."
+            f"{', '.join(sorted(lost))}: left out, as their places are unknown.",
         ]
+
+
+class StaticJudgment(NamedTuple):
+    """What a judge says of a static trial."""
+
+    findings: list[Finding]  # the worst first
+    skeleton: Skeleton | None  # the person's; None where there is nothing to fit
+    report: ScalingReport | None
 
 
 def scale(
@@ -97,7 +113,8 @@ def scale(
     NotEnoughData
         When the trial is too short or the person moves in it.
     MarkerMismatch
-        When no marker is known or a whole segment has none.
+        When no marker is known or a whole segment has none, or no person stands like
+        that: names exchanged, another unit, a mirror image.
 
     Examples
     --------
@@ -109,11 +126,63 @@ def scale(
     >>> abs(report.lengths["right_forearm"] - true) < 0.005
     True
     """
-    reference, target, duration = static_posture(
+    found = judge_static(
         generic, static, marker_set=marker_set, min_duration=min_duration
     )
-    worn = reference.marker_set
+    if faults := refused(found.findings):
+        moved = faults[0].kind == "moved"
+        raise (NotEnoughData if moved else MarkerMismatch)(faults[0].sentence)
+    assert found.skeleton is not None
+    assert found.report is not None
+    return found.skeleton, replace(
+        found.report, warnings=tuple(finding.sentence for finding in found.findings)
+    )
+
+
+def judge_static(
+    generic: Skeleton,
+    static: Recording,
+    *,
+    marker_set: str | Path | MarkerSet = "oxford24",
+    min_duration: float = 1.0,
+) -> StaticJudgment:
+    """Judge a static trial, and fit a skeleton to it where that makes sense.
+
+    Arguments are those of :func:`scale`, which raises what is refused here. The same
+    errors as there are raised for a trial that is too short or lacks a segment.
+    """
+    where = static.source
+    worn = (
+        marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
+    )
+    markers = worn.pick(static.labels, static.markers)
+    size = body_size(where, markers, generic.with_nominal_markers(worn))
+    if size:
+        return StaticJudgment(size, None, None)
+    traces, spoiled, measured = judge_traces(where, worn.labels, static.time, markers)
+    # What is known to be wrong for a moment is left out, and warned of.
+    kept = static
+    if traces:
+        kept = Recording(
+            static.time[~spoiled], measured[~spoiled], worn.labels, static.source
+        )
+    reference, target, duration = static_posture(
+        generic, kept, marker_set=worn, min_duration=min_duration
+    )
+    findings = traces + movement(where, worn.labels, measured[~spoiled])
+    if refused(findings):
+        return StaticJudgment(worst_first(findings), None, None)
     fit = fit_sizes(reference, target)
+    findings += judge_posture(where, reference, target, fit)
+    skeleton, report = _fitted(reference, target, fit, duration)
+    return StaticJudgment(worst_first(findings), skeleton, report)
+
+
+def _fitted(
+    reference: Skeleton, target: Array, fit: SizeFit, duration: float
+) -> tuple[Skeleton, ScalingReport]:
+    """Return the body with the markers that are kept, and how well it is known."""
+    worn = reference.marker_set
     sized = reference.resized(size_factors(fit.log_sizes))
     placed = worn.at(fit.positions)
     seen = seen_markers(target)

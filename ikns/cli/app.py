@@ -13,6 +13,7 @@ import typer
 
 import ikns
 from ikns.cli.calibrate import calibrate
+from ikns.cli.check import check
 from ikns.cli.checks import checked
 from ikns.cli.compare import compare
 from ikns.cli.control import control
@@ -44,6 +45,7 @@ app = typer.Typer(
 )
 for command in (
     demo,
+    check,
     scale,
     calibrate,
     ik,

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.scaling import scale
+from ikns.calibration import scaling
+from ikns.calibration.judge.finding import refused
+from ikns.calibration.judge.static import marker_displacement
 from ikns.errors import IknsError
 from ikns.live.calibration.measures import (
     SEEN_SHARE,
-    marker_displacement,
     median,
     millimeters,
     missing_percent,
@@ -32,10 +33,6 @@ from ikns.recording.recording import Recording
 
 Array = NDArray[np.float64]
 
-#: Largest displacement of a marker of a person who stands still, without the sway of
-#: the whole body, m: as much as markers are misplaced on the skin (10 mm for most of a
-#: set). Two real static trials have 0.7 and 1.2 mm, simulated ones 2 to 7 mm.
-STILL_MARKERS = 0.010
 #: A hand that moves farther than this is not at one position, and two points closer
 #: than this are not two positions, m (a fifth of a small workspace; chosen here).
 ONE_PLACE = 0.05
@@ -97,41 +94,42 @@ def judge_static(
     markers = expected.pick(recording.labels, recording.markers)
     seen = np.all(np.isfinite(markers), axis=2)
     never = [m for m, s in zip(expected.labels, seen.any(axis=0), strict=True) if not s]
-    spread = marker_displacement(markers)
     values: dict[str, Any] = {
         "seconds": len(recording.time) / recording.rate,
         "markers_seen": len(expected.labels) - len(never),
         "markers_expected": len(expected.labels),
         "markers_never_seen": never,
         "missing_percent": percent(~seen),
-        "spread_mm": millimeters(spread.max(initial=0.0)),
+        "spread_mm": millimeters(marker_displacement(markers).max(initial=0.0)),
     }
     try:
-        skeleton, report = scale(
+        judged = scaling.judge_static(
             generic, recording, marker_set=marker_set, min_duration=min_static
         )
     except IknsError as error:
         return Verdict(False, False, str(error), values)
-    values["residual_mm"] = millimeters(max(report.residuals.values()))
-    reason = ""
-    if spread.max() > STILL_MARKERS:
-        reason = (
-            f"The person moved: {expected.labels[int(spread.argmax())]} by "
-            f"{millimeters(spread.max()):.0f} mm, expected at most "
-            f"{millimeters(STILL_MARKERS):.0f} mm."
-        )
-    elif not report.converged:
-        reason = "The body could not be fitted to the markers."
-    elif lost := _lost(expected, seen.any(axis=0), recording.labels, report.dropped):
+    values["findings"] = [finding.as_dict() for finding in judged.findings]
+    faults = [f for f in judged.findings if f.severity != "note"]
+    reason = faults[0].reason if faults else ""
+    if judged.report is None or refused(faults):
+        return Verdict(False, False, _sentence(reason), values)
+    values["residual_mm"] = millimeters(max(judged.report.residuals.values()))
+    dropped = judged.report.dropped
+    if not reason and (
+        lost := _lost(expected, seen.any(axis=0), recording.labels, dropped)
+    ):
         reason = (
             f"Never in sight: {', '.join(lost)}; what the static trial does not show "
             "cannot be used later."
         )
-    elif np.mean(seen[:, seen.any(axis=0)]) < SEEN_SHARE:
+    elif not reason and np.mean(seen[:, seen.any(axis=0)]) < SEEN_SHARE:
         reason = f"{values['missing_percent']:.0f} % of the markers were missing."
-    return Verdict(
-        not reason, True, reason or "The person stood still.", values, skeleton=skeleton
-    )
+    words = _sentence(reason or "The person stood still.")
+    return Verdict(not reason, True, words, values, skeleton=judged.skeleton)
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _lost(
@@ -183,7 +181,7 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
         return Verdict(False, False, "The hand was hardly ever in sight.", values)
     box = minimum_bounding_box(explored)
     values["box_cm"] = np.round(200 * box.half_lengths, 1).tolist()
-    reason = tracking_fault(skeleton, recording, motion, known, chain=chain)
+    reason = tracking_fault(skeleton, recording, known, chain=chain)
     if not reason and 2 * box.half_lengths.min() < LEAST_BOX:
         reason = (
             f"The hand explored a volume only {200 * box.half_lengths.min():.0f} cm "

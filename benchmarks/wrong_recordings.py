@@ -1,0 +1,289 @@
+"""What the judge of recordings says when two labels are exchanged, and when none are.
+
+Every pair of markers of a set that lie at different places carries each other's name:
+everywhere (static trial and recording), or in 30 or 5 % of the recording's frames. It
+counts when a joint turns by more than 10 deg for it, median over the frames concerned;
+it is told when the judge finds anything. `oxford24` is worn by a simulated person,
+`ue_adl` by real ones. False alarms are counted on clean real recordings of all people.
+"""
+
+import argparse
+import json
+import platform
+import time
+from itertools import combinations
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ikns import MarkerIK, MarkerSet, Skeleton, read
+from ikns.calibration.judge.recordings import check_recordings
+from ikns.calibration.scaling import judge_static
+from ikns.recording.recording import Recording
+from ikns.simulation import simulate_protocol, virtual_subject
+
+BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
+MODES = {"everywhere": 1.0, "in 30 %": 0.3, "in 5 %": 0.05}
+#: Markers closer than this lie at one place, m.
+ONE_PLACE = 0.015
+#: A joint that turns by more than this is wrong, rad.
+WRONG = np.radians(10.0)
+
+
+class Person(NamedTuple):
+    """A clean static trial and recording, and what they give."""
+
+    name: str
+    marker_set: str
+    static: Recording
+    recording: Recording
+    skeleton: Skeleton
+    angles: np.ndarray
+
+
+def clean(
+    name: str, marker_set: str, static: Recording, recording: Recording
+) -> Person:
+    """Scale and track without any exchange."""
+    skeleton = judge_static(
+        Skeleton.load(), static, marker_set=marker_set, min_duration=0.1
+    ).skeleton
+    assert skeleton is not None, f"{name}: a clean static trial is refused"
+    angles = MarkerIK(skeleton).track(recording).angles
+    return Person(name, marker_set, static, recording, skeleton, angles)
+
+
+def simulated(seed: int) -> Person:
+    """Simulate somebody who holds the hand at ten points."""
+    run = simulate_protocol(
+        virtual_subject(seed),
+        seed=seed,
+        rate=50,
+        static_seconds=1.2,
+        free_seconds=0.1,
+        point_seconds=1.5,
+    )
+    return clean(
+        f"simulated {seed}", "oxford24", run.static.recording, run.points.recording
+    )
+
+
+def real(folder: Path, name: str, task: str) -> Person:
+    """Read a person of UE_ADL."""
+    static = read(folder / name / f"{name}_static.csv")
+    return clean(name, "ue_adl", static, read(folder / name / f"{name}{task}.csv"))
+
+
+def exchanged(recording: Recording, a: str, b: str, rows: slice) -> Recording:
+    """Exchange two names in some frames of a recording, where it has both."""
+    labels = [label.rpartition(":")[2] for label in recording.labels]
+    if not {a, b} <= set(labels):
+        return recording
+    markers = np.array(recording.markers)
+    i, j = labels.index(a), labels.index(b)
+    markers[rows, i], markers[rows, j] = (
+        recording.markers[rows, j],
+        (recording.markers[rows, i]),
+    )
+    return Recording(recording.time, markers, recording.labels, recording.source)
+
+
+def pairs_of(person: Person) -> list[tuple[str, str]]:
+    """Pairs of markers at different places in the static trial."""
+    worn = MarkerSet.load(person.marker_set)
+    places = worn.pick(person.static.labels, person.static.markers)
+    seen = np.isfinite(places).all(axis=2).any(axis=0)
+    middle = np.full(places.shape[1:], np.nan)
+    middle[seen] = np.nanmedian(places[:, seen], axis=0)
+    return [
+        (worn.labels[i], worn.labels[j])
+        for i, j in combinations(np.flatnonzero(seen), 2)
+        if np.linalg.norm(middle[i] - middle[j]) > ONE_PLACE
+    ]
+
+
+def judge(person: Person, a: str, b: str, share: float, rng) -> dict:
+    """Exchange two markers, and ask the judge."""
+    n = len(person.recording.time)
+    count = max(1, round(share * n))
+    first = int(rng.integers(n - count + 1))
+    rows = slice(first, first + count)
+    static = person.static
+    if share == 1.0:
+        static = exchanged(static, a, b, slice(None))
+    recording = exchanged(person.recording, a, b, rows)
+    start = time.process_time()
+    found = check_recordings(
+        [recording],
+        static=static if share == 1.0 else None,
+        skeleton=None if share == 1.0 else person.skeleton,
+        marker_set=person.marker_set,
+    )
+    spent = time.process_time() - start
+    told = [f for f in found.findings if f.severity != "note"]
+    named = any({a, b} <= set(f.markers) for f in told if f.kind == "exchanged")
+    return {
+        "pair": (a, b),
+        "told": bool(told),
+        "named": named,
+        "refused": not found.usable,
+        "turned_deg": _turned(person, static, recording, rows, share),
+        "seconds": spent,
+    }
+
+
+def _turned(
+    person: Person, static: Recording, recording: Recording, rows: slice, share: float
+) -> float:
+    """How far the worst joint turns, deg; NaN where there is no body to fit."""
+    skeleton: Skeleton | None = person.skeleton
+    if share == 1.0:
+        skeleton = judge_static(
+            Skeleton.load(), static, marker_set=person.marker_set, min_duration=0.1
+        ).skeleton
+        if skeleton is None:
+            return float("nan")
+    off = np.abs(MarkerIK(skeleton).track(recording).angles - person.angles)[rows]
+    seen = np.isfinite(off).any(axis=0)
+    return float(np.degrees(np.nanmedian(off[:, seen], axis=0).max()))
+
+
+def false_alarms(folder: Path, people: list[str], *, quick: bool) -> list[dict]:
+    """Check all clean recordings of each person, a row a person."""
+    rows = []
+    for name in people:
+        files = sorted((folder / name).glob(f"{name}*[0-9].csv"))[
+            : 4 if quick else None
+        ]
+        recordings = [read(path) for path in files]
+        static = read(folder / name / f"{name}_static.csv")
+        start = time.process_time()
+        found = check_recordings(recordings, static=static, marker_set="ue_adl")
+        alone = check_recordings(recordings, marker_set="ue_adl")
+        rows.append(
+            {
+                "person": name,
+                "recordings": len(recordings),
+                "frames": sum(len(one.time) for one in recordings),
+                "alarms": [
+                    finding.sentence
+                    for finding in (*found.findings, *alone.findings)
+                    if finding.severity != "note"
+                ],
+                "seconds": time.process_time() - start,
+            }
+        )
+    return rows
+
+
+def speed(person: Person, *, count: int, seconds: float) -> float:
+    """CPU time for recordings of this length with a known body, s."""
+    one = person.recording
+    frames = round(seconds * one.rate)
+    # There and back again, so that nothing jumps.
+    there = np.concatenate([one.markers, one.markers[::-1]])
+    markers = np.tile(there, (-(-frames // len(there)), 1, 1))[:frames]
+    markers = markers + np.random.default_rng(0).normal(0, 2e-4, markers.shape)
+    long = Recording(np.arange(frames) / one.rate, markers, one.labels, "long")
+    start = time.process_time()
+    check_recordings([long] * count, skeleton=person.skeleton)
+    return time.process_time() - start
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=BESIDE)
+    parser.add_argument("--pairs", type=int, help="random pairs a set; default: all")
+    parser.add_argument("--set", choices=["oxford24", "ue_adl"], help="only this set")
+    parser.add_argument("--mode", choices=list(MODES), help="only this one")
+    parser.add_argument("--person", default="ADL005")
+    parser.add_argument("--task", default="CR1")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--quick", action="store_true", help="few pairs, few recordings"
+    )
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    folder = options.data / "ue_adl"
+    count = 6 if options.quick else options.pairs
+    rng = np.random.default_rng(options.seed)
+    people = []
+    if options.set != "ue_adl":
+        people.append(simulated(options.seed))
+    if options.set != "oxford24" and folder.is_dir():
+        people.append(real(folder, options.person, options.task))
+    result: dict = {"exchanges": [], "clean": [], "twenty_of_60_s": {}}
+    for person in people:
+        pairs = pairs_of(person)
+        if count and count < len(pairs):
+            pairs = [pairs[i] for i in sorted(rng.permutation(len(pairs))[:count])]
+        for mode, share in MODES.items():
+            if options.mode in (None, mode):
+                cases = [judge(person, a, b, share, rng) for a, b in pairs]
+                result["exchanges"].append(_summary(person, mode, cases))
+        result["twenty_of_60_s"][person.marker_set] = speed(
+            person, count=2 if options.quick else 20, seconds=60.0
+        ) * (10 if options.quick else 1)
+    if folder.is_dir() and options.mode is None:
+        names = sorted(path.name for path in folder.glob("ADL*"))
+        result["clean"] = false_alarms(
+            folder, names[: 1 if options.quick else None], quick=options.quick
+        )
+    if options.json:
+        print(json.dumps(result))
+        return
+    _print(result, options.seed)
+    if not folder.is_dir():
+        print(f"\nNo real recordings in {folder}: only simulated ones were judged.")
+
+
+def _summary(person: Person, mode: str, cases: list[dict]) -> dict:
+    # Without a body there is nothing to turn: it counts, and is told.
+    wrong = [c for c in cases if not c["turned_deg"] <= np.degrees(WRONG)]
+    return {
+        "person": person.name,
+        "marker_set": person.marker_set,
+        "mode": mode,
+        "pairs": len(cases),
+        "wrong": len(wrong),
+        "told": sum(c["told"] for c in wrong),
+        "named": sum(c["named"] for c in wrong),
+        "refused": sum(c["refused"] for c in wrong),
+        "silent": [
+            [*c["pair"], round(c["turned_deg"])] for c in wrong if not c["told"]
+        ],
+        "seconds": float(np.mean([c["seconds"] for c in cases])),
+    }
+
+
+def _print(result: dict, seed: int) -> None:
+    print(f"numpy {np.__version__}, Python {platform.python_version()}, seed {seed}\n")
+    print(
+        "| set | person | exchanged | pairs | turn a joint > 10 deg | told | of these "
+        "the pair named | refused | CPU s each |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    for row in result["exchanges"]:
+        share = row["told"] / row["wrong"] if row["wrong"] else 1.0
+        print(
+            f"| {row['marker_set']} | {row['person']} | {row['mode']} | {row['pairs']} "
+            f"| {row['wrong']} | {row['told']} ({share:.1%}) | {row['named']} "
+            f"| {row['refused']} | {row['seconds']:.2f} |"
+        )
+    for row in result["exchanges"]:
+        for a, b, turned in row["silent"]:
+            print(f"not told: {row['marker_set']} {row['mode']}: {a} {b}, {turned} deg")
+    alarms = sum(len(row["alarms"]) for row in result["clean"])
+    files = sum(row["recordings"] for row in result["clean"])
+    print(f"\nFalse alarms on {files} clean real recordings: {alarms}")
+    for row in result["clean"]:
+        for alarm in row["alarms"]:
+            print(f"- {alarm}")
+    for name, seconds in result["twenty_of_60_s"].items():
+        print(f"\nTwenty recordings of 60 s, {name}: {seconds:.1f} s of CPU")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,262 @@
+"""The judge of recordings in which a person moves, with their body known or not."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from ikns.arrays import Array, Indices, Mask
+from ikns.body.chains import chain_sides
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.distances import (
+    MOST_CHANGE,
+    all_distances,
+    changed_pairs,
+    exchanged_by_distance,
+    frame_changes,
+)
+from ikns.calibration.judge.finding import Finding, say_frames, worst_first
+from ikns.calibration.judge.static import body_size
+from ikns.calibration.judge.trace_findings import judge_traces
+from ikns.calibration.judge.tracking import judge_tracking
+from ikns.calibration.judge.unit import wrong_unit
+from ikns.motion.marker_ik.visibility import segment_pairs
+from ikns.recording.recording import Recording
+
+#: A distance within a segment is off in a frame by more than this, m, as for a live
+#: frame: landmarks on the skin of real people move by up to 24 mm against each other.
+_ASTRAY = 0.04
+#: Another person: so many of the distances within segments are off, by so much, m. Of
+#: the same person, 14 % were off by 5 mm, none of them by 16.
+_OTHERS, _OTHERS_CHANGE = 0.35, 0.008
+#: Shorter distances say nothing about a size, m.
+_SHORTEST = 0.01
+
+
+def judge_exploration(
+    recording: Recording,
+    worn: MarkerSet,
+    generic: Skeleton,
+    *,
+    skeleton: Skeleton | None = None,
+    chain: str = "both_arms",
+) -> list[Finding]:
+    """Judge a recording in which a person moves.
+
+    Parameters
+    ----------
+    recording : Recording
+    worn : MarkerSet
+        The markers on the person.
+    generic : Skeleton
+        Any body; its size is compared where the person's is not known.
+    skeleton : Skeleton, optional
+        The person's, from the static trial.
+    chain : str
+        See :data:`ikns.body.chains.CHAINS`; what is wrong with the other arm alone is
+        left out.
+
+    Returns
+    -------
+    list of Finding
+        The worst first.
+    """
+    findings = _judge(recording, worn, generic, skeleton)
+    sides = ("thorax", *chain_sides(chain))
+    own = {m.label for m in worn.markers if m.link.startswith(sides)}
+    return worst_first(f for f in findings if not f.markers or own & set(f.markers))
+
+
+def _judge(
+    recording: Recording, worn: MarkerSet, generic: Skeleton, skeleton: Skeleton | None
+) -> list[Finding]:
+    where = recording.source
+    if skeleton is None:
+        worn = worn.without_static()
+        pairs, apart = _pairs(worn), None
+    else:
+        worn = skeleton.marker_set
+        pairs, apart = segment_pairs(skeleton, "both_arms")
+    markers = worn.pick(recording.labels, recording.markers)
+    if skeleton is None or apart is None:
+        size = body_size(where, markers, generic.with_nominal_markers(worn))
+    else:
+        size = _size_beside(where, markers, pairs, apart)
+    if size:
+        return size
+    findings, spoiled, measured = judge_traces(
+        where, worn.labels, recording.time, markers
+    )
+    if spoiled.all():
+        return findings
+    good = measured[~spoiled]
+    distant, exchanges = _judge_distances(where, worn, good, pairs, apart)
+    findings += distant
+    findings += _astray(where, worn, measured, spoiled, pairs, exchanges)
+    if skeleton is not None:
+        order = np.arange(len(worn.markers))
+        for a, b in exchanges:
+            order[[a, b]] = order[[b, a]]
+        findings += judge_tracking(where, skeleton, good[:, order])
+    return findings
+
+
+def _pairs(worn: MarkerSet) -> Indices:
+    """Pairs (N, 2) of markers of one segment."""
+    links = [marker.link for marker in worn.markers]
+    pairs = [
+        (i, j) for i, j in combinations(range(len(links)), 2) if links[i] == links[j]
+    ]
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _size_beside(
+    where: str, markers: Array, pairs: Indices, apart: Array
+) -> list[Finding]:
+    """Compare distances within segments (N,) with those on the person, m."""
+    step = max(1, len(markers) // 60)
+    first, second = np.moveaxis(markers[::step][:, pairs[apart > _SHORTEST]], 2, 0)
+    ratio = np.linalg.norm(first - second, axis=2) / apart[apart > _SHORTEST]
+    ratio = ratio[np.isfinite(ratio)]
+    wrong = wrong_unit(float(np.median(ratio))) if ratio.size else None
+    if wrong is None:
+        return []
+    return [
+        Finding(
+            "unit",
+            "refuse",
+            where,
+            f"the body is {wrong[0]:.3g} times as large as in the static trial",
+            f"probably {wrong[1]}: correct the unit in one of the files"
+            if wrong[1]
+            else "expected the same person in the same unit",
+        )
+    ]
+
+
+def _judge_distances(
+    where: str, worn: MarkerSet, markers: Array, pairs: Indices, apart: Array | None
+) -> tuple[list[Finding], list[tuple[int, int]]]:
+    """Judge distances within segments; also return the exchanges that mend them."""
+    if not len(pairs):
+        return [], []
+    labels = worn.labels
+    found = all_distances(markers)
+    changes = changed_pairs(found, pairs, apart)
+    with np.errstate(invalid="ignore"):
+        if not (changes > MOST_CHANGE).any() and apart is None:
+            return [], []
+    exchanges, left = exchanged_by_distance(found, pairs, apart)
+    findings = [
+        Finding(
+            "exchanged",
+            "refuse",
+            where,
+            f"{labels[a]} and {labels[b]} carry each other's name: their distances to "
+            "other markers of their segments are off",
+            f"exchange {labels[a]} and {labels[b]}: then all distances fit",
+            (labels[a], labels[b]),
+        )
+        for a, b in exchanges
+    ]
+    if apart is not None and not exchanges:
+        i, j = pairs.T
+        off = np.abs(found.middle[i, j] - apart)
+        known = np.isfinite(off)
+        links = {worn.markers[i].link for i in pairs[off > _OTHERS_CHANGE][:, 0]}
+        share = np.mean(off[known] > _OTHERS_CHANGE) if known.any() else 0.0
+        if share > _OTHERS and len(links) > 2:
+            return [
+                Finding(
+                    "another person",
+                    "refuse",
+                    where,
+                    f"{100 * share:.0f} % of the distances within segments differ from "
+                    f"the static trial by more than {1000 * _OTHERS_CHANGE:.0f} mm",
+                    "use the static trial of this person and session",
+                )
+            ], []
+    if left.any() and not exchanges:
+        i, j = pairs[left].T
+        spread = found.spread[i, j]
+        shift = np.zeros(len(i)) if apart is None else found.middle[i, j] - apart[left]
+        if np.abs(shift).max() > MOST_CHANGE:
+            findings.append(_moved(where, labels, pairs[left], shift))
+        else:
+            findings.append(_unsteady(where, labels, pairs[left], spread))
+    return findings, exchanges
+
+
+def _moved(
+    where: str, labels: tuple[str, ...], pairs: Indices, changes: Array
+) -> Finding:
+    """Name the two markers whose distance changes most; changes (N,) are signed, m."""
+    total = np.bincount(pairs.ravel(), np.repeat(np.abs(changes), 2), len(labels))
+    worst = int(total.argmax())
+    own = np.flatnonzero((pairs == worst).any(axis=1))
+    k = own[int(np.abs(changes[own]).argmax())]
+    pair = [labels[i] for i in pairs[k]]
+    size = f"{1000 * abs(changes[k]):.0f} mm"
+    side = "farther apart" if changes[k] > 0 else "closer"
+    return Finding(
+        "marker moved",
+        "warn",
+        where,
+        f"{pair[0]} and {pair[1]} are {size} {side} than in the static trial",
+        f"look at {labels[worst]}: a marker moved or carries another's name",
+        (labels[worst], *(name for name in pair if name != labels[worst])),
+    )
+
+
+def _unsteady(
+    where: str, labels: tuple[str, ...], pairs: Indices, spread: Array
+) -> Finding:
+    """Name the two markers of a segment whose distance varies most."""
+    k = int(spread.argmax())
+    pair = tuple(labels[i] for i in pairs[k])
+    return Finding(
+        "marker moved",
+        "warn",
+        where,
+        f"the distance of {pair[0]} and {pair[1]}, on one segment, varies by "
+        f"{1000 * spread[k]:.0f} mm",
+        f"look at {pair[0]} and {pair[1]}: a marker carries another's name",
+        pair,
+    )
+
+
+def _astray(
+    where: str,
+    worn: MarkerSet,
+    markers: Array,
+    spoiled: Mask,
+    pairs: Indices,
+    exchanges: list[tuple[int, int]],
+) -> list[Finding]:
+    """Find frames in which a distance is off that is right in most others."""
+    if not len(pairs) or exchanges:
+        return []
+    usual = all_distances(markers[~spoiled]).middle[pairs[:, 0], pairs[:, 1]]
+    off = frame_changes(markers, pairs, usual) > _ASTRAY
+    off &= ~spoiled
+    if not off.any() or off.mean() > 0.5:
+        return []
+    change = np.zeros(len(worn.markers))
+    for (i, j), wont in zip(pairs, usual, strict=True):
+        apart = np.linalg.norm(markers[off, i] - markers[off, j], axis=1)
+        much = np.nansum(np.abs(apart - wont) > _ASTRAY)
+        change[[i, j]] += much
+    named = [worn.labels[i] for i in np.argsort(-change)[:2]]
+    return [
+        Finding(
+            "astray",
+            "warn",
+            where,
+            f"{named[0]} is not where the other markers of its segment say",
+            f"look at {named[0]} there: a ghost, or a name exchanged",
+            tuple(named),
+            say_frames(off),
+        )
+    ]

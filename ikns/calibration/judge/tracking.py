@@ -1,0 +1,147 @@
+"""Whether a person's body can follow the markers of a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ikns.arrays import Array
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.distances import quantile
+from ikns.calibration.judge.finding import Finding
+from ikns.calibration.judge.pose_cost import PoseCost
+from ikns.motion.marker_ik import MarkerIK
+from ikns.recording.recording import Recording
+
+#: Frames looked at, evenly spaced.
+_GLANCES = 60
+#: Largest distance of markers from the body that people have, m: weighted root mean
+#: square in the median frame. Seven people with clusters have 10 to 22 mm, one with
+#: single markers 9 mm, simulated ones 2 to 3 mm.
+MOST_RESIDUAL = 0.03
+#: The same for a single marker, over the frames; and where a wrong name is suspected.
+_MOST_MARKER, _SUSPECT_MARKER = 0.08, 0.05
+#: A joint beyond its limit by more than this, rad, in more than this share of frames.
+_BEYOND, _SHARE = np.radians(30.0), 0.2
+#: Share of frames in which inverse kinematics may fail.
+_MOST_FAILED = 0.1
+#: What skin and modeling leave between a marker and the body, m.
+_SKIN_SD = 0.02
+#: Frames on which exchanges are tried, and the share of the cost that one may leave.
+_TRIED, _LEFT = 3, 0.3
+
+
+def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Finding]:
+    """Judge how a skeleton follows its markers (T, M, 3), m; NaN where not seen."""
+    worn = skeleton.marker_set
+    enough = np.isfinite(markers).all(axis=2).sum(axis=1) >= 3
+    some = markers[enough][:: max(1, int(enough.sum()) // _GLANCES)]
+    if not len(some):
+        return []
+    seconds = np.arange(len(some), dtype=np.float64)
+    motion = MarkerIK(skeleton).track(Recording(seconds, some, worn.labels, where))
+    placed = np.stack([skeleton.markers_in_world(q) for q in motion.q])
+    weight = np.array([marker.weight for marker in worn.markers])
+    apart = np.linalg.norm(placed - some, axis=2)
+    weighed = np.where(np.isfinite(apart), weight, 0.0).sum(axis=1)
+    squares = np.nansum(weight * apart**2, axis=1)
+    residual = float(np.median(np.sqrt(squares / weighed)))
+    # What may give way more does not count more than it is weighed.
+    off = np.nan_to_num(quantile(apart, 0.5)) * np.minimum(1.0, np.sqrt(weight))
+    with np.errstate(invalid="ignore"):
+        angles = motion.angles
+        beyond = np.maximum(skeleton.lower - angles, angles - skeleton.upper)
+        share = (beyond > _BEYOND).mean(axis=0)
+    if (
+        off.max() > _SUSPECT_MARKER or residual > MOST_RESIDUAL or share.max() > _SHARE
+    ) and (pair := _exchanged(skeleton, some, off)):
+        first, second = (worn.labels[i] for i in pair)
+        return [
+            Finding(
+                "exchanged",
+                "refuse",
+                where,
+                f"{first} and {second} carry each other's name: no posture fits "
+                f"({1000 * residual:.0f} mm off)",
+                f"exchange {first} and {second}: then a posture fits",
+                (first, second),
+            )
+        ]
+    findings = _residual(where, worn.labels, residual, off)
+    if share.max() > _SHARE:
+        worst = int(share.argmax())
+        findings.append(
+            Finding(
+                "beyond limits",
+                "warn",
+                where,
+                f"{skeleton.joint_names[worst]} is beyond its limits by more than "
+                f"{np.degrees(_BEYOND):.0f} deg in {100 * share[worst]:.0f} % of the "
+                "frames",
+                "look at the names and places of the markers next to it",
+                _near(skeleton, skeleton.joint_names[worst]),
+            )
+        )
+    if 1 - motion.converged.mean() > _MOST_FAILED:
+        findings.append(
+            Finding(
+                "not converged",
+                "warn",
+                where,
+                f"no posture was found in {100 * (1 - motion.converged.mean()):.0f} % "
+                "of the frames",
+                "expected the markers of the person of the static trial",
+            )
+        )
+    return findings
+
+
+def _near(skeleton: Skeleton, joint: str) -> tuple[str, ...]:
+    """Name the markers of a joint's arm."""
+    side = joint.partition("_")[0]
+    markers = skeleton.marker_set.markers
+    return tuple(m.label for m in markers if m.link.startswith(side))
+
+
+def _residual(
+    where: str, labels: tuple[str, ...], residual: float, off: Array
+) -> list[Finding]:
+    """Say that the markers do not fit the body; `off` (M,) m is each one's distance."""
+    worst = int(off.argmax())
+    if residual <= MOST_RESIDUAL and off[worst] <= _MOST_MARKER:
+        return []
+    return [
+        Finding(
+            "residual",
+            "warn",
+            where,
+            f"markers and body are {1000 * residual:.0f} mm apart, {labels[worst]} "
+            f"{1000 * off[worst]:.0f} mm",
+            f"expected at most {1000 * MOST_RESIDUAL:.0f} mm with the static trial of "
+            "this person and session: a marker moved, or carries another's name",
+            (labels[worst],),
+        )
+    ]
+
+
+def _exchanged(
+    skeleton: Skeleton, markers: Array, off: Array
+) -> tuple[int, int] | None:
+    """Find two markers that must be exchanged for any posture to fit."""
+    weight = np.array([marker.weight for marker in skeleton.marker_set.markers])
+    cost = PoseCost(skeleton, _SKIN_SD / np.sqrt(np.maximum(weight, 1e-3)))
+    frames = markers[np.linspace(0, len(markers) - 1, _TRIED).astype(int)]
+    before = sum(map(cost, frames))
+    suspects = np.argsort(-off)[: max(3, int((off > _SUSPECT_MARKER).sum()))]
+    best: tuple[float, tuple[int, int]] = (_LEFT * before, (-1, -1))
+    for a in suspects.tolist():
+        for b in range(len(off)):
+            trial = frames.copy()
+            trial[:, [a, b]] = frames[:, [b, a]]
+            after = 0.0
+            for frame in trial:
+                after += cost(frame)
+                if after >= best[0]:
+                    break
+            else:
+                best = after, (min(a, b), max(a, b))
+    return best[1] if best[1][0] >= 0 else None

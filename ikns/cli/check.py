@@ -1,0 +1,81 @@
+"""``ikns check``: what is wrong with recordings, before they are used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import ikns
+from ikns.cli.options import AsJson, MarkerSetName
+from ikns.cli.output import show, table
+from ikns.cli.reading import Read, reads_markers
+from ikns.errors import InvalidInput, MarkerMismatch
+
+
+@reads_markers
+def check(
+    read: Read,
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(help="Recordings of one person: .c3d, .trc or Vicon .csv."),
+    ],
+    static: Annotated[
+        Path | None,
+        typer.Option(help="Recording of the person standing still, to compare with."),
+    ] = None,
+    subject: Annotated[
+        Path | None,
+        typer.Option(help="Folder that `ikns calibrate` wrote, to compare with."),
+    ] = None,
+    marker_set: MarkerSetName = "oxford24",
+    as_json: AsJson = False,
+) -> None:
+    """Say what is wrong in recordings: labels, units, ghosts, another person's.
+
+    A recording in which the person stands still is judged as a static trial. Exits
+    with 2 when one must not be used.
+    """
+    from ikns.calibration.judge.finding import refused
+
+    if static is not None and subject is not None:
+        raise InvalidInput("--static and --subject exclude each other; give one.")
+    found = ikns.check_recordings(
+        [read(path) for path in recordings],
+        static=None if static is None else read(static),
+        skeleton=None if subject is None else ikns.Subject.load(subject).skeleton,
+        marker_set=marker_set,
+    )
+    shown = {
+        "refuse": "do not use",
+        "warn": "take care",
+        "note": "note",
+    }
+    rows = [
+        [
+            shown[finding.severity],
+            Path(finding.where).name,
+            finding.found + (f", frames {finding.frames}" * bool(finding.frames)),
+            finding.right,
+        ]
+        for finding in found.findings
+    ]
+    show(
+        found.as_dict(),
+        table(
+            "Judged",
+            {"recording": "s", "as": "s"},
+            [[Path(name).name, kind] for name, kind in found.judged],
+        ),
+        table(
+            "Found",
+            {"verdict": "s", "recording": "s", "what": "s", "what would be right": "s"},
+            rows,
+        )
+        if rows
+        else "Nothing is wrong.",
+        as_json=as_json,
+    )
+    if faults := refused(found.findings):
+        raise MarkerMismatch(faults[0].sentence)
