@@ -7,6 +7,8 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from ikns.nullspace.clustering import BoundingBoxKMeans
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.natural_posture import NaturalPosture
+from ikns.nullspace.readout import IntentMap
 
 
 @pytest.fixture(autouse=True)
@@ -19,7 +21,15 @@ def array_api(monkeypatch):
 # longer than most commands.
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", ".*does not inherit", UserWarning)
-    all_checks = parametrize_with_checks([BoundingBoxKMeans(), NullSpaceMap()])
+    all_checks = parametrize_with_checks(
+        [
+            BoundingBoxKMeans(),
+            NullSpaceMap(),
+            NullSpaceMap(interpolation="smooth"),
+            NaturalPosture(),
+            IntentMap(n_points=2),
+        ]
+    )
 
 
 # The checks fit a few dozen random samples, about which a map rightly warns.

@@ -17,6 +17,8 @@ from ikns.calibration.elbow import elbow_reference
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import refused
 from ikns.calibration.judge.subjects import other_subject
+from ikns.calibration.places import recorded_places
+from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.report import (
     exploration_report,
     extrinsic_report,
@@ -39,6 +41,7 @@ def calibrate(
     static: Recording | None,
     explorations: Sequence[Recording],
     *,
+    natural: Sequence[Recording] = (),
     generic: Skeleton | None = None,
     marker_set: str | Path = "oxford24",
     chain: str = "right_arm",
@@ -61,7 +64,11 @@ def calibrate(
         The person standing or sitting still. Without one, `generic` is taken for the
         person's body, with the spread of people of one stature.
     explorations : sequence of Recording
-        The hand held at the PCA points while the arm moves freely.
+        The hand held at the PCA points while the arm moves freely. A recording of one
+        point alone says which samples are of one place.
+    natural : sequence of Recording
+        Ordinary movement with everyday objects, 20 s over the work space: the natural
+        posture of the method intent. Without it the reaches between the points tell.
     generic : Skeleton, optional
         Body to start from; :meth:`Skeleton.from_anthropometry` when stature, mass and
         sex are known. Default: the generic adult.
@@ -132,14 +139,15 @@ def calibrate(
         for sentence in _judged(static, recording, skeleton, chain)
     ]
     solver = MarkerIK(skeleton)
-    motions = tuple(
+    tracked = tuple(
         solver.track(
             recording,
             chain=chain,
             progress=progress and partial(progress, Path(recording.source).name),
         )
-        for recording in explorations
+        for recording in (*explorations, *natural)
     )
+    motions = tracked[: len(explorations)]
     gates = [
         still_mask(motion, chain, max_hand_speed=max_hand_speed) for motion in motions
     ]
@@ -150,7 +158,8 @@ def calibrate(
             f"m/s, found none below {np.nanmin(speeds, initial=np.inf):.3g} m/s."
         )
     pairs = list(zip(motions, gates, strict=True))
-    x = np.concatenate([motion.task_position(chain)[gate] for motion, gate in pairs])
+    hands = [motion.task_position(chain)[gate] for motion, gate in pairs]
+    x = np.concatenate(hands)
     q = np.concatenate([motion.chain_angles(chain)[gate] for motion, gate in pairs])
     posture = np.concatenate([motion.angles[gate] for motion, gate in pairs])
     enough = int(np.ceil(min_still * explorations[0].rate))
@@ -168,7 +177,16 @@ def calibrate(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
         with naming(names):
-            learned.fit(x, q)
+            learned.fit(x, q, groups=recorded_places(hands, n_points=n_points))
+    with naming(", ".join(recording.source for recording in natural) or names):
+        readouts, methods = learn_readouts(
+            skeleton,
+            learned,
+            pairs,
+            chain,
+            natural=tracked[len(explorations) :],
+            max_hand_speed=max_hand_speed,
+        )
     report = {
         "chain": chain,
         "marker_set": skeleton.marker_set.name,
@@ -178,7 +196,9 @@ def calibrate(
             "variance": variance,
             "max_hand_speed_m_s": max_hand_speed,
             "min_samples": learned.min_samples,
+            "clusters_start": learned.start_,
         },
+        "methods": methods,
         "static": static_report(static, scaling),
         "explorations": [
             exploration_report(recording, motion, gate)
@@ -198,7 +218,7 @@ def calibrate(
     }
     step = len(x) // _SHOWN + 1
     shown = np.column_stack([x, learned.labels_ + 1.0])[::step]
-    return Subject(skeleton, learned, chain, report, motions, shown)
+    return Subject(skeleton, learned, chain, report, motions, shown, readouts)
 
 
 def _assumed(scaling: ScalingReport) -> str:

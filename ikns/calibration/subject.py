@@ -1,8 +1,9 @@
 """A calibrated person: body, markers and null-space map, in memory and on disk.
 
 A subject folder is plain text: ``skeleton.urdf``, ``markers.toml``, ``map.json`` and
-``calibration.json``, the last two with a format version, and ``samples.csv`` where the
-still samples of the calibration are known.
+``calibration.json``, the last two with a format version; ``proximal.json`` and
+``intent.json`` where these methods were learned, and ``samples.csv`` where the still
+samples of the calibration are known.
 """
 
 from __future__ import annotations
@@ -22,14 +23,17 @@ from ikns.body.skeleton.model import read_urdf
 from ikns.errors import FileError, IknsError, InvalidInput, naming
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.readout import METHODS, Method, Readout
 from ikns.output.folder import check_output_folder, output_folder
 
 #: Version of the folder's layout and of the JSON files in it.
 FORMAT = 1
 _NEEDED = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
 _SAMPLES = "samples.csv"
-#: All files of a subject folder; the last is optional.
-FILES = (*_NEEDED, _SAMPLES)
+#: Methods beside the paper's, which ``map.json`` holds.
+_OTHERS: tuple[str, ...] = tuple(method for method in METHODS if method != "paper")
+#: All files of a subject folder; those after the first four are optional.
+FILES = (*_NEEDED, *(f"{method}.json" for method in _OTHERS), _SAMPLES)
 
 #: Columns of the still samples: hand position, m in the thorax frame, and number of the
 #: PCA point, from 1; 0 for none.
@@ -76,6 +80,31 @@ class Subject:
     report: dict[str, Any]
     motions: tuple[Motion, ...] = field(default=(), repr=False)
     samples: Array | None = field(default=None, repr=False)
+    readouts: dict[str, Readout] = field(default_factory=dict, repr=False)
+
+    def readout(self, method: Method = "paper") -> Readout:
+        """Return a method's map and what it reads.
+
+        Raises
+        ------
+        InvalidInput
+            When there is no such method, or this subject was calibrated without it.
+        """
+        if method == "paper":
+            return Readout("paper", self.chain, self.null_space_map)
+        if method not in METHODS:
+            raise InvalidInput(
+                f"expected a method of {', '.join(METHODS)}, found '{method}'."
+            )
+        if method not in self.readouts:
+            known = ["paper", *self.readouts]
+            lost = [other for other in _OTHERS if other not in self.readouts]
+            raise InvalidInput(
+                f"the subject has the method{'s' * (len(known) > 1)} "
+                f"{' and '.join(known)}, not {' and '.join(lost)}; calibrate one arm "
+                f"with one degree of freedom again to use '{method}'."
+            )
+        return self.readouts[method]
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Write the subject folder, completely or not at all.
@@ -100,6 +129,9 @@ class Subject:
             self.skeleton.marker_set.write(part / "markers.toml")
             _write_json(part / "map.json", self._map())
             _write_json(part / "calibration.json", {"format": FORMAT} | self.report)
+            for method, readout in self.readouts.items():
+                table = {"format": FORMAT} | readout.table()
+                _write_json(part / f"{method}.json", table)
             if self.samples is not None:
                 # A tenth of a millimeter is finer than cameras see.
                 np.savetxt(
@@ -175,7 +207,12 @@ class Subject:
                 f"{place / 'map.json'}: cannot be read as a null-space map: {fault}"
             ) from None
         samples = _read_samples(place / _SAMPLES, n_points=len(learned.centers_))
-        return cls(skeleton, learned, chain, report, samples=samples)
+        readouts = {
+            method: _read_readout(place / f"{method}.json", method, chain)
+            for method in _OTHERS
+            if (place / f"{method}.json").exists()
+        }
+        return cls(skeleton, learned, chain, report, samples=samples, readouts=readouts)
 
     def _map(self) -> dict[str, Any]:
         learned = self.null_space_map
@@ -240,6 +277,24 @@ def _read_samples(path: Path, *, n_points: int) -> Array | None:
             "pictures: the file can go."
         ) from None
     return samples
+
+
+def _read_readout(path: Path, method: str, chain: str) -> Readout:
+    """Read the map of a method beside the paper's."""
+    table = _read_json(path)
+    try:
+        if (table["method"], table["chain"]) != (method, chain):
+            raise InvalidInput(
+                f"expected {method} of {chain}, found {table['method']} of "
+                f"{table['chain']}."
+            )
+        return Readout.from_table(table)
+    except (LookupError, TypeError, ValueError) as error:
+        fault = f"{error}" if isinstance(error, IknsError) else f"({error!r})."
+        raise FileError(
+            f"{path}: cannot be read as a map of {method}: {fault} Only --method "
+            f"{method} needs it: the file can go."
+        ) from None
 
 
 def _read_json(path: Path) -> dict[str, Any]:

@@ -54,6 +54,10 @@ def calibrate(
         list[Path] | None,
         typer.Option(help="Recordings with the hand held at the points, one or more."),
     ] = None,
+    natural: Annotated[
+        list[Path] | None,
+        typer.Option(help="Recordings of ordinary movement, for the method intent."),
+    ] = None,
     live: Annotated[
         bool,
         typer.Option("--live", help="Record now, from --source, with prompts."),
@@ -149,7 +153,7 @@ def calibrate(
             f"only {' and '.join(given)}."
         )
     _check_input(context, live=live)
-    inputs = [static, *(exploration or []), marker_set, recordings]
+    inputs = [static, *(exploration or []), *(natural or []), marker_set, recordings]
     check_output_folder(out, FILES, force=force, inputs=inputs)
     # Three times None is none of them.
     generic = (
@@ -186,6 +190,7 @@ def calibrate(
         subject = ikns.calibrate(
             None if static is None else read(static),
             [read(path) for path in exploration],
+            natural=[read(path) for path in natural or []],
             generic=generic,
             marker_set=marker_set,
             chain=chain,
@@ -294,8 +299,27 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
         + " and ".join(f"{name} {angle:.0f} deg" for name, angle in moved)
         + ".",
         *held_sentences(static["held"]),
-        *notes(report["warnings"]),
+        methods_sentence(report),
+        *notes([*report["warnings"], *report["methods"]["warnings"]]),
     ]
+
+
+def methods_sentence(report: dict[str, Any]) -> str:
+    """Say which methods of `control --method` were learned."""
+    methods = report["methods"]
+    lost = methods["without"]
+    known = [name for name in ("paper", "proximal", "intent") if name not in lost]
+    parts = [f"Methods learned: {', '.join(known)}."]
+    parts += [f"Not {name}: {reason.rstrip('.')}." for name, reason in lost.items()]
+    if "intent" not in lost:
+        taught = methods["natural_posture"]
+        parts.append(
+            f"Natural posture of {taught['frames']} frames of this person's movement."
+            if taught["frames"]
+            else "Natural posture of other people, as there was too little ordinary "
+            "movement; add some with --natural."
+        )
+    return " ".join(parts)
 
 
 def _verdict(row: dict[str, Any], least: int, n_dof: int) -> str:

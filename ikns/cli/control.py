@@ -34,6 +34,13 @@ def control(
             help="c from the posture, as in the paper, or from null-space motion."
         ),
     ] = "position",
+    method: Annotated[
+        Literal["paper", "proximal", "intent"],
+        typer.Option(
+            help="What reads c off the posture: the paper's map over joint angles, the "
+            "upper arm and elbow alone, or the departure from the natural posture."
+        ),
+    ] = "paper",
     from_: From = None,
     to: To = None,
     force: Force = False,
@@ -53,11 +60,11 @@ def control(
         motion = ikns.MarkerIK(calibrated.skeleton).track(
             frames, chain=calibrated.chain, progress=partial(report, recording.name)
         )
-    found = control_table(calibrated, motion, mode=mode)
+    found = control_table(calibrated, motion, mode=mode, method=method)
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
     show(
-        {"recording": recording, "csv": out} | result,
+        {"recording": recording, "csv": out, "method": method} | result,
         table(
             str(recording),
             {"quantity": "s", "value": "g"},

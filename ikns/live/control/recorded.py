@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.calibration.subject import Subject
+from ikns.errors import InvalidInput
 from ikns.live.control.rate import RateControl
 from ikns.motion.motion import Motion
+from ikns.nullspace.readout import Method
 from ikns.numerics.median import finite_median
 
 
@@ -21,8 +23,8 @@ class ControlTable(NamedTuple):
     columns : list of str
         ``time_s``; ``c``, clipped to 0 to 1 (``c_1``, ``c_2``, ... for several degrees
         of freedom), NaN while the chain is not in sight; ``hand_speed_m_s`` in the
-        thorax frame; ``inside``, 1 within the volume of the PCA points; ``residual_m``
-        of the markers.
+        thorax frame; ``inside``, 1 within the volume of the PCA points, or of intent
+        where natural movement was taught; ``residual_m`` of the markers.
     rows : (T, len(columns)) array
     summary : dict
         Counts, shares and medians, ready for JSON.
@@ -38,6 +40,7 @@ def control_table(
     motion: Motion,
     *,
     mode: Literal["position", "rate"] = "position",
+    method: Method = "paper",
 ) -> ControlTable:
     """Compute the control signal of a recording.
 
@@ -50,16 +53,30 @@ def control_table(
         c from the posture, as in the paper, or from null-space motion. In rate mode c
         is held while the arm is not in sight, is NaN only before it was first seen,
         and counts as clipped while it is at 0 or 1.
+    method : {"paper", "proximal", "intent"}
+        What reads c off the posture, see :mod:`ikns.nullspace.readout`.
+
+    Raises
+    ------
+    InvalidInput
+        When the subject was calibrated without the method, or rate mode is to go on
+        another map than the paper's.
     """
+    if mode == "rate" and method != "paper":
+        raise InvalidInput(
+            f"rate mode moves on the paper's map, found the method '{method}'; choose "
+            "one of the two."
+        )
     learned, chain = subject.null_space_map, subject.chain
+    readout = subject.readout(method)
     place = motion.task_position(chain)
     if mode == "rate":
         raw = RateControl(learned, subject.skeleton, chain).track(motion)
     else:
-        raw = learned.control_signal(motion.chain_angles(chain), place)
+        raw = readout.control_signal(subject.skeleton, motion)
     raw = raw.reshape(len(place), -1)
     c = np.clip(raw, 0.0, 1.0)
-    inside = learned.inside(place)
+    inside = readout.inside(subject.skeleton, motion)
     names = ["c"] if c.shape[1] == 1 else [f"c_{k + 1}" for k in range(c.shape[1])]
     rows = np.column_stack(
         [motion.time, c, motion.hand_speed(chain), inside, motion.residual]

@@ -7,15 +7,23 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, ClusterMixin
+from sklearn.cluster import kmeans_plusplus
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from ikns.arrays import Indices
+from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.clustering.bounding_box import (
     box_surface_points,
     minimum_bounding_box,
 )
+from ikns.nullspace.clustering.lloyd import inertia, lloyd, two_places
 from ikns.nullspace.clustering.nearest import nearest_center
+
+# A held place has at least this share of an equal part of the samples; fewer are on
+# their way. Virtual people are steady in half of the samples of a place at the least.
+_SHARE = 0.2
+# Starts beside that on the box, once this one has lost a place.
+_STARTS = 10
 
 
 class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
@@ -23,7 +31,15 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
 
     Centroids start at :func:`box_surface_points`; each sample goes to the nearest; each
     centroid moves to the mean of its samples; this repeats until no assignment changes.
-    Then samples farther than `radius` from their centroid are removed. A centroid
+    Then samples farther than `radius` from their centroid are removed.
+
+    That start can lose a place: two places share a centroid, while another ends without
+    samples or takes half a place. Only then (a cluster holds two places by
+    :func:`ikns.nullspace.clustering.lloyd.two_places`, or two `groups` end in one
+    cluster) others are tried: the same start with empty centroids moved to the sample
+    farthest from all, the means of the groups, and ten starts by k-means++ (Arthur and
+    Vassilvitskii 2007, with fixed seeds). The one that merges the fewest places is
+    taken, of several the one of lowest inertia. While no place was lost a centroid
     without samples stays where it is.
 
     Parameters
@@ -48,6 +64,10 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         Samples within the radius.
     n_iter_ : int
         Iterations taken.
+    start_ : {"box", "box, empty moved", "groups", "k-means++"}
+        Where the centroids started.
+    merged_ : list of (int, (n_features,) array, (n_features,) array)
+        Clusters that hold two places all the same, and where these are, m.
     radius_ : float
         The radius used, m.
     box_ : BoundingBox
@@ -75,17 +95,57 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         self.radius = radius
         self.up = up
 
-    def fit(self, X: ArrayLike, y: Any = None) -> Self:
-        """Find the clusters of positions (n_samples, n_features), m; `y` is ignored.
+    def fit(
+        self, X: ArrayLike, y: Any = None, *, groups: ArrayLike | None = None
+    ) -> Self:
+        """Find the clusters of positions.
+
+        Parameters
+        ----------
+        X : (n_samples, n_features) array
+            Positions, m.
+        y : object
+            Ignored.
+        groups : (n_samples,) integer array, optional
+            Which samples are known to be of one place, by any number from 0; -1 where
+            that is not known. Different numbers are different places.
 
         Raises
         ------
         InvalidInput
-            When a parameter is out of its range.
+            When a parameter is out of its range, or the groups do not match.
         NotEnoughData
             When there are fewer samples than clusters.
         """
         x = validate_data(self, X, dtype=np.float64)
+        self._check(x)
+        known = _checked_groups(groups, len(x), self.n_clusters)
+        self.box_ = minimum_bounding_box(x)
+        on_box = box_surface_points(self.box_, self.n_clusters, up=self.up)
+        found = lloyd(x, on_box, max_iter=self.max_iter)
+        self.start_, self.merged_ = "box", self._merged(x, found[1], known)
+        if self.merged_:
+            # A centroid without samples is one more place that could be kept apart.
+            idle = self.n_clusters - len(np.unique(found[1]))
+            rows = []
+            for name, start, moved in self._starts(x, on_box, known):
+                other = lloyd(x, start, max_iter=self.max_iter, move_empty=moved)
+                merged = self._merged(x, other[1], known)
+                size = inertia(x, *other[:2])
+                rows.append((len(merged), size, name, merged, other))
+            best = min(rows, key=lambda row: row[:2])
+            if best[0] < len(self.merged_) + idle:
+                self.start_, self.merged_, found = best[2:]
+        centers, _, self.n_iter_ = found
+        self.cluster_centers_ = centers
+        self.labels_, self.radius_ = nearest_center(x, centers, radius=self.radius)
+        self.counts_ = np.bincount(
+            self.labels_[self.labels_ >= 0], minlength=self.n_clusters
+        )
+        return self
+
+    def _check(self, x: Array) -> None:
+        """Raise what is wrong with the parameters or the number of samples."""
         if self.n_clusters < 1 or self.max_iter < 1:
             raise InvalidInput(
                 f"expected at least one cluster and one iteration, found "
@@ -105,22 +165,37 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
                 f"found n_samples={len(x)}, expected at least one for each of the "
                 f"{self.n_clusters} clusters."
             )
-        self.box_ = minimum_bounding_box(x)
-        centers = box_surface_points(self.box_, self.n_clusters, up=self.up)
-        labels = np.full(len(x), -1)
-        for n_iter in range(1, self.max_iter + 1):
-            self.n_iter_ = n_iter
-            previous, (labels, _) = labels, nearest_center(x, centers, radius=np.inf)
-            if (labels == previous).all():
-                break
-            for k in np.unique(labels):
-                centers[k] = x[labels == k].mean(axis=0)
-        self.cluster_centers_ = centers
-        self.labels_, self.radius_ = nearest_center(x, centers, radius=self.radius)
-        self.counts_ = np.bincount(
-            self.labels_[self.labels_ >= 0], minlength=self.n_clusters
-        )
-        return self
+
+    def _starts(
+        self, x: Array, on_box: Array, groups: Indices
+    ) -> list[tuple[str, Array, bool]]:
+        """Name other starts, with their centroids and whether empty ones move."""
+        starts = [("box, empty moved", on_box, True)]
+        means = _means(x, groups)
+        if len(means) == self.n_clusters:
+            starts.append(("groups", means, True))
+        for seed in range(_STARTS):
+            drawn, _ = kmeans_plusplus(x, self.n_clusters, random_state=seed)
+            starts.append(("k-means++", drawn, True))
+        return starts
+
+    def _merged(
+        self, x: Array, labels: Indices, groups: Indices
+    ) -> list[tuple[int, Array, Array]]:
+        """Clusters that hold two places, and where these are."""
+        least = max(2, int(_SHARE * len(x) / self.n_clusters))
+        across = float(np.linalg.norm(np.ptp(x, axis=0)))
+        # The cluster of a group is that of most of its samples.
+        home = [np.bincount(labels[groups == g]).argmax() for g in _names(groups)]
+        means = _means(x, groups)
+        merged = []
+        for k in range(self.n_clusters):
+            own = [mean for mean, h in zip(means, home, strict=True) if h == k]
+            if len(own) > 1:
+                merged.append((k, own[0], own[1]))
+            elif both := two_places(x[labels == k], least=least, across=across):
+                merged.append((k, *both))
+        return merged
 
     def predict(self, X: ArrayLike) -> Indices:
         """Cluster of each position, -1 beyond the radius, (n_samples,)."""
@@ -128,3 +203,31 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         x = validate_data(self, X, dtype=np.float64, reset=False)
         labels, _ = nearest_center(x, self.cluster_centers_, radius=self.radius_)
         return labels
+
+
+def _checked_groups(groups: ArrayLike | None, n: int, n_clusters: int) -> Indices:
+    """Return the group of each sample, -1 for none."""
+    if groups is None:
+        return np.full(n, -1)
+    known = np.asarray(groups)
+    if known.shape != (n,) or not np.issubdtype(known.dtype, np.integer):
+        raise InvalidInput(
+            f"expected the group of each of {n} samples as an integer, found an array "
+            f"{known.shape} of {known.dtype}."
+        )
+    if (places := len(_names(known))) > n_clusters:
+        raise InvalidInput(
+            f"expected at most {n_clusters} groups, one for each cluster, found "
+            f"{places}."
+        )
+    return known
+
+
+def _names(groups: Indices) -> Indices:
+    return np.unique(groups[groups >= 0])
+
+
+def _means(x: Array, groups: Indices) -> Array:
+    """Mean of each group, (G, d)."""
+    rows = [x[groups == g].mean(axis=0) for g in _names(groups)]
+    return np.array(rows).reshape(-1, x.shape[1])

@@ -149,7 +149,14 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
         _check_volume(2 * found.box_.half_lengths, f"the {counts.sum()} samples")
     used = np.flatnonzero(counts >= need).tolist()
     few = [k for k in range(len(centers)) if k not in used]
-    listed = "; ".join(f"{format_point(centers, k)} has {counts[k]}" for k in few)
+    _warn_of_merged(found)
+    shared = [k for k, *_ in found.merged_]
+    listed = "; ".join(
+        f"{format_point(centers, k)} has {counts[k]}"
+        + ", as it lies between two places" * (k in shared)
+        + ", as no hand was held there" * (k not in shared and not counts[k])
+        for k in few
+    )
     sentence = (
         f"{len(few)} of {len(centers)} PCA points have fewer than {need} samples and "
         f"are left out: {listed}"
@@ -174,6 +181,21 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
     if few:
         warnings.warn(f"{sentence}.", MapWarning, stacklevel=3)
     return used
+
+
+def _warn_of_merged(found: BoundingBoxKMeans) -> None:
+    """Name places that share a point; c there is a mean of what it is at either."""
+    shared = [
+        f"{format_point(np.array([a, b]), 0)} and {format_point(np.array([a, b]), 1)}"
+        for _, a, b in found.merged_
+    ]
+    if shared:
+        warnings.warn(
+            f"two places share one PCA point: {'; '.join(shared)}; use as many points "
+            "as there are places, or one recording a place.",
+            MapWarning,
+            stacklevel=4,
+        )
 
 
 def _check_volume(width: Array, what: str) -> None:

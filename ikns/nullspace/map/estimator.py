@@ -31,6 +31,7 @@ from ikns.nullspace.map.checks import (
     warn_of_components,
 )
 from ikns.nullspace.map.interpolator import Interpolation, make_interpolator
+from ikns.nullspace.map.score import explained_share
 from ikns.numerics.subspace import principal_components
 
 
@@ -76,10 +77,11 @@ class NullSpaceMap(EstimatorBase):
         Gradient over the joints of a quantity that increases with c: its dot product
         with the sum of all Z is made positive, row by row. Default: that sum's largest
         entry is.
-    interpolation : {"natural", "laplace", "nearest"}
+    interpolation : {"natural", "laplace", "nearest", "smooth"}
         Weights between the points: natural neighbors by volume (the paper's), natural
-        neighbors by area (Laplace), or all the weight to the nearest point. Signs
-        agree between natural neighbors with all three.
+        neighbors by area (Laplace), all the weight to the nearest point, or a smooth
+        field (:class:`ikns.nullspace.map.smooth.SmoothField`), for which `outside`
+        means nothing. Signs agree between natural neighbors with all of them.
     min_samples : int, optional
         Points with fewer samples are left out, with a warning. Default: a tenth of an
         equal share, N / (10 n_points); half a second of 5 s at each point.
@@ -109,6 +111,9 @@ class NullSpaceMap(EstimatorBase):
         Of all components, decreasing.
     all_centers_, all_counts_ : (n_points, 3), (n_points,) array
         All PCA points, including those left out.
+    start_ : str
+        Where the clusters started: "box", or what kept apart places that share a point
+        from there.
     radius_ : float
         Radius used, m. Of a map made from arrays: the parameter, None by default.
     interpolator_ : object
@@ -155,7 +160,12 @@ class NullSpaceMap(EstimatorBase):
         self.up = up
 
     def fit(
-        self, X: ArrayLike, y: ArrayLike, *, velocity: ArrayLike | None = None
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        *,
+        velocity: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
     ) -> Self:
         """Learn the map from samples whose hand is still.
 
@@ -167,6 +177,9 @@ class NullSpaceMap(EstimatorBase):
             Joint vectors there, rad.
         velocity : (N, n) array, optional
             Joint velocities there, rad/s, for ``domain="velocity"``.
+        groups : (N,) integer array, optional
+            Which samples are known to be of one place, see
+            :meth:`ikns.nullspace.clustering.BoundingBoxKMeans.fit`.
 
         Raises
         ------
@@ -188,7 +201,7 @@ class NullSpaceMap(EstimatorBase):
 
         found = BoundingBoxKMeans(
             self.n_points, max_iter=self.max_iter, radius=self.radius, up=self.up
-        ).fit(x)
+        ).fit(x, groups=groups)
         used = usable_points(found, settings.min_samples)
         centers = found.cluster_centers_[used]
         interpolator = make_interpolator(centers, self.outside, self.interpolation)
@@ -219,6 +232,7 @@ class NullSpaceMap(EstimatorBase):
         self.n_components_, self.explained_variance_ratio_ = n_components, ratios
         self.interpolator_ = interpolator
         self.radius_: float | None = found.radius_
+        self.start_ = found.start_
         return self
 
     @classmethod
@@ -287,6 +301,24 @@ class NullSpaceMap(EstimatorBase):
         c = np.full(above.shape, np.nan)
         np.divide(above, width, out=c, where=width > 0)
         return c[..., 0] if self.directions_.shape[1] == 1 else c
+
+    def score(self, X: ArrayLike, y: ArrayLike) -> float:
+        """Share of held-out joint vectors' variance that lies along Z, see `fit`.
+
+        Each sample counts to its nearest point, about the mean posture learned there.
+        """
+        from sklearn.utils.validation import validate_data
+
+        self._check_fitted()
+        x = validate_data(self, X, dtype=np.float64, reset=False)
+        q = np.reshape(np.asarray(y, dtype=np.float64), (len(x), -1))
+        return explained_share(
+            x,
+            checked_rows(q, self.directions_.shape[2], "joint vectors"),
+            centers=self.centers_,
+            means=getattr(self, "cluster_means_", None),
+            directions=self.directions_,
+        )
 
     def directions(self, x: ArrayLike) -> Array:
         """Interpolated directions Z^ at hand positions (..., 3), (..., d, n)."""

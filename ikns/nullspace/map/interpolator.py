@@ -1,4 +1,4 @@
-"""Between the points: natural neighbors, or the nearest point.
+"""Between the points: natural neighbors, the nearest point, or a smooth field.
 
 Natural neighbors need a volume. One to three points, or points that are not in space,
 have none, and the nearest point's values hold.
@@ -16,8 +16,9 @@ from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.map.smooth import SmoothField
 
-Interpolation = Literal["natural", "laplace", "nearest"]
+Interpolation = Literal["natural", "laplace", "nearest", "smooth"]
 
 _METHODS: dict[str, Literal["sibson", "laplace"]] = {
     "natural": "sibson",
@@ -29,16 +30,18 @@ def make_interpolator(
     points: Array,
     outside: Literal["nearest", "project", "nan"],
     interpolation: Interpolation = "natural",
-) -> NaturalNeighborInterpolator | NearestPoint:
+) -> NaturalNeighborInterpolator | NearestPoint | SmoothField:
     """Interpolator between points (P, d): natural neighbors for 4 or more in space.
 
     Options and errors are those of :class:`ikns.NullSpaceMap`.
     """
-    known = (*_METHODS, "nearest")
+    known = (*_METHODS, "nearest", "smooth")
     if interpolation not in known:
         raise InvalidInput(
             f"expected interpolation as one of {known}, found '{interpolation}'."
         )
+    if interpolation == "smooth":
+        return SmoothField(points, edges=NearestPoint(points).edges)
     if interpolation == "nearest" or not _in_space(points):
         return NearestPoint(points)
     return NaturalNeighborInterpolator(

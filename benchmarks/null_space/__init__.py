@@ -1,0 +1,1 @@
+"""What c does on real people: recordings, entrants and scores."""

@@ -1,0 +1,186 @@
+"""Proximal and intent, learned from the same recordings as the paper's map."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ikns.arrays import Array, Mask
+from ikns.body.chains import chain_sides
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.places import ONE_PLACE
+from ikns.errors import IknsError, NotEnoughData
+from ikns.motion.motion import Motion
+from ikns.nullspace.clustering import nearest_center
+from ikns.nullspace.map import MapWarning, NullSpaceMap
+from ikns.nullspace.readout import IntentMap, Readout, readout_samples
+from ikns.nullspace.readout.coordinates import elbow_height_gradient, mean_orientation
+
+#: Least natural movement of one's own, s; with less, other people's is all there is.
+LEAST_NATURAL = 2.0
+#: Natural movement within less than this along every axis covers nothing, m.
+_LEAST_COVERED = 0.10
+
+
+def learn_readouts(
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    explorations: Sequence[tuple[Motion, Mask]],
+    chain: str,
+    *,
+    natural: Sequence[Motion] = (),
+    max_hand_speed: float = 0.05,
+) -> tuple[dict[str, Readout], dict[str, Any]]:
+    """Fit the other methods at the places of the paper's map.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    learned : NullSpaceMap
+        Fitted to the still samples of the explorations, in their order.
+    explorations : sequence of (Motion, (T,) boolean array)
+        With their still samples.
+    chain : str
+    natural : sequence of Motion
+        Ordinary movement. Reaches between the places count as well.
+    max_hand_speed : float
+        Faster hands move, m/s.
+
+    Returns
+    -------
+    readouts : dict
+        Without the methods that cannot be learned here.
+    report : dict
+        ``without``: method and why it is missing; ``warnings``; and of intent
+        ``natural_posture``, ``ends_rad`` and ``scatter``.
+
+    Raises
+    ------
+    NotEnoughData
+        When natural movement was given and covers nothing.
+    """
+    found: dict[str, Readout] = {}
+    report: dict[str, Any] = {"without": {}, "warnings": []}
+    if learned.directions_.shape[1] > 1:
+        reason = "reads one degree of freedom, and the map has more"
+        report["without"] = dict.fromkeys(("proximal", "intent"), reason)
+        return found, report
+    moving = _natural_samples(
+        skeleton, learned, explorations, chain, natural, max_hand_speed=max_hand_speed
+    )
+    steps = {
+        "proximal": lambda: _proximal(skeleton, learned, explorations, chain),
+        "intent": lambda: _intent(skeleton, learned, explorations, chain, moving),
+    }
+    for method, fit in steps.items():
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", MapWarning)
+            try:
+                found[method] = fit()
+            except IknsError as error:
+                report["without"][method] = str(error)
+        report["warnings"] += [f"{method}: {one.message}" for one in caught]
+    if "intent" in found and isinstance(intent := found["intent"].map, IntentMap):
+        report["natural_posture"] = intent.natural_.coverage_
+        report["ends_rad"] = list(intent.ends_)
+        report["scatter"] = intent.scatter_.tolist()
+    return found, report
+
+
+def _proximal(
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    explorations: Sequence[tuple[Motion, Mask]],
+    chain: str,
+) -> Readout:
+    still = np.concatenate([motion.angles[gate] for motion, gate in explorations])
+    reference = mean_orientation(skeleton, still, chain)
+    rows = [
+        readout_samples(skeleton, motion, chain, "proximal", reference=reference)
+        for motion, _ in explorations
+    ]
+    x, y = _still(rows, explorations)
+    made = NullSpaceMap(
+        len(learned.centers_),
+        variance=learned.variance,
+        radius=learned.radius_,
+        interpolation="smooth",
+        reference=elbow_height_gradient(reference),
+        min_samples=1,
+    ).fit(x, y, groups=learned.labels_)
+    return Readout("proximal", chain, made, reference)
+
+
+def _intent(
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    explorations: Sequence[tuple[Motion, Mask]],
+    chain: str,
+    moving: tuple[Array, Array] | None,
+) -> Readout:
+    rows = [
+        readout_samples(skeleton, motion, chain, "intent") for motion, _ in explorations
+    ]
+    x, y = _still(rows, explorations)
+    natural = {} if moving is None else {"natural_X": moving[0], "natural_y": moving[1]}
+    made = IntentMap(len(learned.centers_), min_samples=1)
+    made.fit(x, y, groups=learned.labels_, **natural)
+    made.warn_of_scatter()
+    return Readout("intent", chain, made)
+
+
+def _still(
+    rows: Sequence[tuple[Array, Array]], explorations: Sequence[tuple[Motion, Mask]]
+) -> tuple[Array, Array]:
+    """Places and coordinates of the still samples of all explorations."""
+    gates = [gate for _, gate in explorations]
+    x = np.concatenate([x[gate] for (x, _), gate in zip(rows, gates, strict=True)])
+    y = np.concatenate([y[gate] for (_, y), gate in zip(rows, gates, strict=True)])
+    return x, y
+
+
+def _natural_samples(
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    explorations: Sequence[tuple[Motion, Mask]],
+    chain: str,
+    natural: Sequence[Motion],
+    *,
+    max_hand_speed: float,
+) -> tuple[Array, Array] | None:
+    """Wrist centers and swivels of ordinary movement; None where there is too little.
+
+    In the explorations these are the frames away from every held place.
+    """
+    if len(chain_sides(chain)) != 1:
+        return None
+    parts: list[tuple[Array, Array]] = []
+    seconds = 0.0
+    for motion, away in [(motion, True) for motion, _ in explorations] + [
+        (motion, False) for motion in natural
+    ]:
+        wrist, swivel = readout_samples(skeleton, motion, chain, "intent")
+        row = np.isfinite(wrist).all(axis=1) & np.isfinite(swivel[:, 0])
+        row &= motion.hand_speed(chain) >= max_hand_speed
+        if away:
+            hand = motion.task_position(chain)[row]
+            row[row] = nearest_center(hand, learned.centers_, radius=ONE_PLACE)[0] < 0
+        parts.append((wrist[row], swivel[row, 0]))
+        seconds += float(row.sum() * np.median(np.diff(motion.time)))
+    if natural:
+        own = np.concatenate([w for w, _ in parts[len(explorations) :]])
+        span = np.ptp(np.quantile(own, [0.01, 0.99], axis=0), axis=0) if len(own) else 0
+        if np.max(span) < _LEAST_COVERED:
+            raise NotEnoughData(
+                "expected natural movement over the work space, found a hand that "
+                f"moves within {1e3 * np.max(span):.0f} mm: reach and carry things, "
+                "20 s over all of it."
+            )
+    if seconds < LEAST_NATURAL:
+        return None
+    wrist = np.concatenate([w for w, _ in parts])
+    swivel = np.concatenate([s for _, s in parts])
+    return wrist, swivel

@@ -1,0 +1,324 @@
+"""Where the elbow would be at this place of the wrist if the person meant nothing.
+
+A quadratic in the wrist center, learned from ordinary movement and drawn toward what
+other people do. What departs from it is what a person means (posture is not intent).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ikns.arrays import Array, Mask
+from ikns.errors import FileError, InvalidInput
+from ikns.nullspace.estimator_base import EstimatorBase
+from ikns.nullspace.map.checks import checked_rows
+
+#: Middle of the work space, m, and the unit of length, m: the quadratic terms are then
+#: of order 1 wherever a hand goes (ISB thorax, right arm).
+_MIDDLE, _UNIT = np.array([0.25, -0.15, 0.20]), 0.2
+#: What of the taught places counts as taught.
+_TAUGHT = 0.99
+_PEOPLE = Path(__file__).with_name("natural_posture_people.toml")
+
+
+class People(NamedTuple):
+    """Natural posture of a population: quadratics in the wrist center.
+
+    Parameters
+    ----------
+    mean : (10,) array
+        Coefficients of :func:`quadratic_terms`, rad.
+    covariance : (10, 10) array
+        Between arms of different people, rad^2.
+    leverage : (10, 10) array
+        Matrix of the leverage over all their movements.
+    taught_leverage : float
+        99th percentile of the leverage over all their movements.
+    arms : int
+        How many arms they are from.
+    source, license : str
+    """
+
+    mean: Array
+    covariance: Array
+    leverage: Array
+    taught_leverage: float
+    arms: int
+    source: str
+    license: str
+
+
+@cache
+def natural_posture_people() -> People:
+    """Return the population that ships with the package.
+
+    Made by ``benchmarks/natural_posture_people.py``.
+
+    Raises
+    ------
+    FileError
+        When the file is damaged.
+    """
+    try:
+        table = tomllib.loads(_PEOPLE.read_text(encoding="utf-8"))
+        mean = np.array(table["mean_rad"], dtype=np.float64)
+        covariance = np.array(table["covariance_rad2"], dtype=np.float64)
+        leverage = np.array(table["leverage"], dtype=np.float64)
+        if {mean.shape * 2, covariance.shape, leverage.shape} != {(10, 10)}:
+            raise ValueError(f"{mean.shape}, {covariance.shape}, {leverage.shape}")
+        return People(
+            mean,
+            covariance,
+            leverage,
+            float(table["taught_leverage"]),
+            int(table["arms"]),
+            table["source"],
+            table["license"],
+        )
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise FileError(f"{_PEOPLE}: cannot be read: {error!r}.") from None
+
+
+def quadratic_terms(wrist_in_thorax: ArrayLike) -> Array:
+    """Terms 1, x_i, x_i^2 and x_i x_j of positions, (..., 10) for three dimensions.
+
+    Positions (..., 3) in m count from (0.25, -0.15, 0.20) m, in units of 0.2 m; of
+    other dimensions they count from zero.
+    """
+    w = np.asarray(wrist_in_thorax, dtype=np.float64)
+    x = (w - _MIDDLE if w.shape[-1] == 3 else w) / _UNIT
+    i, j = np.triu_indices(w.shape[-1], 1)
+    return np.concatenate([np.ones((*x.shape[:-1], 1)), x, x**2, x[..., i] * x[..., j]],
+                          axis=-1)  # fmt: skip
+
+
+class NaturalPosture(EstimatorBase):
+    """Ridge regression of the hinge swivel on the wrist center, toward a population.
+
+    ``s_nat(w) = phi(w) . beta`` with the terms of :func:`quadratic_terms` and
+
+        beta = argmin mean_t (s_t - phi(w_t) . beta)^2 + penalty |beta - beta_people|^2
+
+    in which the constant term is free of the penalty. Where the wrist is in none of the
+    places that were taught (its leverage ``h = phi (Phi'Phi / N + penalty)^-1 phi``
+    exceeds the 99th percentile h99 of the taught ones), the difference from the
+    population fades to its mean by ``h99 / h``: outside, other people know more than a
+    quadratic that is continued. Directions that the penalty decides do not count.
+
+    :meth:`of_people` is the population's, without anything of one's own.
+
+    Parameters
+    ----------
+    penalty : float
+        Weight of the population, above 0. With the default, 20 s of ordinary movement
+        outweigh it where they went.
+    guard : bool
+        Whether the person's own part fades outside what was taught.
+
+    Attributes
+    ----------
+    coefficients_ : (K,) array
+        beta, rad.
+    people_ : (K,) array
+        beta_people, rad; zeros unless `X` has three columns.
+    offset_ : float
+        Mean difference from the population over the taught places, rad.
+    leverage_ : (K, K) array
+        Matrix of the leverage, and of the normal equations.
+    taught_leverage_ : float
+        h99.
+    coverage_ : dict
+        What was taught: ``frames``, ``low_m`` and ``high_m`` (1st and 99th percentile
+        of each coordinate), ``residual_rad`` (root mean square).
+
+    Examples
+    --------
+    >>> share = np.random.default_rng(0).uniform(size=(500, 3))
+    >>> wrist = [0.1, -0.4, 0.0] + share * [0.3, 0.5, 0.4]
+    >>> people = natural_posture_people()
+    >>> swivel = quadratic_terms(wrist) @ people.mean + 0.2
+    >>> own = NaturalPosture().fit(wrist, swivel)
+    >>> bool(np.allclose(own.predict(wrist), swivel)), round(own.offset_, 6)
+    (True, 0.2)
+    """
+
+    def __init__(self, *, penalty: float = 0.03, guard: bool = True) -> None:
+        self.penalty = penalty
+        self.guard = guard
+
+    @classmethod
+    def of_people(cls, **parameters: Any) -> Self:
+        """Return the population's natural posture, fitted to no movement of one's own.
+
+        Parameters are those of the constructor.
+        """
+        people = natural_posture_people()
+        return cls.from_arrays(
+            people.mean,
+            people.mean,
+            people.leverage,
+            taught_leverage=people.taught_leverage,
+            **parameters,
+        )
+
+    @classmethod
+    def from_arrays(
+        cls,
+        coefficients: ArrayLike,
+        people: ArrayLike,
+        leverage: ArrayLike,
+        *,
+        taught_leverage: float,
+        offset: float = 0.0,
+        coverage: dict[str, Any] | None = None,
+        **parameters: Any,
+    ) -> Self:
+        """Make one from its attributes, as from a file; rad, in the wrist's space.
+
+        Raises
+        ------
+        InvalidInput
+            When shapes disagree or values are not finite.
+        """
+        made = cls(**parameters)
+        made.n_features_in_ = 3
+        made.coefficients_ = np.array(coefficients, dtype=np.float64)
+        made.people_ = np.array(people, dtype=np.float64)
+        made.leverage_ = np.array(leverage, dtype=np.float64)
+        made.taught_leverage_, made.offset_ = float(taught_leverage), float(offset)
+        made.coverage_ = dict(coverage or {"frames": 0})
+        arrays = (made.coefficients_, made.people_, made.leverage_)
+        if [array.shape for array in arrays] != [(10,), (10,), (10, 10)]:
+            raise InvalidInput(
+                "expected 10 coefficients, those of other people and a leverage "
+                f"(10, 10), found {', '.join(str(a.shape) for a in arrays)}."
+            )
+        numbers = np.concatenate([*map(np.ravel, arrays), [made.offset_]])
+        if not np.isfinite([*numbers, made.taught_leverage_]).all():
+            raise InvalidInput("expected a natural posture of finite numbers.")
+        if not made.taught_leverage_ > 0:
+            raise InvalidInput("expected a taught leverage above 0.")
+        return made
+
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, *, people: ArrayLike | None = None
+    ) -> Self:
+        """Learn from ordinary movement.
+
+        Parameters
+        ----------
+        X : (N, 3) array
+            Wrist centers in the thorax frame, m; of a left arm mirrored to the right.
+        y : (N,) array
+            Hinge swivel, rad, without jumps of a full turn.
+        people : (K,) array, optional
+            Other people's coefficients, rad; default those that ship.
+
+        Raises
+        ------
+        InvalidInput, ValueError
+            When the penalty is not above 0, or samples are not finite or do not match.
+        """
+        # Only here: what is read from a file does without.
+        from sklearn.utils.validation import validate_data
+
+        w, s = validate_data(self, X, y, y_numeric=True, dtype=np.float64)
+        if not 0 < self.penalty < np.inf:
+            raise InvalidInput(f"expected a penalty above 0, found {self.penalty}.")
+        s = np.asarray(s, dtype=np.float64)
+        phi = quadratic_terms(w)
+        others = _people(phi.shape[1], people)
+        beyond = s - phi @ others
+        self.leverage_, self.taught_leverage_ = leverage_of(phi, self.penalty)
+        own = self.leverage_ @ phi.T @ beyond / len(w)
+        self.people_, self.coefficients_ = others, others + own
+        self.offset_ = float((phi @ own).mean())
+        low, high = np.quantile(w, [0.01, 0.99], axis=0)
+        self.coverage_: dict[str, Any] = {
+            "frames": len(w),
+            "low_m": low.tolist(),
+            "high_m": high.tolist(),
+            "residual_rad": float(np.sqrt(np.mean((beyond - phi @ own) ** 2))),
+        }
+        return self
+
+    def swivel(self, wrist_in_thorax: ArrayLike) -> Array:
+        """Natural swivel at wrist centers (..., 3) m, (...) rad; NaN where unknown."""
+        self._check_fitted()
+        rows = checked_rows(wrist_in_thorax, self.n_features_in_, "wrist centers")
+        phi = quadratic_terms(rows)
+        own = phi @ (self.coefficients_ - self.people_)
+        if self.guard:
+            beyond = np.maximum(self._leverage(phi) / self.taught_leverage_, 1.0)
+            own = self.offset_ + (own - self.offset_) / beyond
+        return np.asarray(phi @ self.people_ + own)
+
+    def predict(self, X: ArrayLike) -> Array:
+        """Return :meth:`swivel` at wrist centers (N, 3), all of them finite, (N,)."""
+        from sklearn.utils.validation import validate_data
+
+        self._check_fitted()
+        return self.swivel(validate_data(self, X, dtype=np.float64, reset=False))
+
+    def score(self, X: ArrayLike, y: ArrayLike) -> float:
+        """Share of the variance of held-out swivels (N,) that is explained.
+
+        A constant difference counts as explained, since the ends of a range take it up.
+        """
+        s = np.asarray(y, dtype=np.float64)
+        rest = s - self.predict(X)
+        total = float(np.var(s))
+        return 1.0 - float(np.var(rest)) / total if total > 0 else 0.0
+
+    def taught(self, X: ArrayLike) -> Mask:
+        """Whether wrist centers (..., 3) m lie where movement was taught, (...)."""
+        self._check_fitted()
+        phi = quadratic_terms(checked_rows(X, self.n_features_in_, "wrist centers"))
+        return np.asarray(self._leverage(phi) <= self.taught_leverage_)
+
+    def _leverage(self, phi: Array) -> Array:
+        return np.einsum("...i,ij,...j->...", phi, self.leverage_, phi)
+
+    def __sklearn_tags__(self) -> Any:
+        """Tell scikit-learn that it is a regressor of one number."""
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = False
+        tags.target_tags.single_output = True
+        return tags
+
+    def _check_fitted(self) -> None:
+        if not hasattr(self, "coefficients_"):
+            from sklearn.exceptions import NotFittedError
+
+            raise NotFittedError("call fit of this NaturalPosture first.")
+
+
+def leverage_of(phi: Array, penalty: float) -> tuple[Array, float]:
+    """Matrix of the leverage of terms (N, K), (K, K), and its 99th percentile.
+
+    The first term is the constant, which has no penalty.
+    """
+    k = phi.shape[1]
+    free = np.diag(np.r_[0.0, np.full(k - 1, float(penalty))])
+    matrix = np.linalg.inv(phi.T @ phi / len(phi) + free)
+    levels = np.einsum("ni,ij,nj->n", phi, matrix, phi)
+    return matrix, float(np.quantile(levels, _TAUGHT))
+
+
+def _people(terms: int, given: ArrayLike | None) -> Array:
+    """Return other people's coefficients; zeros for other than 3 dimensions."""
+    if given is None:
+        return natural_posture_people().mean if terms == 10 else np.zeros(terms)
+    people = np.array(given, dtype=np.float64)
+    if people.shape != (terms,) or not np.isfinite(people).all():
+        raise InvalidInput(
+            f"expected {terms} finite coefficients of other people, found an array "
+            f"{people.shape}."
+        )
+    return people

@@ -1,0 +1,304 @@
+"""The control signal that measures what a person means, not how the arm is held.
+
+    c = (s - s_nat(w) - a) / (b - a)
+
+s is the hinge swivel (:mod:`ikns.nullspace.hinge_swivel`), s_nat the natural posture at
+the wrist center w (:mod:`ikns.nullspace.natural_posture`), and a and b are the means
+over the held places of the lower and upper end of s - s_nat. Two numbers for the whole
+range: fields through ends that scatter would put this scatter back into c.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ikns.arrays import Array, Mask
+from ikns.errors import InvalidInput, NotEnoughData
+from ikns.nullspace.estimator_base import EstimatorBase
+from ikns.nullspace.map.checks import MapWarning, checked_rows, format_point
+from ikns.nullspace.natural_posture import NaturalPosture
+
+#: A place whose ends differ from the mean by more than this share of the range was half
+#: explored, and is asked for again.
+_HALF_EXPLORED = 0.1
+#: A place with less than this share of an equal part of the samples is left out.
+_SHARE = 0.1
+
+
+class IntentMap(EstimatorBase):
+    """Departure of the hinge swivel from the natural posture, from 0 to 1.
+
+    Parameters
+    ----------
+    n_points : int
+        Held places.
+    penalty : float
+        Weight of other people in the natural posture, see :class:`NaturalPosture`.
+    quantiles : (float, float)
+        Quantiles that define the ends at a place; (0, 1) are minimum and maximum.
+    radius : float, optional
+        Samples farther from the center of their place are ignored, m; default as in
+        :func:`ikns.nullspace.clustering.nearest_center`.
+    max_iter : int
+        Most iterations of the clustering.
+    min_samples : int, optional
+        Places with fewer samples are left out; default a tenth of an equal share.
+
+    Attributes
+    ----------
+    natural_ : NaturalPosture
+        The person's; the population's where no natural movement was given.
+    centers_ : (P, 3) array
+        Wrist centers of the places in use, m.
+    lower_, upper_ : (P,) arrays
+        Ends of s - s_nat at each place, rad.
+    counts_ : (P,) integer array
+        Samples at each place.
+    ends_ : (float, float)
+        a and b, rad.
+    scatter_ : (P,) array
+        How far the farther end of each place is from the mean, in units of b - a.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corners = 0.3 * np.array(list(np.ndindex(2, 2, 2))) + [0.1, -0.3, 0.0]
+    >>> wrist = np.repeat(corners, 50, axis=0)
+    >>> natural = NaturalPosture.of_people()
+    >>> meant = np.tile(np.linspace(-0.5, 0.5, 50), 8)
+    >>> intent = IntentMap(8).fit(wrist, natural.swivel(wrist) + meant)
+    >>> held = natural.swivel([0.3, -0.2, 0.1]) + 0.25
+    >>> float(intent.control_signal([held], [0.3, -0.2, 0.1]).round(9))
+    0.75
+    """
+
+    def __init__(
+        self,
+        n_points: int = 10,
+        *,
+        penalty: float = 0.03,
+        quantiles: tuple[float, float] = (0.0, 1.0),
+        radius: float | None = None,
+        max_iter: int = 300,
+        min_samples: int | None = None,
+    ) -> None:
+        self.n_points = n_points
+        self.penalty = penalty
+        self.quantiles = quantiles
+        self.radius = radius
+        self.max_iter = max_iter
+        self.min_samples = min_samples
+
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        *,
+        groups: ArrayLike | None = None,
+        natural_X: ArrayLike | None = None,
+        natural_y: ArrayLike | None = None,
+    ) -> Self:
+        """Learn the range from held places, and the natural posture from movement.
+
+        Parameters
+        ----------
+        X : (N, 3) array
+            Wrist centers of samples whose hand is still, thorax frame, m; of a left
+            arm mirrored to the right.
+        y : (N,) or (N, 1) array
+            Hinge swivel there, rad.
+        groups : (N,) integer array, optional
+            Which samples are of one place, see
+            :meth:`ikns.nullspace.clustering.BoundingBoxKMeans.fit`.
+        natural_X, natural_y : (K, 3) and (K,) array, optional
+            Wrist centers and swivels of ordinary movement; without them the natural
+            posture is that of other people.
+
+        Raises
+        ------
+        InvalidInput, ValueError
+            When a parameter is out of range, or samples are not finite or do not match.
+        NotEnoughData
+            When no place has enough samples, or the elbow moves nowhere.
+        """
+        # Only here: a map that is read from a file does without.
+        from sklearn.utils.validation import validate_data
+
+        from ikns.nullspace.clustering import BoundingBoxKMeans
+
+        one = np.ndim(y) == 2 and np.shape(y)[1] == 1
+        w, s = validate_data(
+            self, X, np.ravel(y) if one else y, y_numeric=True, dtype=np.float64
+        )
+        least = self._least(len(w))
+        found = BoundingBoxKMeans(
+            self.n_points, max_iter=self.max_iter, radius=self.radius
+        ).fit(w, groups=groups)
+        used = np.flatnonzero(found.counts_ >= least)
+        if not used.size:
+            raise NotEnoughData(
+                f"expected a held place with {least} samples or more, found at most "
+                f"{found.counts_.max()} (n_samples={len(w)})."
+            )
+        self.natural_ = self._natural(natural_X, natural_y, width=w.shape[1])
+        beyond = wrapped(s - self.natural_.swivel(w))
+        ends = np.array(
+            [np.quantile(beyond[found.labels_ == k], self.quantiles) for k in used]
+        )
+        self.centers_, self.counts_ = found.cluster_centers_[used], found.counts_[used]
+        self.lower_, self.upper_ = ends[:, 0], ends[:, 1]
+        self._finish()
+        return self
+
+    @classmethod
+    def from_arrays(
+        cls,
+        natural: NaturalPosture,
+        centers: ArrayLike,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        *,
+        counts: ArrayLike = 0,
+        **parameters: Any,
+    ) -> Self:
+        """Make a map from its arrays, as from a file; arguments are the attributes.
+
+        Raises
+        ------
+        InvalidInput
+            When shapes disagree, values are not finite, or an upper end is below.
+        """
+        places = np.array(centers, dtype=np.float64)
+        m, M = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
+        if (
+            places.ndim != 2
+            or not len(places)
+            or not m.shape == M.shape == (len(places),)
+        ):
+            raise InvalidInput(
+                f"expected centers (P, 3) and ends (P,), found {places.shape}, "
+                f"{m.shape} and {M.shape}."
+            )
+        finite = all(np.isfinite(array).all() for array in (places, m, M))
+        if not finite or (m > M).any():
+            raise InvalidInput("expected finite ends with lower <= upper.")
+        made = cls(**{**parameters, "n_points": len(places)})
+        made.n_features_in_ = places.shape[1]
+        made.natural_, made.centers_, made.lower_, made.upper_ = natural, places, m, M
+        made.counts_ = np.full(len(places), counts, dtype=np.int64)
+        made._finish()
+        return made
+
+    def control_signal(self, q: ArrayLike, x: ArrayLike) -> Array:
+        """Return the control signal c, not clipped.
+
+        Parameters
+        ----------
+        q : (..., 1) array
+            Hinge swivel, rad.
+        x : (..., 3) array
+            Wrist centers, m.
+
+        Returns
+        -------
+        (...) array
+            0 at the lower end, 1 at the upper; NaN where an input is not finite.
+        """
+        self._check_fitted()
+        s = checked_rows(q, 1, "swivels")[..., 0]
+        w = checked_rows(x, self.n_features_in_, "wrist centers")
+        a, b = self.ends_
+        return np.asarray((wrapped(s - self.natural_.swivel(w)) - a) / (b - a))
+
+    def inside(self, x: ArrayLike) -> Mask:
+        """Whether natural movement was taught at wrist centers (..., 3), (...)."""
+        self._check_fitted()
+        return self.natural_.taught(x)
+
+    def score(self, X: ArrayLike, y: ArrayLike) -> float:
+        """One less the share of c's variance that the wrist's place explains.
+
+        On held-out samples as for :meth:`fit`: 1 where c does not follow the hand.
+        """
+        from sklearn.utils.validation import validate_data
+
+        self._check_fitted()
+        w = validate_data(self, X, dtype=np.float64, reset=False)
+        c = self.control_signal(np.reshape(y, (len(w), 1)), w)
+        terms = np.column_stack([np.ones(len(w)), w - w.mean(axis=0)])
+        rest = c - terms @ np.linalg.lstsq(terms, c, rcond=None)[0]
+        total = float(np.var(c))
+        return float(np.var(rest)) / total if total > 0 else 0.0
+
+    def _least(self, n: int) -> int:
+        low, high = self.quantiles
+        least = self.min_samples
+        if least is None:
+            least = max(1, int(_SHARE * n / max(self.n_points, 1)))
+        if not 0 <= low < high <= 1 or least < 1:
+            raise InvalidInput(
+                f"expected quantiles 0 <= low < high <= 1 and min_samples of at least "
+                f"1, found {self.quantiles} and {least}."
+            )
+        return least
+
+    def _natural(
+        self, X: ArrayLike | None, y: ArrayLike | None, *, width: int
+    ) -> NaturalPosture:
+        if (X is None) != (y is None):
+            raise InvalidInput("natural_X and natural_y go together.")
+        natural = NaturalPosture(penalty=self.penalty)
+        if X is not None and y is not None:
+            return natural.fit(X, y)
+        if width == 3:
+            return NaturalPosture.of_people(penalty=self.penalty)
+        # There are no other people in another space.
+        return natural.fit(np.zeros((1, width)), [0.0])
+
+    def _finish(self) -> None:
+        """Set the mean ends, and name places that were half explored."""
+        a, b = float(self.lower_.mean()), float(self.upper_.mean())
+        if not b - a > 0:
+            raise NotEnoughData(
+                "expected held places at which the elbow turns, found none "
+                f"(n_features={self.n_features_in_})."
+            )
+        self.ends_ = (a, b)
+        off = np.maximum(np.abs(self.lower_ - a), np.abs(self.upper_ - b))
+        self.scatter_ = off / (b - a)
+
+    def warn_of_scatter(self) -> None:
+        """Name the places whose ends are far from the mean, with a MapWarning."""
+        named = [
+            f"{format_point(self.centers_, k)} ({self.scatter_[k]:.2f} of the range)"
+            for k in np.flatnonzero(self.scatter_ > _HALF_EXPLORED).tolist()
+        ]
+        if named:
+            warnings.warn(
+                f"the elbow did not go as far as elsewhere, or farther, with the wrist "
+                f"at {'; '.join(named)}: repeat these places.",
+                MapWarning,
+                stacklevel=2,
+            )
+
+    def __sklearn_tags__(self) -> Any:
+        """Tell scikit-learn that `y` holds one number."""
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = False
+        tags.target_tags.single_output = True
+        return tags
+
+    def _check_fitted(self) -> None:
+        if not hasattr(self, "ends_"):
+            from sklearn.exceptions import NotFittedError
+
+            raise NotFittedError("call fit of this IntentMap first.")
+
+
+def wrapped(angle: Array) -> Array:
+    """Angles in [-pi, pi), rad."""
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
