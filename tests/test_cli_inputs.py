@@ -48,6 +48,7 @@ PERSON = {"subject": "person"}
 READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "scale": (["--stature", "1.75", "--mass", "70", "--sex", "male"], {}),
     "ik": ([], {"recording": "free.c3d", **PERSON}),
+    "check": ([], {"recordings": "free.c3d", **PERSON}),
     "convert": ([], {"source": "free.c3d"}),
     "markers list": ([], {}),
     "markers show": ([], {}),
@@ -74,8 +75,8 @@ READS: dict[str, tuple[list[str], dict[str, str]]] = {
 }
 
 
-#: Paths that a command reads instead of one of those.
-INSTEAD = {"ik": ["static"]}
+#: Paths that a command reads besides or instead of one of those.
+INSTEAD = {"ik": ["static"], "check": ["static"], "calibrate": ["natural"]}
 
 
 def leaves(command: Any, name: str = "") -> Iterator[tuple[str, Any]]:

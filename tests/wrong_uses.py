@@ -71,6 +71,7 @@ WRONG = {
     "control out": WRITE_FILE,
     "coordinates": CHOICE,
     "countdown": FROM_ZERO,
+    "check marker_set": ["lost", "{binary}", "{folder}"],
     "convert source": READ_FILE,
     "convert stream": ["", "no-such-stream"],
     "cutoff": POSITIVE,
@@ -130,6 +131,8 @@ WRONG = {
     "reaches": READ_FILE,
     "recording": READ_FILE,
     "recordings": READ_FILE,
+    "method": CHOICE,
+    "natural": READ_FILE,
     "markers check marker_set": ["", "nan", "{nowhere}", "{folder}", "{binary}"],
     "markers new name": [""],
     "markers new out": [*WRITE_FILE, "x.exe"],
@@ -182,6 +185,8 @@ FLAGS = {
 }
 #: Options that count only together with others.
 WITH = {
+    "check marker_set": "--static {static}",
+    "check static": "",
     "ik marker_set": "--static {static}",
     "ik min_static": "--static {static}",
     "calibrate source": "--live",
@@ -228,6 +233,9 @@ TOGETHER = [
     "ik {free}",
     "markers list extra",
     "markers sites extra",
+    "check",
+    "check {free} --subject {person} --marker-set oxford24",
+    "check {free} --subject {person} --static {static}",
     "ik {free} --subject {person} --marker-set oxford24 --out new.csv",
     "ik {free} --subject {person} --static {static} --out new.csv",
     "ik {free} {points} --subject {person} --out new.csv",
@@ -355,7 +363,7 @@ def _uses() -> list[list[str]]:
                     ):
                         if name != each.name and f"--{name}" not in extra:
                             extra += [f"--{name}", right]
-                if command == "ik" and "--static" in extra:
+                if command in ("check", "ik") and "--static" in extra:
                     words = _without(words, "--subject")
                 if "--live" in extra:
                     words = _without(_without(words, "--static"), "--exploration")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, MarkerSetName
+from ikns.cli.options import AsJson, OptionalMarkerSet
 from ikns.cli.output import show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput, MarkerMismatch
@@ -29,7 +29,7 @@ def check(
         Path | None,
         typer.Option(help="Folder that `ikns calibrate` wrote, to compare with."),
     ] = None,
-    marker_set: MarkerSetName = "oxford24",
+    marker_set: OptionalMarkerSet = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what is wrong in recordings: labels, units, ghosts, another person's.
@@ -41,11 +41,15 @@ def check(
 
     if static is not None and subject is not None:
         raise InvalidInput("--static and --subject exclude each other; give one.")
+    if subject is not None and marker_set is not None:
+        raise InvalidInput(
+            "--marker-set goes with --static; a subject has markers of its own."
+        )
     found = ikns.check_recordings(
         [read(path) for path in recordings],
         static=None if static is None else read(static),
         skeleton=None if subject is None else ikns.Subject.load(subject).skeleton,
-        marker_set=marker_set,
+        marker_set=marker_set or "oxford24",
     )
     shown = {
         "refuse": "do not use",
