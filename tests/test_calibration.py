@@ -244,3 +244,41 @@ def test_natural_reaching_of_a_real_person_runs_through_and_is_reported(
     assert 4 <= len(used) < 10
     assert all(row["samples"] < 50 for row in left_out)
     assert any("left out" in sentence for sentence in subject.report["warnings"])
+
+
+def test_free_movement_in_the_file_is_left_out_by_the_duration_of_its_rests() -> None:
+    run = small_person.protocol()
+    points, free = run.points.recording, run.free.recording
+    rows = np.concatenate([free.markers] * 6 + [points.markers])
+    mixed = Recording(np.arange(len(rows)) / 50, rows, points.labels, "mixed.c3d")
+    whole, rests, alone = (
+        calibrate(run.static.recording, [recording], min_still=0.2, min_rest=rest)
+        for recording, rest in ((mixed, 0.0), (mixed, 0.5), (points, 0.5))
+    )
+    assert rests.report["settings"]["min_rest_s"] == 0.5
+    assert rests.gate == {"max_hand_speed": 0.05, "min_duration": 0.5}
+    still = [one.report["explorations"][0]["still_s"] for one in (whole, rests, alone)]
+    # The reversals of free movement are slow for up to 0.2 s each.
+    assert still[1] < still[0]
+    assert still[1] == pytest.approx(still[2], abs=0.6)  # a rest where they meet
+    with pytest.raises(InvalidInput, match="expected min_rest of at least 0 s"):
+        calibrate(run.static.recording, [points], min_rest=-1.0)
+
+
+def test_two_arms_with_one_degree_of_freedom_are_told_to_have_two() -> None:
+    run = small_person.two_handed()
+    options = {"chain": "both_arms", "min_still": 0.2}
+    one, two = (
+        calibrate(run.static.recording, [run.points.recording], n_dof=n, **options)
+        for n in (1, 2)
+    )
+    told = [w for w in one.report["warnings"] if "two arms have two freedoms" in w]
+    assert len(told) == 1
+    assert "--n-dof 2" in told[0]
+    assert not any("two freedoms" in w for w in two.report["warnings"])
+
+
+def test_the_wrong_side_is_named() -> None:
+    run = small_person.protocol()
+    with pytest.raises(NotEnoughData, match="The left hand moves .* cm and the right"):
+        calibrate(run.static.recording, [run.points.recording], chain="left_arm")

@@ -163,22 +163,24 @@ def test_without_keys_verdicts_are_followed():
     assert what == ["ready", "countdown"]
     for keep, usable, then in (
         (False, True, ["verdict", "redo", "ready", "countdown"]),
-        (False, True, ["verdict", "accepted", "ready", "countdown"]),
+        # What could be used but is refused is not kept for want of a better one.
+        (False, True, ["verdict", "skipped", "ready", "countdown"]),
         (False, False, ["verdict", "redo", "ready", "countdown"]),
-        (False, False, ["verdict", "skipped", "done"]),
+        (True, True, ["verdict", "accepted", "done"]),
     ):
         assert feed(protocol, at, at + 20) == ["recording", "judging"]
         at += 20
         changes = protocol.judged(keep=keep, usable=usable, now=at / RATE)
         assert [c.what for c in changes] == then
-    assert protocol.skipped == ["point_02"]
+    assert protocol.skipped == ["point_01"]
 
 
-def test_without_keys_a_useless_static_trial_ends_it():
+@pytest.mark.parametrize("usable", [False, True])
+def test_without_keys_a_refused_static_trial_ends_it(usable):
     protocol = new(auto_takes=1)
     protocol.begin(0.0)
     feed(protocol, 0, 100)
-    changes = protocol.judged(keep=False, usable=False, now=1.0)
+    changes = protocol.judged(keep=False, usable=usable, now=1.0)
     assert [c.what for c in changes] == ["verdict", "stopped"]
 
 

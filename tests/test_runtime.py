@@ -13,13 +13,13 @@ import small_person
 from ikns.calibration.subject import FILES, Subject
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.finger import FingerError, SimulatedFinger
-from ikns.live.control.rejection_count import kind_of
 from ikns.live.control.settings import ControlSettings
 from ikns.live.runtime import replay_run, run
 from ikns.live.session import check_session, create_session, open_run, read_run
 from ikns.live.session.channels import STATES
 from ikns.live.stream import Event, Source
 from ikns.live.stream.replay import Replay
+from ikns.motion.marker_ik.rejection_count import kind_of
 from ikns.recording.recording import Recording
 
 

@@ -1,6 +1,7 @@
 """Trials are cut to their movement and laid over each other in normalized time."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ikns.analysis.ucm import aligned_angles, movement, normalize_time
+from ikns.analysis.ucm.trials import check_repeats
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.scaling import scale
 from ikns.errors import InvalidInput, NotEnoughData
+from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
+from ikns.recording.files import read
 
 TIME = np.arange(200) / 100
 
@@ -127,3 +133,73 @@ def test_angles_are_unknown_while_the_chain_is_out_of_sight() -> None:
     np.testing.assert_array_equal(found[1][~gap], found[0][~gap])
     with pytest.raises(NotEnoughData, match="at least one motion"):
         aligned_angles([], "right_arm")
+
+
+def reaching(end: tuple, side: int = 0, *, late: float = 0.0, seed: int = 0) -> Motion:
+    """A hand that goes to a place and rests, with 1 cm of wandering."""
+    base = small_person.protocol().points.truth
+    time = np.arange(150) / 100
+    share = np.clip((time - 0.2 - late) / 0.8, 0, 1)
+    share = 10 * share**3 - 15 * share**4 + 6 * share**5
+    rng = np.random.default_rng(seed)
+    bend = 0.01 * rng.normal(size=3) * np.sin(np.pi * share)[:, None]
+    hands = np.zeros((150, 2, 3))
+    hands[:, side] = share[:, None] * np.array(end) + bend
+    return replace(
+        base,
+        time=time,
+        q=base.q[:150],
+        v=base.v[:150],
+        hand_in_thorax=hands,
+        hand_rotation_in_thorax=base.hand_rotation_in_thorax[:150],
+        hand_velocity_in_thorax=np.gradient(hands, 0.01, axis=0),
+        residual=base.residual[:150],
+        iterations=base.iterations[:150],
+        converged=base.converged[:150],
+        seen=np.ones((1, len(base.segments)), dtype=bool),
+        known=np.ones((1, 1), dtype=bool),
+        rejected=np.full((1, 2), -1),
+    )
+
+
+def test_repetitions_of_one_movement_pass_wherever_they_start() -> None:
+    trials = [reaching((0.3, 0.1, 0.0), late=0.02 * k, seed=k) for k in range(5)]
+    aside = replace(trials[0], hand_in_thorax=trials[0].hand_in_thorax + 0.1)
+    check_repeats([*trials, aside], [f"{k}.c3d" for k in range(6)], "right_arm")
+
+
+def test_another_movement_among_repetitions_is_named_with_one_of_them() -> None:
+    trials = [reaching((0.3, 0.1, 0.0), seed=k) for k in range(3)]
+    trials.append(reaching((0.0, 0.1, -0.3)))
+    names = ["a.c3d", "b.c3d", "c.c3d", "other.c3d"]
+    # Straight ways at 84 deg: 2 sin(42 deg) = 1.3 times the deviation of one from its
+    # middle, which is 0.3 to 0.5 of its length.
+    with pytest.raises(InvalidInput, match=r"[abc].c3d and other.c3d that differ by"):
+        check_repeats(trials, names, "right_arm")
+    check_repeats(trials, names, "right_arm", most_different=1.0)
+
+
+def test_trials_of_the_other_arm_are_refused() -> None:
+    trials = [reaching((0.3, 0.1, 0.0)), reaching((0.3, 0.1, 0.0), side=1)]
+    with pytest.raises(InvalidInput, match=r"l.c3d: .* right hand moves 0 cm and the"):
+        check_repeats(trials, ["r.c3d", "l.c3d"], "right_arm")
+    with pytest.raises(InvalidInput, match=r"r.c3d: .* left hand moves 0 cm and the"):
+        check_repeats(trials, ["r.c3d", "l.c3d"], "left_arm")
+
+
+def test_real_tasks_are_told_apart_and_their_repeats_are_not(data: Path) -> None:
+    folder = data / "ue_adl" / "ADL007"
+    skeleton, _ = scale(
+        Skeleton.load(),
+        read(folder / "ADL007_static.csv"),
+        marker_set="ue_adl",
+        min_duration=0.15,
+    )
+    solver = MarkerIK(skeleton)
+    names = ["FR1", "FR2", "FR3", "AR1", "FL1"]
+    motions = [solver.track(read(folder / f"ADL007{name}.csv")) for name in names]
+    check_repeats(motions[:3], names[:3], "right_arm")
+    with pytest.raises(InvalidInput, match="and AR1 that differ"):
+        check_repeats(motions[:4], names[:4], "right_arm")
+    with pytest.raises(InvalidInput, match="FL1: expected a movement of right_arm"):
+        check_repeats([motions[0], motions[4]], ["FR1", "FL1"], "right_arm")

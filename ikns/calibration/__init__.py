@@ -4,7 +4,7 @@
 `elbow` defines the sign of c, `report` the report, `judge` says what is wrong.
 """
 
-from ikns.calibration.elbow import elbow_reference
+from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.procedure import calibrate
 from ikns.motion.marker_ik.visibility import (
     say_apart,
@@ -18,4 +18,5 @@ __all__ = [
     "say_apart",
     "segment_pairs",
     "sight_needs",
+    "two_arms_fault",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ikns.arrays import Array
 from ikns.body.chains import chain_joints, chain_sides
@@ -11,6 +12,23 @@ from ikns.body.skeleton import Skeleton
 #: Angle step of the central difference, rad: its error is of the order of the step
 #: squared (1e-10 m/rad), that of rounding 1e-16 m over the step (1e-11 m/rad).
 _STEP = 1e-5
+
+#: Two elbows that move by themselves, read by one direction.
+_TWO_ARMS = (
+    "two arms have two freedoms, one for each elbow, and with one degree of freedom "
+    "every place mixes them in its own way; use two degrees of freedom (--n-dof 2), or "
+    "move both elbows together"
+)
+
+
+def two_arms_fault(chain: str, n_dof: int, n_components: ArrayLike) -> str:
+    """Say that one degree of freedom is too few for two elbows; empty where it is not.
+
+    >>> two_arms_fault("both_arms", 1, [1, 1]), two_arms_fault("right_arm", 1, [2])
+    ('', '')
+    """
+    too_few = n_dof == 1 and len(chain_sides(chain)) > 1
+    return _TWO_ARMS if too_few and np.any(np.asarray(n_components) > 1) else ""
 
 
 def elbow_reference(

@@ -13,7 +13,7 @@ import numpy as np
 from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.elbow import elbow_reference
+from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import refused
 from ikns.calibration.judge.subjects import other_subject
@@ -29,10 +29,16 @@ from ikns.calibration.scaled_body import scaled_body
 from ikns.calibration.scaling import ScalingReport, scale
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
+from ikns.motion.excursion import other_hand_moves
 from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.marker_ik.rejection import rejection_sentence
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
+from ikns.nullspace.map.samples import no_still_sample
 from ikns.recording.recording import Recording
 
+#: So many times as far as a chain's own hand the other one moves only where the chain
+#: is the wrong one.
+_OTHER_SIDE = 3.0
 #: Most still samples that are kept for pictures.
 _SHOWN = 3000
 
@@ -54,6 +60,7 @@ def calibrate(
     interpolation: Literal["natural", "laplace", "nearest"] = "natural",
     min_static: float = 1.0,
     min_still: float = 0.5,
+    min_rest: float = 0.0,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Subject:
     """Calibrate a person.
@@ -86,6 +93,10 @@ def calibrate(
     min_still : float
         A PCA point with less still time is left out, s. The default is a tenth of the
         5 s per point of the protocol.
+    min_rest : float
+        Shorter rests of the hand do not count, s; see
+        :func:`ikns.nullspace.map.still_mask`. With 0.5 a recording may also hold free
+        movement, in which the hand is slow for a moment wherever it reverses.
     progress : callable, optional
         Called with (step, done, total).
 
@@ -118,8 +129,9 @@ def calibrate(
     """
     if not explorations:
         raise InvalidInput("expected at least one exploration recording, found none.")
-    if not 0 <= min_still < np.inf:
-        raise InvalidInput(f"expected min_still of at least 0 s, found {min_still:g}.")
+    for name, seconds in (("min_still", min_still), ("min_rest", min_rest)):
+        if not 0 <= seconds < np.inf:
+            raise InvalidInput(f"expected {name} of at least 0 s, found {seconds:g}.")
     names = ", ".join(recording.source for recording in explorations)
     body = Skeleton.load() if generic is None else generic
     if static is None:
@@ -149,13 +161,15 @@ def calibrate(
     )
     motions = tracked[: len(explorations)]
     gates = [
-        still_mask(motion, chain, max_hand_speed=max_hand_speed) for motion in motions
+        still_mask(motion, chain, max_hand_speed=max_hand_speed, min_duration=min_rest)
+        for motion in motions
     ]
+    other = other_hand_moves(motions, chain, times=_OTHER_SIDE)
     if not any(gate.any() for gate in gates):
-        speeds = np.concatenate([motion.hand_speed(chain) for motion in motions])
         raise NotEnoughData(
-            f"{names}: expected samples with the hand slower than {max_hand_speed:g} "
-            f"m/s, found none below {np.nanmin(speeds, initial=np.inf):.3g} m/s."
+            f"{names}: "
+            + no_still_sample(motions, chain, max_hand_speed, min_duration=min_rest)
+            + (f" {_say_side(other, chain)}" if other else "")
         )
     pairs = list(zip(motions, gates, strict=True))
     hands = [motion.task_position(chain)[gate] for motion, gate in pairs]
@@ -177,7 +191,12 @@ def calibrate(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
         with naming(names):
-            learned.fit(x, q, groups=recorded_places(hands, n_points=n_points))
+            try:
+                learned.fit(x, q, groups=recorded_places(hands, n_points=n_points))
+            except NotEnoughData as error:
+                if not other:
+                    raise
+                raise NotEnoughData(f"{error} {_say_side(other, chain)}") from None
     with naming(", ".join(recording.source for recording in natural) or names):
         readouts, methods = learn_readouts(
             skeleton,
@@ -195,13 +214,14 @@ def calibrate(
             "n_dof": n_dof,
             "variance": variance,
             "max_hand_speed_m_s": max_hand_speed,
+            "min_rest_s": min_rest,
             "min_samples": learned.min_samples,
             "clusters_start": learned.start_,
         },
         "methods": methods,
         "static": static_report(static, scaling),
         "explorations": [
-            exploration_report(recording, motion, gate)
+            exploration_report(recording, motion, gate, chain)
             for recording, (motion, gate) in zip(explorations, pairs, strict=True)
         ],
         "points": points_report(learned, rate=explorations[0].rate),
@@ -213,6 +233,17 @@ def calibrate(
                 else _left_out(static, scaling, marker_set, explorations, chain)
             ),
             *warned,
+            *(
+                f"{recording.source}: {left_out}."
+                for recording, motion in zip(explorations, motions, strict=True)
+                if (left_out := rejection_sentence(motion, chain))
+            ),
+            *([f"{names}: {_say_side(other, chain)}"] if other else []),
+            *(
+                f"{names}: {fault}."
+                for fault in [two_arms_fault(chain, n_dof, learned.n_components_)]
+                if fault
+            ),
             *(str(warning.message) for warning in caught),
         ],
     }
@@ -244,6 +275,10 @@ def _judged(
     if faults := refused(findings):
         raise MarkerMismatch(faults[0].sentence)
     return [finding.sentence for finding in findings if finding.severity == "warn"]
+
+
+def _say_side(other: str, chain: str) -> str:
+    return f"{other[0].upper()}{other[1:]}: {chain} seems to be the wrong side."
 
 
 def _left_out(

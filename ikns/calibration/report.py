@@ -11,6 +11,7 @@ from ikns.arrays import Mask
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.scaling import ScalingReport
+from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.recording.recording import Recording
@@ -33,15 +34,18 @@ def static_report(static: Recording | None, scaling: ScalingReport) -> dict[str,
 
 
 def exploration_report(
-    recording: Recording, motion: Motion, gate: Mask
+    recording: Recording, motion: Motion, gate: Mask, chain: str
 ) -> dict[str, Any]:
     """How well a recording was tracked and how much of it is still."""
     residual = motion.residual[np.isfinite(motion.residual)]
+    rejections = count_rejections(motion, chain)
     return {
         "source": recording.source,
         "duration_s": len(motion.time) / recording.rate,
         "frames": len(motion.time),
         "frames_converged": int(motion.converged.sum()),
+        "frames_rejected": sum(rejections.values()),
+        "rejections": rejections,
         "still_samples": int(gate.sum()),
         "still_s": float(gate.sum() / recording.rate),
         "residual_median_m": float(np.median(residual)) if residual.size else None,

@@ -41,7 +41,8 @@ def static_posture(
     if duration < min_duration * (1 - 1e-6):
         raise NotEnoughData(
             f"{static.source}: expected a static trial of at least "
-            f"{min_duration:g} s, found {duration:.2f} s."
+            f"{min_duration:g} s, found {duration:.2f} s; --min-static (min_duration, "
+            "min_static) accepts a shorter one."
         )
     target = _mean_posture(static, worn)
     absent = absent_joints(static.source, worn, seen_markers(target))

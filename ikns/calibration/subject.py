@@ -214,6 +214,35 @@ class Subject:
         }
         return cls(skeleton, learned, chain, report, samples=samples, readouts=readouts)
 
+    @property
+    def gate(self) -> dict[str, float]:
+        """Gate of the calibration, as :func:`ikns.nullspace.map.still_mask` takes it.
+
+        ``max_hand_speed``, m/s, and ``min_duration``, s; the defaults where the report
+        does not say.
+
+        Raises
+        ------
+        InvalidInput
+            When the report's are no such numbers.
+        """
+        settings = self.report.get("settings", {})
+        try:
+            gate = {
+                "max_hand_speed": float(settings.get("max_hand_speed_m_s", 0.05)),
+                "min_duration": float(settings.get("min_rest_s", 0.0)),
+            }
+        except (AttributeError, TypeError, ValueError):
+            gate = {"max_hand_speed": np.nan}
+        if not (
+            0 < gate["max_hand_speed"] < np.inf and 0 <= gate["min_duration"] < np.inf
+        ):
+            raise InvalidInput(
+                "expected max_hand_speed_m_s above 0 and min_rest_s from 0 on in the "
+                f"settings of the calibration's report, found {settings}."
+            )
+        return gate
+
     def _map(self) -> dict[str, Any]:
         learned = self.null_space_map
         # A map that was not fitted has no postures.

@@ -132,6 +132,15 @@ def calibrate(
             help="Least duration of still samples at a point, s.", min=0.0, max=3600.0
         ),
     ] = 0.5,
+    min_rest: Annotated[
+        float,
+        typer.Option(
+            help="Shorter rests of the hand do not count, s; 0.5 for recordings with "
+            "free movement.",
+            min=0.0,
+            max=3600.0,
+        ),
+    ] = 0.0,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -184,6 +193,7 @@ def calibrate(
             max_hand_speed=max_hand_speed,
             min_static=min_static,
             min_still=min_still,
+            min_rest=min_rest,
         )
     assert exploration is not None
     with progress() as report:
@@ -203,6 +213,7 @@ def calibrate(
             outside=outside,
             min_static=min_static,
             min_still=min_still,
+            min_rest=min_rest,
             progress=report,
         )
     subject.save(out, force=force)

@@ -29,6 +29,7 @@ from ikns.errors import NotEnoughData, naming
 if TYPE_CHECKING:
     from ikns.analysis.compare import NullSpaceComparison
 
+_UNITS = {"max_hand_speed": "m_s", "min_duration": "s"}
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
 
@@ -80,6 +81,7 @@ def compare(
     """
     from ikns.analysis.compare import motion_crosstalk
     from ikns.calibration.simulated import is_simulated
+    from ikns.motion.marker_ik.rejection import rejection_sentence
 
     refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
@@ -92,6 +94,7 @@ def compare(
             if path is not None
         ]
     motion, reaching = tracked[0], tracked[-1]
+    gate = calibrated.gate
     first: Literal["pose", "position"] = "position" if task == "position" else "pose"
     rows, warned = comparison_rows(
         calibrated, motion, source=str(recording), task=first
@@ -104,13 +107,23 @@ def compare(
         tasks=("pose", "position") if task == "both" else (first,),
         chain=chain,
         coordinates=coordinates,
-        options=options,
+        options=options | gate,
     )
-    warned += left_out
+    warned += left_out + [
+        f"{path}: {sentence}."
+        for path, each in zip((recording, reaches), tracked, strict=False)
+        if (sentence := rejection_sentence(each, own))
+    ]
     across = None
     with naming(str(reaches or recording)):
         try:
-            across = motion_crosstalk(learned, reaching, chain=own, **options)
+            across = motion_crosstalk(
+                learned,
+                reaching,
+                chain=own,
+                max_hand_speed=gate["max_hand_speed"],
+                **options,
+            )
         except NotEnoughData as error:
             if reaches is not None:
                 raise
@@ -132,7 +145,9 @@ def compare(
             "simulated": simulated,
             "chain": own,
             "task": task,
-            "settings": options | {"level": 0.95},
+            "settings": options
+            | {"level": 0.95}
+            | {f"{name}_{_UNITS[name]}": value for name, value in gate.items()},
             "points": rows,
             "comparisons": [
                 findings_json(each, chain=names[0], task=names[1], coordinates=names[2])
@@ -229,6 +244,7 @@ def comparison_rows(
             motion,
             chain=subject.chain,
             task=task,
+            **subject.gate,
         )
     found = visited.comparison
     rows: list[dict[str, Any]] = [
@@ -240,6 +256,8 @@ def comparison_rows(
             "angle_deg": np.degrees(found.angles[i]).tolist(),
             "inside": float(found.inside[i]),
             "learned_leak_m": float(found.learned_leak[i]),
+            "learned_leak_corrected_m": float(found.learned_leak_corrected[i]),
+            "learned_leak_interval_m": found.learned_leak_interval[i].tolist(),
             "analytic_leak_m": float(found.analytic_leak[i]),
             "agreement": float(found.agreement[i]),
             "learned_direction": visited.learned.directions_[i].tolist(),
@@ -259,6 +277,7 @@ def comparison_table(rows: list[dict[str, Any]], title: str) -> Any:
             "angle\ndeg": ".1f",
             "% variance\nalong analytic": ".1f",
             "leak mm/c\nlearned": ".1f",
+            "without\nnoise": ".1f",
             "leak mm/c\nanalytic": ".1f",
             "r of\nboth c": ".3f",
         },
@@ -269,6 +288,7 @@ def comparison_table(rows: list[dict[str, Any]], title: str) -> Any:
                 max(row.get("angle_deg", [nan])),
                 100 * row.get("inside", nan),
                 1000 * row.get("learned_leak_m", nan),
+                1000 * row.get("learned_leak_corrected_m", nan),
                 1000 * row.get("analytic_leak_m", nan),
                 row.get("agreement", nan),
             ]

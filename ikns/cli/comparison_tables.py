@@ -28,6 +28,7 @@ def findings_json(found: NullSpaceComparison, **about: Any) -> dict[str, Any]:
             "point": int(found.points[i]) + 1,
             "samples": int(found.counts[i]),
             "angles_deg": degrees(found.angles[i]),
+            "angle_corrected_deg": degrees(found.angle_corrected[i]),
             "angle_interval_deg": degrees(found.angle_interval[i]),
             "mean_posture_angles_deg": degrees(found.mean_posture_angles[i]),
             "mean_posture_interval_deg": degrees(found.mean_posture_interval[i]),
@@ -37,8 +38,10 @@ def findings_json(found: NullSpaceComparison, **about: Any) -> dict[str, Any]:
             "inside_mean_posture": found.inside_mean_posture[i],
             "inside_chance_median_and_95": found.inside_chance[i],
             "leak_m": found.leak[i],
+            "leak_corrected_m": found.leak_corrected[i],
             "leak_interval_m": found.leak_interval[i],
             "turn_deg": degrees(found.turn[i]),
+            "turn_corrected_deg": degrees(found.turn_corrected[i]),
             "turn_interval_deg": degrees(found.turn_interval[i]),
             "kinematic_leak_m": found.kinematic_leak[i],
             "kinematic_turn_deg": degrees(found.kinematic_turn[i]),
@@ -54,8 +57,9 @@ def findings_json(found: NullSpaceComparison, **about: Any) -> dict[str, Any]:
     ]
     pooled: dict[str, Any] = {}
     for name, values in found.pooled.items():
-        angle = name.endswith(("angle", "turn", "curvature"))
-        unit = "_deg" if angle else "_m" if name.endswith("leak") else ""
+        kind = name.removesuffix("_corrected")
+        angle = kind.endswith(("angle", "turn", "curvature"))
+        unit = "_deg" if angle else "_m" if kind.endswith("leak") else ""
         value, low, high = degrees(values) if angle else values
         pooled[name + unit] = {"value": value, "interval": [low, high]}
     return about | {
@@ -92,10 +96,14 @@ def point_table(found: NullSpaceComparison, title: str) -> Any:
         [
             int(found.points[i]) + 1,
             int(found.counts[i]),
-            _with_ends(found.angles[i, -1], found.angle_interval[i], np.degrees),
+            _with_ends(
+                _known(found.angle_corrected[i], found.angles[i, -1]),
+                found.angle_interval[i],
+                np.degrees,
+            ),
             float(np.degrees(found.mean_posture_angles[i, -1])),
             _with_ends(found.inside[i], found.inside_interval[i], _percent),
-            _with_ends(*_worst(found.leak[i], found.leak_interval[i]), _milli),
+            _with_ends(*_worst_leak(found, i), _milli),
             float(np.degrees(found.turn[i].max())),
             float(1000 * found.straight_leak[i]),
             float(np.degrees(found.curvature[i])),
@@ -138,11 +146,11 @@ def pooled_table(
                 found.directions.shape[2],
                 task,
                 SHOULDER[coordinates],
-                cell("angle", np.degrees),
+                cell(_corrected(found, "angle"), np.degrees),
                 float(np.degrees(found.chance_angles[0])),
                 cell("inside", _percent),
                 100 * float(np.mean(found.inside_chance[:, 1])),
-                1000 * pooled["leak"][0],
+                1000 * pooled[_corrected(found, "leak")][0],
                 1000 * pooled["straight_leak"][0],
             ]
         )
@@ -169,20 +177,39 @@ LEGEND = (
     "postures.  inside: joint variance inside the null space.  leak, turn: hand's way "
     "while c goes from 0 to 1.  ends: how far the hand is off where straight Z ends.  "
     "bend: turn of the null space over the range.  chance: one random subspace in "
-    "twenty is below (above).  Noise makes angles and ways longer; intervals allow for "
-    "that, so one may end below its value."
+    "twenty is below (above).  angle and leak are without what noise adds to them, as "
+    "long as there are intervals; --json has both."
 )
 
 
 def leak_sentence(found: NullSpaceComparison) -> str:
-    """Say how the hand moves with c, all points together."""
+    """Say how the hand moves with c, all points together, and without noise."""
     import numpy as np
 
-    leak, turn = (
-        _with_ends(found.pooled[name][0], found.pooled[name][1:], unit)
-        for name, unit in (("leak", _milli), ("turn", np.degrees))
-    )
-    return f"While c goes from 0 to 1 the hand goes {leak} mm and turns {turn} deg."
+    parts = []
+    for name, unit, written in (("leak", _milli, "mm"), ("turn", np.degrees, "deg")):
+        corrected = _with_ends(*_value_and_ends(found, name), unit)
+        plain = _with_ends(found.pooled[name][0], (np.nan, np.nan), unit)
+        if _corrected(found, name) == name:
+            parts.append(f"{plain} {written}")
+        else:
+            parts.append(f"{corrected} {written} ({plain} with noise)")
+    return f"While c goes from 0 to 1 the hand goes {parts[0]} and turns {parts[1]}."
+
+
+def _corrected(found: NullSpaceComparison, name: str) -> str:
+    """Name of a pooled value without what noise adds, where there is one."""
+    better = f"{name}_corrected"
+    return name if math.isnan(found.pooled[better][0]) else better
+
+
+def _value_and_ends(found: NullSpaceComparison, name: str) -> tuple[Any, Any]:
+    value, *ends = found.pooled[_corrected(found, name)]
+    return value, ends
+
+
+def _known(value: Any, other: Any) -> Any:
+    return other if math.isnan(value) else value
 
 
 def crosstalk_sentence(found: Crosstalk) -> str:
@@ -221,9 +248,12 @@ def _short(value: float) -> str:
     return f"{value:.2f}" if value < 1 else f"{value:.{1 if value < 9.95 else 0}f}"
 
 
-def _worst(values: Any, intervals: Any) -> tuple[Any, Any]:
+def _worst_leak(found: NullSpaceComparison, i: int) -> tuple[Any, Any]:
+    """Of the signal that moves the hand most at a point."""
+    values = found.leak[i]
     worst = int(values.argmax()) if not math.isnan(values.max()) else 0
-    return values[worst], intervals[worst]
+    best = _known(found.leak_corrected[i][worst], values[worst])
+    return best, found.leak_interval[i][worst]
 
 
 def _percent(share: Any) -> Any:

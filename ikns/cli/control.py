@@ -17,7 +17,7 @@ from ikns.cli.options import (
     SubjectFolder,
     To,
 )
-from ikns.cli.output import progress, show, table
+from ikns.cli.output import notes, progress, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.output.file import refuse_overwriting, write_csv
 
@@ -48,10 +48,11 @@ def control(
 ) -> None:
     """Write the control signal of a recording: c from 0 to 1, frame by frame.
 
-    This is the map's own signal; `ikns run --source replay:FILE` also smooths it and
-    rejects frames.
+    This is the map's own signal; `ikns run --source replay:FILE` also smooths it. As
+    there, frames whose markers cannot be right have none.
     """
     from ikns.live.control.recorded import control_table
+    from ikns.motion.marker_ik.rejection import say_rejections
 
     refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
@@ -63,6 +64,7 @@ def control(
     found = control_table(calibrated, motion, mode=mode, method=method)
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
+    left_out = say_rejections(result["rejections"], result["frames"])
     show(
         {"recording": recording, "csv": out, "method": method} | result,
         table(
@@ -71,6 +73,7 @@ def control(
             [
                 ["frames", result["frames"]],
                 ["of these without a signal", result["frames_without_signal"]],
+                ["of these, markers rejected", result["frames_rejected"]],
                 ["% with the hand in the volume", _percent(result["inside_share"])],
                 ["% with c cut off at 0 or 1", _percent(result["clipped_share"])],
                 ["median of c", round(result["c_median"], 3)],
@@ -80,6 +83,7 @@ def control(
                 ],
             ],
         ),
+        *notes([f"{recording}: {left_out}."] if left_out else []),
         f"Wrote {out}",
         as_json=as_json,
     )

@@ -48,10 +48,12 @@ def ik(
 
     The body is that of a subject, or scaled from --static with --marker-set. Cells of a
     joint are empty in frames in which a segment next to it is out of sight, cells of
-    the thorax in frames that do not show it; .mot and .sto, which have no empty cells,
-    are without such frames.
+    the thorax in frames that do not show it, and those of an arm in frames whose
+    markers cannot be right; .mot and .sto, which have no empty cells, are without such
+    frames.
     """
     from ikns.motion.export import check_motion_file, write_motion
+    from ikns.motion.marker_ik.rejection import say_rejections
     from ikns.motion.table import motion_table
 
     outputs = out or [Path("motion.csv")]
@@ -93,6 +95,8 @@ def ik(
     csv = next((path for path in outputs if path.suffix.lower() == ".csv"), None)
     found = motion_table(motion)
     summary = found.summary
+    if rejected := say_rejections(summary["rejections"], summary["frames"]):
+        said.append(f"{recording}: {rejected}.")
     show(
         {"recording": recording, "csv": csv, "files": outputs, "notes": said} | summary,
         f"{recording}: {summary['frames_converged']} of {summary['frames']} frames "

@@ -66,6 +66,7 @@ def record_live(
     max_hand_speed: float,
     min_static: float,
     min_still: float,
+    min_rest: float,
 ) -> tuple[Path, list[Path], list[dict[str, Any]]]:
     """Record the calibration of a person, step by step.
 
@@ -116,6 +117,7 @@ def record_live(
         max_hand_speed=max_hand_speed,
         min_static=min_static,
         min_still=min_still,
+        min_rest=min_rest,
     )
     with ExitStack() as stack:
         source = stack.enter_context(open_source(options.source))

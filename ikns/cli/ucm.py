@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -41,6 +41,14 @@ def ucm(
             max=10.0,
         ),
     ] = 0.05,
+    most_different: Annotated[
+        float,
+        typer.Option(
+            help="Largest difference of two repetitions' hand paths, by their size.",
+            min=0.0,
+            max=10.0,
+        ),
+    ] = 0.25,
     surrogates: Annotated[
         int, typer.Option(help="Number of surrogates.", min=1, max=1000000)
     ] = 1000,
@@ -59,6 +67,7 @@ def ucm(
     over the still samples at each PCA point.
     """
     from ikns.calibration.simulated import is_simulated
+    from ikns.motion.marker_ik.rejection import rejection_sentence
 
     refuse_picture(figure, force=force, inputs=[*recordings, subject])
     if len({path.resolve() for path in recordings}) < len(recordings):
@@ -77,15 +86,24 @@ def ucm(
             )
             for path in recordings
         ]
-    analyze = over_points if len(motions) == 1 else over_time
-    found = analyze(
-        calibrated,
-        motions,
-        [str(path) for path in recordings],
-        task=task,
-        speed=onset_speed,
-        surrogates=surrogates,
-        seed=seed,
+    rejected = [
+        f"{path}: {sentence}."
+        for path, motion in zip(recordings, motions, strict=True)
+        if (sentence := rejection_sentence(motion, calibrated.chain))
+    ]
+    names = [str(path) for path in recordings]
+    options: dict[str, Any] = {
+        "task": task,
+        "speed": onset_speed,
+        "surrogates": surrogates,
+        "seed": seed,
+    }
+    found = (
+        over_points(calibrated, motions, names, **options)
+        if len(motions) == 1
+        else over_time(
+            calibrated, motions, names, most_different=most_different, **options
+        )
     )
     simulated = is_simulated(calibrated, subject, recordings)
     if figure is not None:
@@ -100,14 +118,16 @@ def ucm(
             "chain": calibrated.chain,
             "task": task,
             "onset_speed_m_s": onset_speed,
+            "most_different": most_different,
             "surrogates": surrogates,
             "seed": seed,
             "figure": figure,
         }
-        | found.result,
+        | found.result
+        | {"warnings": [*rejected, *found.result["warnings"]]},
         "Simulated subject" if simulated else "Recorded subject",
         *found.shown,
-        *notes(found.result["warnings"]),
+        *notes([*rejected, *found.result["warnings"]]),
         *([] if figure is None else [f"Wrote {figure}"]),
         as_json=as_json,
     )

@@ -45,6 +45,7 @@ def over_time(
     speed: float,
     surrogates: int,
     seed: int,
+    most_different: float,
 ) -> Found:
     """Split the variance over repetitions, at each normalized time."""
     import numpy as np
@@ -61,6 +62,7 @@ def over_time(
         n_surrogates=surrogates,
         seed=seed,
         names=sources,
+        most_different=most_different,
     )
     analysis, overall = found.over_time, found.overall
     split, test = analysis.split, analysis.surrogates

@@ -20,7 +20,8 @@ class Motion:
     compute with: what was not seen stays there where it was. Everything else is NaN
     where it is not known: an angle and its velocity by `known`, the pose of the thorax
     by `seen` of the thorax, a hand while the thorax or a segment of its arm is out of
-    sight.
+    sight; and all of an arm, and the thorax if it is of both, in frames whose markers
+    were rejected.
 
     Parameters
     ----------
@@ -56,6 +57,12 @@ class Motion:
     known : (T, J) boolean array
         Whether the frame shows each joint, in the order of `joint_names`; the rule is
         that of :func:`ikns.motion.marker_ik.visibility.visible_segments`.
+    rejected : (T, 2) integer array
+        By side, why the markers of thorax and arm are not believed: a number of
+        `reasons`, -1 where they are; see :class:`ikns.motion.marker_ik.gate.GateLimits`
+        and :func:`ikns.motion.marker_ik.rejection.count_rejections`.
+    reasons : tuple of str
+        In words.
     """
 
     time: Array
@@ -72,18 +79,25 @@ class Motion:
     segments: tuple[str, ...] = ()
     seen: Mask = field(default_factory=lambda: np.ones((1, 0), bool))
     known: Mask = field(default_factory=lambda: np.ones((1, 1), bool))
+    rejected: Indices = field(default_factory=lambda: np.full((1, len(SIDES)), -1))
+    reasons: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Hide what was not seen, and freeze the arrays."""
         n, joints = len(self.time), len(self.joint_names)
         seen = np.broadcast_to(self.seen, (n, len(self.segments)))
         known = np.broadcast_to(self.known, (n, joints))
+        rejected = np.broadcast_to(self.rejected, (n, len(SIDES)))
+        if (rejected >= 0).any():
+            known = known & believed_joints(self.joint_names, rejected)
         object.__setattr__(self, "seen", seen)
         object.__setattr__(self, "known", known)
+        object.__setattr__(self, "rejected", rejected)
         thorax = np.repeat(
-            all_seen(self.segments, seen)[:, None], self.v.shape[1] - joints, axis=1
+            self._thorax_known()[:, None], self.v.shape[1] - joints, axis=1
         )
         arms = np.stack([all_seen(self.segments, seen, side) for side in SIDES], axis=1)
+        arms &= rejected < 0
         for name, shown in (
             ("v", np.hstack([thorax, known])),
             ("hand_in_thorax", arms),
@@ -108,13 +122,17 @@ class Motion:
 
     @property
     def thorax_in_world(self) -> Array:
-        """Pose of the thorax, (T, 7) m and a quaternion; NaN where it was not seen."""
+        """Pose of the thorax, (T, 7) m and a quaternion; NaN where it is not known."""
         pose = self.q[:, : -len(self.joint_names)]
-        return np.where(all_seen(self.segments, self.seen)[:, None], pose, np.nan)
+        return np.where(self._thorax_known()[:, None], pose, np.nan)
 
     def in_sight(self, chain: str) -> Mask:
         """Whether the thorax and every segment of a chain were seen, (T,)."""
         return all_seen(self.segments, self.seen, *chain_sides(chain))
+
+    def believed(self, chain: str) -> Mask:
+        """Whether the markers of the thorax and a chain were not rejected, (T,)."""
+        return np.asarray((self.rejected[:, self._sides(chain)] < 0).all(axis=1))
 
     def never_seen(self, chain: str) -> tuple[str, ...]:
         """Segments of a chain, or the thorax, that no frame shows."""
@@ -126,7 +144,10 @@ class Motion:
         )
 
     def chain_angles(self, chain: str) -> Array:
-        """Joint angles of a chain, (T, n) radians in chain order; NaN out of sight."""
+        """Joint angles of a chain, (T, n) radians in chain order; NaN where not known.
+
+        That is where the chain is out of sight or its markers were rejected.
+        """
         return self._while_in_sight(chain, self.angles)
 
     def chain_velocities(self, chain: str) -> Array:
@@ -200,7 +221,13 @@ class Motion:
 
     def _while_in_sight(self, chain: str, values: Array) -> Array:
         columns = [self.joint_names.index(name) for name in chain_joints(chain)]
-        return np.where(self.in_sight(chain)[:, None], values[:, columns], np.nan)
+        shown = self.in_sight(chain) & self.believed(chain)
+        return np.where(shown[:, None], values[:, columns], np.nan)
+
+    def _thorax_known(self) -> Mask:
+        # Its markers are judged with each arm's.
+        judged: Mask = (self.rejected < 0).any(axis=1)
+        return all_seen(self.segments, self.seen) & judged
 
     def _sides(self, chain: str) -> list[int]:
         return [SIDES.index(side) for side in chain_sides(chain)]
@@ -213,3 +240,12 @@ def all_seen(segments: tuple[str, ...], seen: Mask, *sides: str) -> Mask:
     """
     own = [link.startswith(("thorax", *sides)) for link in segments]
     return np.asarray(seen[:, own].all(axis=1))
+
+
+def believed_joints(joint_names: tuple[str, ...], rejected: Indices) -> Mask:
+    """Which joints (T, J) belong to no arm whose markers were rejected (T, 2)."""
+    kept = np.ones((len(rejected), len(joint_names)), dtype=bool)
+    for side, numbers in zip(SIDES, rejected.T, strict=True):
+        own = [name.startswith(side) for name in joint_names]
+        kept[np.ix_(numbers >= 0, own)] = False
+    return kept

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ikns.arrays import Array
+from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
 from ikns.numerics.median import finite_median
 
@@ -21,7 +22,7 @@ class MotionTable(NamedTuple):
     """
 
     columns: list[str]
-    rows: Array  # (T, columns); NaN where not seen
+    rows: Array  # (T, columns); NaN where not seen, or markers were rejected
     range_deg: dict[str, tuple[float, float]]  # of every joint; NaN for one never seen
     summary: dict[str, Any]  # frames, residual (m), held joints; ready for JSON
 
@@ -49,10 +50,13 @@ def motion_table(motion: Motion) -> MotionTable:
     lowest, highest = np.fmin.reduce(degrees), np.fmax.reduce(degrees)
     span = highest - lowest
     ends = zip(lowest.tolist(), highest.tolist(), strict=True)
+    rejections = count_rejections(motion, "both_arms")
     summary = {
         "frames": len(motion.time),
         "frames_converged": int(motion.converged.sum()),
         "frames_without_markers": int(np.isnan(motion.residual).sum()),
+        "frames_rejected": sum(rejections.values()),
+        "rejections": rejections,
         "residual_median_m": finite_median(motion.residual),
         "held_joints": motion.held,
         "moved_deg": dict(zip(motion.joint_names, span.tolist(), strict=True)),

@@ -18,6 +18,7 @@ reproduces the critical values of Kiefer and Vogelsang (2005, Econometric Theory
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,21 +27,25 @@ from scipy.special import stdtrit
 from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
 
-#: Least number of blocks; fewer hardly determine their own spread.
-_LEAST_BLOCKS = 3
-#: Share of the variance that may be lost at block ends: a twentieth of an interval.
-_BIAS = 0.1
+#: Fewer samples are no series.
+_FEWEST = 6
+#: Least number of blocks. So few hardly determine their own spread, which Student's
+#: quantile allows for; shorter blocks would not see a drift, which nothing allows for.
+_LEAST_BLOCKS = 1.5
+#: Share of the variance that may be lost at block ends: a fortieth of an interval.
+_BIAS = 0.05
 
 
 def block_length(series: ArrayLike) -> int:
-    """Block length for a series (N,) or (N, m), in samples, from 1 to a third of N.
+    """Block length for a series (N,) or (N, m), in samples, from 1 to two thirds of N.
 
     Blocks cut correlations at their ends. The relative bias of a variance from blocks
     of length b is therefore ``-G / (g(0) b)``, where g(0) is the long-run variance, the
     sum of all autocovariances R(k), and G the sum of ``|k| R(k)``. The length returned
-    makes that bias a tenth. Both sums run over lags up to twice the one beyond which
-    autocorrelations are only noise, with a flat-top window (Politis and White 2004,
-    Econometric Reviews 23:53; corrected by Patton, Politis and White 2009, 28:372).
+    makes that bias a twentieth. Both sums run over lags up to twice the one beyond
+    which autocorrelations are only noise, with a flat-top window (Politis and White
+    2004, Econometric Reviews 23:53; corrected by Patton, Politis and White 2009,
+    28:372); that lag is sought up to half the series, so that blocks follow a drift.
     The length they recommend, which grows with the cube root of N, has the least mean
     squared error of the variance; intervals keep their level with longer blocks, while
     the small number of blocks is allowed for (Sun, Phillips and Jin 2008, Econometrica
@@ -57,13 +62,12 @@ def block_length(series: ArrayLike) -> int:
     """
     rows = np.asarray(series, dtype=np.float64)
     rows = rows.reshape(len(rows), -1)
-    if len(rows) < 2 * _LEAST_BLOCKS:
-        raise NotEnoughData(
-            f"expected at least {2 * _LEAST_BLOCKS} samples to draw blocks from, found "
-            f"{len(rows)}."
-        )
     n = len(rows)
-    most = n // _LEAST_BLOCKS
+    if n < _FEWEST:
+        raise NotEnoughData(
+            f"expected at least {_FEWEST} samples to draw blocks from, found {n}."
+        )
+    most = int(n / _LEAST_BLOCKS)
     return max(_length_of_one(column, most) for column in rows.T)
 
 
@@ -73,14 +77,14 @@ def _length_of_one(x: Array, most: int) -> int:
     if not np.abs(deviation).max() > 1e-12 * np.abs(x).max():
         return 1
     quiet = max(5, math.ceil(math.sqrt(math.log10(n))))
-    lags = min(math.ceil(math.sqrt(n)) + quiet, n - 1)
+    lags = min(max(math.ceil(math.sqrt(n)) + quiet, n // 2), n - 1)
     spectrum = np.abs(np.fft.rfft(deviation, 2 * n)) ** 2
     R = np.fft.irfft(spectrum, 2 * n)[: lags + 1] / n
     noise = 2 * math.sqrt(math.log10(n) / n)
     small = np.abs(R[1:] / R[0]) < noise
-    runs = [k for k in range(lags - quiet + 1) if small[k : k + quiet].all()]
+    runs = np.flatnonzero(np.convolve(small, np.ones(quiet), "valid") > quiet - 0.5)
     # The first lag beyond which all is noise; else the last that is not.
-    last = runs[0] if runs else int(np.flatnonzero(~small).max(initial=0)) + 1
+    last = int(runs[0] if runs.size else np.flatnonzero(~small).max(initial=0) + 1)
     reach = min(2 * max(last, 1), lags)
     k = np.arange(1, reach + 1)
     window = np.clip(2 * (1 - k / reach), 0.0, 1.0)  # a trapezoid: flat, then down
@@ -142,6 +146,14 @@ def student_interval(
     return estimate - half, estimate + half
 
 
+class LengthEstimate(NamedTuple):
+    """Length of a vector that noise made longer: corrected, and its interval's ends."""
+
+    corrected: float
+    low: float
+    high: float
+
+
 def length_interval(
     estimate: ArrayLike,
     replicates: ArrayLike,
@@ -150,28 +162,59 @@ def length_interval(
     rng: np.random.Generator,
     level: float = 0.95,
 ) -> tuple[float, float]:
-    """Confidence interval of a vector's length, which noise makes longer.
+    """Confidence interval of a vector's length; see :func:`length_estimate`."""
+    found = length_estimate(estimate, replicates, blocks, rng=rng, level=level)
+    return found.low, found.high
+
+
+def length_estimate(
+    estimate: ArrayLike,
+    replicates: ArrayLike,
+    blocks: float,
+    *,
+    rng: np.random.Generator,
+    level: float = 0.95,
+) -> LengthEstimate:
+    """Length of a vector that noise makes longer, corrected, with its interval.
 
     The length of a noisy vector is never zero, even where that of the true one is; so
     replicates scatter around too long a length. The interval instead holds all lengths
     r that a test does not reject: true vectors of length r in the direction found, with
     the errors of the replicates, widened as in :func:`student_interval` (test
-    inversion, Carpenter 1999, Statistics in Medicine 18:1).
+    inversion, Carpenter 1999, Statistics in Medicine 18:1). The corrected length is the
+    r with which the vector would be longer half of the time, so it lies within.
 
     The estimate is (m,); rows of the replicates (B, m) that are not finite are ignored.
-    The lower end is 0 where the vector is within its noise.
+    Corrected length and lower end are 0 where the vector is within its noise. A vector
+    that is shorter than noise alone would make it half of the time has the upper end of
+    one that long (Cowan et al. 2011, arXiv 1105.3166): without that the interval
+    could be empty.
     """
     vector = np.asarray(estimate, dtype=np.float64)
     rows = np.asarray(replicates, dtype=np.float64).reshape(-1, len(vector))
     rows = rows[np.isfinite(rows).all(axis=1)]
     length = float(np.linalg.norm(vector))
     if len(rows) < 2 or not math.isfinite(length):
-        return math.nan, math.nan
+        return LengthEstimate(math.nan, math.nan, math.nan)
     degrees, widen = _small_sample(blocks)
     errors = widen * (rows - rows.mean(axis=0))
     errors *= np.sqrt(degrees / rng.chisquare(degrees, len(rows)))[:, None]
     along = errors @ (vector / length) if length > 0 else errors[:, 0]
     squared = np.sum(errors**2, axis=1)
+    usual = max(length, float(np.sqrt(np.median(squared))))
+    upper, lower = (1 + level) / 2, (1 - level) / 2
+    return LengthEstimate(
+        corrected=_longest(length, along, squared, 0.5),
+        low=_longest(length, along, squared, upper),
+        high=_longest(usual, along, squared, lower),
+    )
+
+
+def _longest(length: float, along: Array, squared: Array, share: float) -> float:
+    """Return the longest true vector of which `share` are found shorter than `length`.
+
+    Errors (B,) have a part `along` the vector, and are `squared`; 0 if there is none.
+    """
     # A vector of length r and an error e make one shorter than `length` exactly while
     # r lies between the roots of r^2 + 2 r along + squared = length^2.
     discriminant = along**2 - squared + length**2
@@ -182,11 +225,7 @@ def length_interval(
     lengths = np.unique(np.concatenate([[0.0], first, last]))
     lengths = lengths[lengths >= 0]
     shorter = np.searchsorted(first, lengths, "right") - np.searchsorted(last, lengths)
-    low, high = (
-        float(lengths[shorter >= share * len(rows)].max(initial=0.0))
-        for share in ((1 + level) / 2, (1 - level) / 2)
-    )
-    return low, high
+    return float(lengths[shorter >= share * len(squared)].max(initial=0.0))
 
 
 def _small_sample(blocks: float) -> tuple[float, float]:

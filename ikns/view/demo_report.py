@@ -147,7 +147,10 @@ def _key_numbers(summary: Mapping[str, Any]) -> list[KeyNumber]:
     """Results to see first, each with its meaning."""
     worst = min(summary["r_of_c_and_true_swivel"], key=abs)
     rows, lengths = summary["points"], summary["length_error_m"]
-    leaks = [row["learned_leak_m"] for row in rows if "learned_leak_m" in row]
+    leaks, corrected = (
+        [row[name] for row in rows if name in row]
+        for name in ("learned_leak_m", "learned_leak_corrected_m")
+    )
     return [
         KeyNumber(
             "c against the true elbow swivel",
@@ -163,8 +166,9 @@ def _key_numbers(summary: Mapping[str, Any]) -> list[KeyNumber]:
         ),
         KeyNumber(
             "leak",
-            f"{1000 * np.median(leaks):.1f} mm at the median point",
-            "How far the hand goes with c from 0 to 1; it should stay.",
+            f"{1000 * np.nanmedian(corrected):.1f} mm at the median point",
+            "How far the hand goes with c from 0 to 1, without what noise adds; it "
+            f"should stay. With noise it is {1000 * np.median(leaks):.1f} mm.",
         ),
         KeyNumber(
             "segment lengths",

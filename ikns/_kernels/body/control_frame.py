@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.descent import errors_at
-from ikns._kernels.body.marker_ik import solve_frame
-from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
+from ikns._kernels.body.frame_sequence import Memory, follow_frame
+from ikns._kernels.body.marker_gate import THORAX, MarkerGate
+from ikns._kernels.body.marker_problem import cut, unpack
 from ikns._kernels.body.paths import Paths, place_frames
 from ikns._kernels.compiled import compiled
 from ikns._kernels.voronoi.diagram import NOT_FINITE, OUTSIDE_HULL
@@ -36,8 +36,6 @@ class ControlMap(NamedTuple):
     hands: Indices  # (1,) or (2,) the chain's hands, of right and left
     link: Indices  # (M,) link that a marker belongs to, or -1
     need: Indices  # (L,) how many markers of a link must be seen
-    pair: Indices  # (N, 2) pairs of markers of the same link
-    apart: Array  # (N,) their distance on the link, m
 
 
 @compiled
@@ -45,9 +43,11 @@ def control_frame(
     whole: Indices,
     real: Array,
     paths: Paths,
+    gate: MarkerGate,
     control_map: ControlMap,
     markers: Array,
     from_scratch: bool,
+    memory: Memory,
     q: Array,
     work: Array,
     cavity_work: Array,
@@ -59,8 +59,8 @@ def control_frame(
 ) -> tuple[float, float, float, int, bool, bool, int]:
     """Solve one frame of markers (M, 3) in the world, m; NaN where not seen.
 
-    `whole`, `real` and `q`, the previous pose, are as in
-    :func:`ikns._kernels.body.marker_ik.solve_frames`, `paths` lead to both hands;
+    `whole`, `real`, `gate` and `memory`, which has the pose to start from, are as in
+    :func:`ikns._kernels.body.frame_sequence.solve_frames`, `paths` lead to both hands;
     `work`, `cavity_work`, `rotation` (1, 2, 3, 3) and `weights` (P,) are scratch.
     Written are the pose `q` (nq,), the right and left hand `position` (1, 2, 3) and the
     task's `place` (3,) in the thorax frame, m, and the signals `c` (d,), not clipped:
@@ -86,11 +86,25 @@ def control_frame(
     """
     problem = unpack(whole, real)
     s = cut(problem, work)
-    residual, iterations, converged = solve_frame(
-        problem, s, markers, q, from_scratch, q
+    figures, passed = np.empty((2, 3)), np.empty(2, dtype=np.bool_)
+    residual, iterations, converged = follow_frame(
+        problem,
+        s,
+        gate,
+        markers,
+        memory,
+        from_scratch,
+        q,
+        figures[0],
+        figures[1],
+        passed,
     )
-    worst = _worst_residual(problem, s, control_map.link, q)
-    intermarker = _intermarker_error(markers, control_map.pair, control_map.apart)
+    worst, intermarker = figures[0, THORAX], figures[1, THORAX]
+    for hand in control_map.hands:
+        # The first is NaN where nothing of the thorax is seen.
+        if not worst >= figures[0, 1 + hand]:
+            worst = figures[0, 1 + hand]
+        intermarker = max(intermarker, figures[1, 1 + hand])
     known = _in_sight(markers, control_map.link, control_map.need)
     n_angles = len(q) - 7
     place_frames(paths, q[7:].reshape(1, n_angles), rotation, position)
@@ -120,36 +134,6 @@ def control_frame(
         c,
     )
     return residual, worst, intermarker, iterations, converged, known, status
-
-
-@compiled
-def _worst_residual(
-    problem: MarkerProblem, s: Scratch, link: Indices, q: Array
-) -> float:
-    """Largest residual of the current markers at `q`, m."""
-    errors_at(problem, s, q)
-    largest = -1.0
-    for m in range(len(link)):
-        if link[m] >= 0 and s.weight[m] > 0:
-            square = 0.0
-            for k in range(3):
-                square += s.error[m, k] ** 2
-            largest = max(largest, square)
-    return np.sqrt(largest) if largest >= 0 else np.nan
-
-
-@compiled
-def _intermarker_error(markers: Array, pair: Indices, apart: Array) -> float:
-    largest = 0.0
-    for i in range(len(pair)):
-        square = total = 0.0
-        for k in range(3):
-            first, second = markers[pair[i, 0], k], markers[pair[i, 1], k]
-            total += abs(first) + abs(second)
-            square += (first - second) ** 2
-        if np.isfinite(total):
-            largest = max(largest, abs(np.sqrt(square) - apart[i]))
-    return largest
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Marker inverse kinematics of one frame, and of a recording frame by frame.
+"""Marker inverse kinematics of one frame.
 
 Minimizes over the configuration q
 
@@ -16,53 +16,17 @@ import numpy as np
 
 from ikns._kernels.body.descent import copy, descend, errors_at
 from ikns._kernels.body.marker_errors import take_markers
-from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
+from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
 from ikns._kernels.body.rigid import rigid_pose
 from ikns._kernels.body.tree import FREE_FLYER
 from ikns._kernels.compiled import compiled
-from ikns.arrays import Array, Indices, Mask
+from ikns.arrays import Array, Indices
 
 #: Iterations of a frame with an infinite marker, which is a fault and not a gap.
 INFINITE = -1
-
-
-@compiled
-def solve_frames(
-    whole: Indices,
-    real: Array,
-    markers: Array,
-    first: int,
-    last: int,
-    way: int,
-    before: Array,
-    from_scratch: bool,
-    work: Array,
-    q: Array,
-    residual: Array,
-    iterations: Indices,
-    converged: Mask,
-) -> None:
-    """Solve frames from `first` to before `last`, `way` (1 or -1) one after the other.
-
-    `whole` and `real` are a packed
-    :class:`ikns._kernels.body.marker_problem.MarkerProblem`, `markers` (T, M, 3) in the
-    world, m, NaN where not seen; `before` (nq,) is the pose before the first frame,
-    unless it is solved `from_scratch`, and later frames start from the previous one.
-    `work` is scratch of :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
-
-    Written are the solutions `q` (T, nq), the previous pose where no marker is seen,
-    and by frame (T,) the `residual`, the root mean square distance of the seen markers
-    (m; NaN without any, infinite where the previous pose is not finite), whether it
-    `converged`, and `iterations`: `INFINITE` where a marker is infinite, not seen and
-    not NaN.
-    """
-    problem = unpack(whole, real)
-    s = cut(problem, work)
-    for i in range(first, last, way):
-        start = before if i == first else q[i - way]
-        residual[i], iterations[i], converged[i] = solve_frame(
-            problem, s, markers[i], start, from_scratch and i == first, q[i]
-        )
+#: Joints this far beyond their limits, rad (root of the sum of squares), make a pose
+#: doubtful: people's marker errors take them a few degrees beyond.
+FAR = 0.26
 
 
 @compiled
@@ -80,9 +44,12 @@ def solve_frame(
     seen: Array,
     before: Array,
     from_scratch: bool,
+    loose: bool,
     q: Array,
 ) -> tuple[float, int, bool]:
     """Write the solution of one frame, (nq,); return residual, iterations, converged.
+
+    `loose` pulls less to the previous pose, which may be some time ago.
 
     Round -1 descends from the previous pose. Without one, or where that fails, rounds
     0, 1, ... descend from the starts, the last from the best result for each limb.
@@ -91,13 +58,14 @@ def solve_frame(
     copy(before, s.start)
     copy(before, q)
     best_residual, best_iterations, best_converged = np.inf, 0, False
+    best_cost = np.inf
     if not _finite(before):
         return best_residual, best_iterations, best_converged
     if n_seen == 0:
         return np.nan, INFINITE if infinite else 0, best_converged
     n_starts = len(problem.starts)
     for k in range(0 if from_scratch else -1, n_starts + 1):
-        pull = problem.pull if k < 0 else problem.pull_from_scratch
+        pull = problem.pull_from_scratch if k >= 0 or loose else problem.pull
         aligned = problem.tree.kind[0] == FREE_FLYER and n_seen >= 3
         if 0 <= k < n_starts:
             copy(problem.starts[k], s.start)
@@ -109,8 +77,11 @@ def solve_frame(
             rigid_pose(s.x, s.target, s.weight, s.N, s.V, s.start)
         copy(s.start, s.q)
         residual, iterations, converged = descend(problem, n_seen, pull, s)
-        if residual < best_residual:
-            best_residual = residual
+        # Half turns about all axes of a shoulder leave the markers where they are, so
+        # only its limits tell such poses apart.
+        cost = residual**2 * n_seen + far_cost(problem, s.q)
+        if cost < best_cost:
+            best_cost, best_residual = cost, residual
             best_iterations, best_converged = iterations, converged
             copy(s.q, q)
         if k < 0 and residual <= problem.lost:
@@ -118,22 +89,42 @@ def solve_frame(
         if 0 <= k < n_starts:
             copy(s.q, s.solved[k])
             errors_at(problem, s, s.q)
-            s.residuals[k, 0] = residual
-            _sum_by_limb(problem.marker_branch, s.weight, s.error, s.residuals[k])
+            s.residuals[k, 0] = cost
+            _sum_by_limb(problem, s, s.q, s.residuals[k])
     return best_residual, INFINITE if infinite else best_iterations, best_converged
 
 
 @compiled
+def far_cost(problem: MarkerProblem, q: Array) -> float:
+    """Return the cost of joints beyond their limits, m^2; 0 unless they are far."""
+    return _far(problem, q, -1)
+
+
+@compiled
+def _far(problem: MarkerProblem, q: Array, branch: int) -> float:
+    """Return the same for one limb, or for all with -1."""
+    square = 0.0
+    for i in range(len(problem.angle)):
+        at = problem.angle[i]
+        if at >= 0 and (branch < 0 or problem.q_branch[at] == branch):
+            over = max(q[at] - problem.upper[i], 0.0)
+            over += min(q[at] - problem.lower[i], 0.0)
+            square += over**2
+    return problem.limit**2 * square if square > FAR**2 else 0.0
+
+
+@compiled
 def _sum_by_limb(
-    branch: Indices, weight: Array, error: Array, residuals: Array
+    problem: MarkerProblem, s: Scratch, q: Array, residuals: Array
 ) -> None:
-    """Write each limb's squared errors after the first entry."""
+    """Write each limb's squared errors and cost of limits after the first entry."""
     for b in range(1, len(residuals)):
-        residuals[b] = 0.0
-    for m in range(len(weight)):
-        if weight[m] > 0 and branch[m] >= 0:
+        residuals[b] = _far(problem, q, b - 1)
+    for m in range(len(s.weight)):
+        branch = problem.marker_branch[m]
+        if s.weight[m] > 0 and branch >= 0:
             for a in range(3):
-                residuals[1 + branch[m]] += error[m, a] ** 2
+                residuals[1 + branch] += s.error[m, a] ** 2
 
 
 @compiled

@@ -69,6 +69,7 @@ class Scratch(NamedTuple):
     start: Array
     q: Array
     trial: Array
+    kept: Array
     solved: Array
     residuals: Array
     N: Array
@@ -174,7 +175,7 @@ def scratch_size(problem: MarkerProblem) -> int:
         + J * (12 + MOMENTS)
         + n * (19 + 3 * D)
         + 10 * M
-        + nq * (3 + S)
+        + nq * (4 + S)
         + S * (1 + problem.n_branches)
     )
 
@@ -193,7 +194,7 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
     f = e + n * 4
     g = f + n * 3 * D
     h = g + M * 10
-    k = h + nq * 3
+    k = h + nq * 4
     m = k + nq * S
     return Scratch(
         work[0:3],
@@ -216,6 +217,7 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
         work[h : h + nq],
         work[h + nq : h + 2 * nq],
         work[h + 2 * nq : h + 3 * nq],
+        work[h + 3 * nq : h + 4 * nq],
         _table(work, k, S, nq),
         _table(work, m, S, 1 + problem.n_branches),
         _table(work, 3, 4, 4),

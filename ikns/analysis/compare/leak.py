@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ikns.analysis.compare.resampling import draw
-from ikns.numerics.bootstrap import length_interval
+from ikns.numerics.bootstrap import length_estimate
 
 Array = NDArray[np.float64]
 
@@ -18,13 +18,14 @@ class HandSlope(NamedTuple):
     """How the hand moves per unit of each control signal.
 
     `slope` (d, 3) is in m or rad, NaN where a signal has no range; `replicates` (B, d,
-    3) are the same from resamples, `interval` (d, 2) of the slopes' lengths, empty and
-    NaN without resampling; `blocks` how many fit into the samples, 0 without an
-    interval.
+    3) are the same from resamples, `corrected` (d,) the slopes' lengths without what
+    noise adds, `interval` (d, 2) of these, empty and NaN without resampling; `blocks`
+    how many fit into the samples, 0 without an interval.
     """
 
     slope: Array
     replicates: Array
+    corrected: Array
     interval: Array
     blocks: float
 
@@ -45,14 +46,17 @@ def hand_slope(
         slope = slopes(c, hand)
     if not resamples or np.isnan(slope).any():
         none = np.empty((0, *slope.shape))
-        return HandSlope(slope, none, np.full((d, 2), np.nan), 0.0)
+        unknown = np.full((d, 3), np.nan)
+        return HandSlope(slope, none, unknown[:, 0], unknown[:, 1:], 0.0)
     counts, blocks = draw(slope_scores(c, hand), resamples, rng)
     replicates = slopes(c, hand, counts)
-    interval = [
-        length_interval(slope[i], replicates[:, i], blocks, level=level, rng=rng)
-        for i in range(d)
-    ]
-    return HandSlope(slope, replicates, np.array(interval), blocks)
+    found = np.array(
+        [
+            length_estimate(slope[i], replicates[:, i], blocks, level=level, rng=rng)
+            for i in range(d)
+        ]
+    )
+    return HandSlope(slope, replicates, found[:, 0], found[:, 1:], blocks)
 
 
 def slopes(c: Array, hand: Array, counts: Array | None = None) -> Array:

@@ -14,7 +14,7 @@ from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap, null_space_samples, still_mask
-from ikns.numerics.bootstrap import length_interval
+from ikns.numerics.bootstrap import LengthEstimate, length_estimate
 from ikns.numerics.subspace import principal_angles
 
 Array = NDArray[np.float64]
@@ -42,6 +42,8 @@ class MapComparison:
         on c over the samples. It should be zero.
     learned_turn, analytic_turn : (P,) array
         Hand rotation meanwhile, rad: likewise.
+    learned_leak_corrected : (P,) array
+        The first without what noise adds, m; NaN where there is no interval.
     learned_leak_interval : (P, 2) array
         95 % confidence interval of the learned leak (block bootstrap over time, see
         :mod:`ikns.numerics.bootstrap`); NaN with fewer than ten samples.
@@ -58,6 +60,7 @@ class MapComparison:
     analytic_leak: Array
     learned_turn: Array
     analytic_turn: Array
+    learned_leak_corrected: Array
     learned_leak_interval: Array
     agreement: Array
 
@@ -69,6 +72,7 @@ def compare(
     *,
     chain: str = "right_arm",
     max_hand_speed: float = 0.05,
+    min_duration: float = 0.0,
     resamples: int = 400,
     seed: int | np.random.Generator = 0,
 ) -> MapComparison:
@@ -86,8 +90,8 @@ def compare(
         Any motion with still hands near the points.
     chain : str
         See :data:`ikns.body.chains.CHAINS`.
-    max_hand_speed : float
-        Gate on the hand, m/s.
+    max_hand_speed, min_duration : float
+        Gate on the hand, see :func:`ikns.nullspace.map.still_mask`, m/s and s.
     resamples : int
         For the interval of the leak; 0 for none.
     seed : int or numpy.random.Generator
@@ -119,8 +123,9 @@ def compare(
             f"found directions {learned.directions_.shape} and "
             f"{analytic.directions_.shape}."
         )
-    x, q = null_space_samples(motion, chain, max_hand_speed=max_hand_speed)
-    gate = still_mask(motion, chain, max_hand_speed=max_hand_speed)
+    limits = {"max_hand_speed": max_hand_speed, "min_duration": min_duration}
+    x, q = null_space_samples(motion, chain, **limits)
+    gate = still_mask(motion, chain, **limits)
     side = SIDES.index(chain_sides(chain)[0])
     rotation = motion.hand_rotation_in_thorax[gate][:, side]
     radius = getattr(learned, "radius_", None)
@@ -137,7 +142,7 @@ def compare(
             turn = hand_turns(rotation[own])
             leaks[:, i] = [_slope_norm(x[own], c) for c in signals]
             turns[:, i] = [_slope_norm(turn, c) for c in signals]
-        ends.append(_leak_interval(x[own], signals[0], resamples, rng))
+        ends.append(_leak_estimate(x[own], signals[0], resamples, rng))
         centered = q[own] - q[own].mean(axis=0) if own.any() else q[own]
         total = float(np.sum(centered**2))
         if total > 0:
@@ -154,7 +159,8 @@ def compare(
         analytic_leak=leaks[1],
         learned_turn=turns[0],
         analytic_turn=turns[1],
-        learned_leak_interval=np.array(ends),
+        learned_leak_corrected=np.array([each.corrected for each in ends]),
+        learned_leak_interval=np.array([each[1:] for each in ends]),
         agreement=agreement,
     )
 
@@ -173,13 +179,13 @@ def _slope_norm(hand: Array, c: Array) -> float:
     return float(np.linalg.norm(slopes(c[:, None], hand)))
 
 
-def _leak_interval(
+def _leak_estimate(
     x: Array, c: Array, resamples: int, rng: np.random.Generator
-) -> tuple[float, float]:
-    """Interval of the length of the slope of x (N, 3) on c (N,)."""
+) -> LengthEstimate:
+    """Length of the slope of x (N, 3) on c (N,), with its interval."""
     if len(c) < _LEAST or not resamples or not np.isfinite(_slope_norm(x, c)):
-        return np.nan, np.nan
+        return LengthEstimate(np.nan, np.nan, np.nan)
     signal = c[:, None]
     counts, blocks = draw(slope_scores(signal, x), resamples, rng)
     replicates = slopes(signal, x, counts)[:, 0]
-    return length_interval(slopes(signal, x)[0], replicates, blocks, rng=rng)
+    return length_estimate(slopes(signal, x)[0], replicates, blocks, rng=rng)

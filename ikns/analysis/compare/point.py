@@ -25,8 +25,8 @@ from ikns.analysis.compare.null_spaces import (
     point_null_spaces,
 )
 from ikns.analysis.compare.resampling import resampled_moments
-from ikns.analysis.compare.subspaces import Subspaces, angle_interval, share_interval
-from ikns.numerics.bootstrap import length_interval
+from ikns.analysis.compare.subspaces import Subspaces, angle_estimate, share_interval
+from ikns.numerics.bootstrap import length_estimate
 
 Array = NDArray[np.float64]
 
@@ -66,6 +66,10 @@ def compare_point(
     straight = straight_departure(kinematics, mean, Z, lower, upper)
 
     blocks, null_dim = moments.blocks, data.null_dim
+    angle, mean_angle = (
+        angle_estimate(each, blocks, level=level, rng=rng)
+        for each in (averaged, at_mean)
+    )
     share = float(inside.averaged[0] / inside.total[0])
     shares = inside.averaged[1:] / inside.total[1:]
     return dict(
@@ -73,16 +77,19 @@ def compare_point(
         null_directions=nulls.averaged[0],
         concentration=nulls.concentration,
         angles=averaged.angles,
-        angle_interval=angle_interval(averaged, blocks, level=level, rng=rng),
+        angle_corrected=angle.corrected,
+        angle_interval=angle[1:],
         mean_posture_angles=at_mean.angles,
-        mean_posture_interval=angle_interval(at_mean, blocks, level=level, rng=rng),
+        mean_posture_interval=mean_angle[1:],
         inside=share,
         inside_interval=share_interval(share, shares, blocks, level=level),
         inside_mean_posture=inside.at_mean / float(inside.total[0]),
         inside_chance=chance_inside(moments.scatter[0], null_dim, seed=rng),
         leak=np.linalg.norm(leak.slope, axis=1),
+        leak_corrected=leak.corrected,
         leak_interval=leak.interval,
         turn=np.linalg.norm(turn.slope, axis=1),
+        turn_corrected=turn.corrected,
         turn_interval=turn.interval,
         kinematic_leak=np.linalg.norm(rates[:, 0], axis=1),
         kinematic_turn=np.linalg.norm(rates[:, 1], axis=1),
@@ -131,9 +138,10 @@ def pool(
 ) -> dict[str, tuple[float, float, float]]:
     """Root mean squares over points (and signals), and shares of all variance.
 
-    (value, low, high) by name. Points are resampled independently of each other; the
-    length of all their vectors, one after the other, over the root of their number is
-    the root mean square. NaN ends where there is no interval.
+    (value, low, high) by name, and as ``NAME_corrected`` the value without what noise
+    adds, of angles, leak and turn. Points are resampled independently of each other;
+    the length of all their vectors, one after the other, over the root of their number
+    is the root mean square. NaN ends where there is no interval.
     """
     parts = [point["parts"] for point in points]
     blocks = float(np.mean([part["blocks"] for part in parts]))
@@ -143,11 +151,13 @@ def pool(
         root = np.sqrt(len(parts) * (dof if name in ("leak", "turn") else 1))
         vector = np.concatenate([part[name][0] for part in parts]) / root
         rows = np.hstack([part[name][1] for part in parts]) / root
-        ends = length_interval(vector, rows, blocks, level=level, rng=rng)
-        values = np.array([np.linalg.norm(vector), *ends])
+        estimate = length_estimate(vector, rows, blocks, level=level, rng=rng)
+        values = np.array([np.linalg.norm(vector), *estimate])
         if name.endswith("angle"):
             values = np.arcsin(np.minimum(values, 1.0))
-        found[name] = (float(values[0]), float(values[1]), float(values[2]))
+        value, corrected, low, high = values.tolist()
+        found[name] = (value, low, high)
+        found[f"{name}_corrected"] = (corrected, low, high)
     inside, here, total = np.sum([part["inside"] for part in parts], axis=0)
     within, whole = (
         np.sum([part["inside_replicates"][i] for part in parts], axis=0) for i in (0, 1)

@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 
 #: Neighboring reaches share the rest between them, so their changes are correlated, by
 #: 0.22 for normally distributed c at unrelated rests. Then G / g(0) of
-#: :func:`ikns.numerics.bootstrap.block_length` is 0.3 and its rule asks for three
-#: reaches; a dozen reaches are too few to estimate that.
+#: :func:`ikns.numerics.bootstrap.block_length` is 0.3, and three reaches lose a tenth
+#: of the variance; a dozen reaches are too few to estimate that.
 _LEAST_BLOCK = 3
 
 

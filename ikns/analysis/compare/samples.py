@@ -27,7 +27,8 @@ class NullSpaceComparison:
     """Result of :func:`compare_samples`: one entry per PCA point, NaN where unknown.
 
     Intervals are (low, high) in the last axis. They allow for what noise adds to the
-    length of a vector, so those of angles, leaks and turns may end below their value.
+    length of a vector, so those of angles, leaks and turns may end below their value,
+    but never below the corrected one.
     `pooled` are root mean squares over the points (and, of leaks and turns, over the d
     signals), except for the variance shares, which are those of all samples about their
     points' means.
@@ -50,6 +51,9 @@ class NullSpaceComparison:
     angles, mean_posture_angles : (P, k) array
         Principal angles to the averaged null space, and to the one at the mean posture,
         rad, increasing.
+    angle_corrected : (P,) array
+        Largest angle without what noise adds, rad; NaN without resamples. So are
+        `leak_corrected` and `turn_corrected`, (P, d).
     angle_interval, mean_posture_interval : (P, 2) array
         Of the largest.
     chance_angles : (2,) array
@@ -64,6 +68,7 @@ class NullSpaceComparison:
     leak, turn : (P, d) array
         Hand displacement, m, and turn, rad, per unit of c: lengths of the slopes of a
         regression over the samples, on all d signals at once.
+    leak_corrected, turn_corrected : (P, d) array
     leak_interval, turn_interval : (P, d, 2) array
     kinematic_leak, kinematic_turn : (P, d) array
         Motion along Z by the Jacobian at the mean posture, per unit of c, m and rad.
@@ -78,7 +83,8 @@ class NullSpaceComparison:
     pooled : dict
         Value, low and high by name: of angle, mean_posture_angle, inside,
         inside_mean_posture, leak, turn, kinematic_leak, kinematic_turn, curvature,
-        straight_leak and straight_turn; NaN for ends that are not known.
+        straight_leak and straight_turn; NaN for ends that are not known. Also
+        ``angle_corrected`` and so on, where an interval is of a length.
     """
 
     points: NDArray[np.int64]
@@ -90,6 +96,7 @@ class NullSpaceComparison:
     null_directions: Array
     concentration: Array
     angles: Array
+    angle_corrected: Array
     angle_interval: Array
     mean_posture_angles: Array
     mean_posture_interval: Array
@@ -99,8 +106,10 @@ class NullSpaceComparison:
     inside_mean_posture: Array
     inside_chance: Array
     leak: Array
+    leak_corrected: Array
     leak_interval: Array
     turn: Array
+    turn_corrected: Array
     turn_interval: Array
     kinematic_leak: Array
     kinematic_turn: Array

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns.numerics.bootstrap import length_interval, student_interval
+from ikns.numerics.bootstrap import LengthEstimate, length_estimate, student_interval
 from ikns.numerics.subspace import principal_angles
 
 Array = NDArray[np.float64]
@@ -98,14 +98,17 @@ def compare_subspaces(
     )
 
 
-def angle_interval(
+def angle_estimate(
     found: Subspaces, blocks: float, *, level: float, rng: np.random.Generator
-) -> tuple[float, float]:
-    """Interval of the largest angle, rad, through the sine as a length."""
-    low, high = length_interval(
+) -> LengthEstimate:
+    """Largest angle without what noise adds, and its interval, rad.
+
+    Through the sine as a length.
+    """
+    sines = length_estimate(
         found.residual, found.replicates, blocks, level=level, rng=rng
     )
-    return float(np.arcsin(min(low, 1.0))), float(np.arcsin(min(high, 1.0)))
+    return LengthEstimate(*(float(np.arcsin(min(sine, 1.0))) for sine in sines))
 
 
 def share_interval(

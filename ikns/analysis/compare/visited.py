@@ -42,6 +42,8 @@ def compare_visited(
     *,
     chain: str = "right_arm",
     task: Literal["pose", "position"] = "pose",
+    max_hand_speed: float = 0.05,
+    min_duration: float = 0.0,
 ) -> VisitedComparison:
     """Compare a map with the analytic one of a motion, which need not visit all points.
 
@@ -49,7 +51,7 @@ def compare_visited(
     ----------
     learned : NullSpaceMap
         Of `chain`, with a radius: fitted, or from a subject's folder.
-    skeleton, motion, chain, task
+    skeleton, motion, chain, task, max_hand_speed, min_duration
         As :func:`compare_motion` takes them.
 
     Raises
@@ -73,7 +75,8 @@ def compare_visited(
     >>> found.points.tolist(), bool(found.comparison.angles.max() < np.radians(20))
     ([0, 1, 2, 3, 4, 5, 6, 7, 8, 9], True)
     """
-    x, _ = null_space_samples(motion, chain)
+    gate = {"max_hand_speed": max_hand_speed, "min_duration": min_duration}
+    x, _ = null_space_samples(motion, chain, **gate)
     near, _ = nearest_center(x, learned.centers_, radius=learned.radius_)
     counts = np.bincount(near[near >= 0], minlength=len(learned.centers_))
     # The analytic map needs samples at each of its points.
@@ -95,7 +98,8 @@ def compare_visited(
         task=task,
         radius=learned.radius_,
         n_dof=learned.n_dof,
+        **gate,
         reference=some.directions_.sum(axis=0),
     )
-    found = compare(some, analytic, motion, chain=chain)
+    found = compare(some, analytic, motion, chain=chain, **gate)
     return VisitedComparison(counts, points, some, analytic, found)

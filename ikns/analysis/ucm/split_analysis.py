@@ -12,7 +12,7 @@ from ikns.analysis.ucm.designs import across_trials, within_trial
 from ikns.analysis.ucm.intervals import Interval, confidence_interval
 from ikns.analysis.ucm.split import VarianceSplit
 from ikns.analysis.ucm.surrogates import SurrogateTest, surrogate_test
-from ikns.analysis.ucm.trials import movement
+from ikns.analysis.ucm.trials import check_repeats, movement
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData, naming
@@ -63,6 +63,7 @@ def analyze_trials(
     n_surrogates: int = 1000,
     seed: int = 0,
     names: Sequence[str] | None = None,
+    most_different: float = 0.25,
 ) -> TrialsAnalysis:
     """Split the variance over repetitions of a movement, with interval and surrogates.
 
@@ -75,11 +76,14 @@ def analyze_trials(
         See :func:`ikns.analysis.ucm.surrogate_test`, which shuffles trials.
     names : sequence of str, optional
         Of the trials, for errors; default "trial 1" and so on.
+    most_different : float
+        See :func:`ikns.analysis.ucm.trials.check_repeats`.
 
     Raises
     ------
     InvalidInput
-        When there are not as many names as motions.
+        When there are not as many names as motions, or they are no repetitions of one
+        movement.
     NotEnoughData
         When a motion never moves, motions are too few, or a joint is constant.
     """
@@ -88,6 +92,9 @@ def analyze_trials(
         raise InvalidInput(
             f"expected one name a trial, found {len(called)} for {len(motions)}."
         )
+    check_repeats(
+        motions, called, chain, threshold=threshold, most_different=most_different
+    )
     durations = []
     for motion, name in zip(motions, called, strict=True):
         with naming(name):

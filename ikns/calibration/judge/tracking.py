@@ -48,7 +48,8 @@ def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Findi
     # What may give way more does not count more than it is weighed.
     off = np.nan_to_num(quantile(apart, 0.5)) * np.minimum(1.0, np.sqrt(weight))
     with np.errstate(invalid="ignore"):
-        angles = motion.angles
+        # Also of frames whose markers are not believed: they are in question here.
+        angles = motion.q[:, -len(skeleton.joint_names) :]
         beyond = np.maximum(skeleton.lower - angles, angles - skeleton.upper)
         share = (beyond > _BEYOND).mean(axis=0)
     if (

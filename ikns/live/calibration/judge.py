@@ -23,7 +23,7 @@ class Judge:
     ----------
     generic : Skeleton
         Body to start from.
-    marker_set, chain, n_dof, variance, max_hand_speed, min_static, min_still
+    marker_set, chain, n_dof, variance, max_hand_speed, min_static, min_still, min_rest
         See :func:`ikns.calibrate`.
 
     Attributes
@@ -52,6 +52,7 @@ class Judge:
         max_hand_speed: float = 0.05,
         min_static: float = 1.0,
         min_still: float = 0.5,
+        min_rest: float = 0.0,
     ) -> None:
         n = len(chain_joints(chain))
         for right, sentence in (
@@ -60,6 +61,7 @@ class Judge:
             (max_hand_speed > 0, f"max_hand_speed above 0, found {max_hand_speed:g}"),
             (0 <= min_static < math.inf, f"min_static of 0 s on, found {min_static:g}"),
             (0 <= min_still < math.inf, f"min_still of 0 s on, found {min_still:g}"),
+            (0 <= min_rest < math.inf, f"min_rest of 0 s on, found {min_rest:g}"),
         ):
             if not right:
                 raise InvalidInput(f"expected {sentence}.")
@@ -70,6 +72,7 @@ class Judge:
         self._generic, self._min_static = generic, min_static
         self._n_dof, self._variance = n_dof, variance
         self._max_hand_speed, self._min_still = max_hand_speed, min_still
+        self._min_rest = min_rest
 
     def judge(self, step: ProtocolStep, recording: Recording | None) -> Verdict:
         """Judge a recording of a step; None stands for no frames."""
@@ -109,5 +112,6 @@ class Judge:
             variance=self._variance,
             max_hand_speed=self._max_hand_speed,
             min_still=self._min_still,
+            min_rest=self._min_rest,
             earlier=self.places,
         )

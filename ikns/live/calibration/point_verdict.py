@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ikns.analysis.compare.leak import slopes
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import elbow_reference
+from ikns.calibration import elbow_reference, two_arms_fault
 from ikns.errors import IknsError
 from ikns.live.calibration.measures import (
     median,
@@ -46,6 +46,7 @@ def judge_point(
     variance: float = 0.8,
     max_hand_speed: float = 0.05,
     min_still: float = 0.5,
+    min_rest: float = 0.0,
     earlier: Mapping[str, Array] | None = None,
 ) -> Verdict:
     """Judge a point: hand still, elbow moving, one degree of freedom, new position.
@@ -60,7 +61,7 @@ def judge_point(
         The person's.
     chain : str
         See :data:`ikns.body.chains.CHAINS`.
-    n_dof, variance, max_hand_speed, min_still
+    n_dof, variance, max_hand_speed, min_still, min_rest
         See :func:`ikns.calibrate`.
     earlier : mapping of str to (3,) array
         Points accepted so far, thorax frame, m.
@@ -73,7 +74,9 @@ def judge_point(
         motion = MarkerIK(skeleton).track(recording, chain=chain)
     except IknsError as error:
         return Verdict(False, False, str(error), values)
-    gate = still_mask(motion, chain, max_hand_speed=max_hand_speed)
+    gate = still_mask(
+        motion, chain, max_hand_speed=max_hand_speed, min_duration=min_rest
+    )
     known = np.isfinite(motion.hand_speed(chain))
     steady = gate.sum() / max(1, known.sum())
     values |= {
@@ -128,6 +131,9 @@ def judge_point(
     reason = reason or _fault(
         float(steady), components, n_dof, float(width.min()), float(leak.max()), apart
     )
+    if reason and (fault := two_arms_fault(chain, n_dof, components)):
+        # Nothing that the person does would be better.
+        reason = f"{fault[0].upper()}{fault[1:]}."
     words = reason or "The hand was steady and the elbow moved."
     return Verdict(not reason, True, words, values, place=place)
 

@@ -115,8 +115,8 @@ class LiveProtocol:
     rate : float
         Frames per second of the device's clock.
     auto_takes : int
-        0: keys decide. Otherwise verdicts decide without keys, and a step gets at most
-        this many takes.
+        0: keys decide. Otherwise verdicts decide without keys: a step gets at most
+        this many takes, and what no verdict keeps is skipped.
     accepted : collection of str
         Names of steps accepted before.
     pending : mapping of str to Recording
@@ -211,7 +211,7 @@ class LiveProtocol:
         if not self.auto:
             return changes
         last = self._takes >= self._auto_takes
-        if keep or (last and usable):
+        if keep:
             return changes + self._decide("accepted", now)
         if not last:
             return changes + self._retry(now)

@@ -13,10 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.live.control.frame import ControlFrame, FrameSolver
-from ikns.live.control.rejection import fits_markers, rejection_reason
+from ikns.live.control.rejection import (
+    NONE_EXCHANGED,
+    fits_markers,
+    rejection_reason,
+)
 from ikns.live.control.safety import Changes, SafetyMachine, State
 from ikns.live.control.settings import ControlSettings
 from ikns.live.control.smoothing import OneEuro
+from ikns.motion.marker_ik.label_changes import LabelWatch
+from ikns.motion.marker_ik.rejection import chain_columns
 
 #: A device clock that steps back by more than this was restarted, s.
 _RESTART = 1.0
@@ -87,6 +93,8 @@ class Controller:
         self._hand = (math.nan,) * 3
         self._markers = b""
         self._why = _SILENCE
+        self._columns = chain_columns(solver.skeleton, solver.chain)
+        self._labels = LabelWatch(len(self._columns))
         self._counted: tuple[float, NDArray[np.float64] | None] = (-math.inf, None)
 
     @property
@@ -119,15 +127,20 @@ class Controller:
         else:
             self._device_time, self._markers = device_time, seen
         solved = self.solver.solve(markers)
+        error = math.hypot(solved.residual, solved.intermarker_error)
+        exchanged = NONE_EXCHANGED
+        if new:
+            wrong = self._labels.step(markers[self._columns], dt, error).wrong
+            exchanged = self._columns[wrong]
         rejection = rejection_reason(
-            self.solver, self.settings, markers, solved, new=new
+            self.solver, self.settings, markers, solved, new=new, exchanged=exchanged
         )
         machine = self.machine
         if rejection:
             self._why = rejection
             changes = machine.check(receive_time, rejection)
             # The next frame must not start from a pose that does not fit or is old.
-            if not fits_markers(solved, self.settings):
+            if len(exchanged) or not fits_markers(solved, self.settings):
                 at, q = self._counted
                 recent = receive_time - at < self.settings.safe_after
                 self.solver.reset(q if recent else None)

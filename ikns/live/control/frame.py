@@ -11,9 +11,9 @@ from ikns._kernels.body.control_frame import ControlMap, control_frame
 from ikns._kernels.voronoi.diagram import INSIDE_HULL, new_work
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
-from ikns.calibration import segment_pairs, sight_needs
 from ikns.errors import InvalidInput
 from ikns.motion.marker_ik.kernel import KernelSolver
+from ikns.motion.marker_ik.visibility import sight_needs
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.map.interpolator import NearestPoint
@@ -116,6 +116,7 @@ class FrameSolver:
         self._rotation, self._position = np.empty((1, 2, 3, 3)), np.empty((1, 2, 3))
         self._weights = np.empty(len(null_space_map.centers_))
         self._markers = np.empty((len(skeleton.marker_set.markers), 3))
+        self._memory = self._ik.new_memory()
         self.reset()
 
     def reset(self, q: ArrayLike | None = None) -> None:
@@ -129,6 +130,7 @@ class FrameSolver:
                     f"expected a finite pose {self._q.shape}, found {given.shape}."
                 )
             self._q[:] = given
+        self._memory.start[:] = self._q
 
     def solve(self, markers: ArrayLike) -> ControlFrame:
         """Solve the next frame.
@@ -149,9 +151,11 @@ class FrameSolver:
         residual, worst, apart, iterations, converged, known, status = control_frame(
             *self._ik.packed,
             self._paths,
+            self._ik.gate,
             self._map,
             self._markers,
             self._lost,
+            self._memory,
             self._q,
             self._ik.work,
             self._cavity,
@@ -162,6 +166,7 @@ class FrameSolver:
             c,
         )
         self._lost = self._lost and not np.isfinite(residual)
+        self._memory.start[:] = self._q
         q = self._q.copy()
         inside = status == INSIDE_HULL
         return ControlFrame(
@@ -176,7 +181,6 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
     for columns, least in sight_needs(skeleton, chain).values():
         link[columns] = len(need)
         need.append(least)
-    pair, apart = segment_pairs(skeleton, chain)
     interpolator = learned.interpolator_
     numbers, indices = np.empty(0), np.empty(0, dtype=np.int64)
     if isinstance(interpolator, NaturalNeighborInterpolator):
@@ -198,6 +202,4 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
         hands=np.array(hands, dtype=np.int64),
         link=link,
         need=np.array(need, dtype=np.int64),
-        pair=pair,
-        apart=apart,
     )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.live.control.rate import RateControl
+from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
 from ikns.nullspace.readout import Method
 from ikns.numerics.median import finite_median
@@ -22,9 +23,10 @@ class ControlTable(NamedTuple):
     ----------
     columns : list of str
         ``time_s``; ``c``, clipped to 0 to 1 (``c_1``, ``c_2``, ... for several degrees
-        of freedom), NaN while the chain is not in sight; ``hand_speed_m_s`` in the
-        thorax frame; ``inside``, 1 within the volume of the PCA points, or of intent
-        where natural movement was taught; ``residual_m`` of the markers.
+        of freedom), NaN while the chain is not in sight or its markers are rejected;
+        ``hand_speed_m_s`` in the thorax frame; ``inside``, 1 within the volume of the
+        PCA points, or of intent where natural movement was taught; ``residual_m`` of
+        the markers.
     rows : (T, len(columns)) array
     summary : dict
         Counts, shares and medians, ready for JSON.
@@ -83,9 +85,12 @@ def control_table(
     )
     known = np.isfinite(raw).all(axis=1)
     clipped = (raw <= 0) | (raw >= 1) if mode == "rate" else (raw < 0) | (raw > 1)
+    rejections = count_rejections(motion, chain)
     summary = {
         "frames": len(c),
         "frames_without_signal": int((~known).sum()),
+        "frames_rejected": sum(rejections.values()),
+        "rejections": rejections,
         "inside_share": float((inside & known).sum() / max(known.sum(), 1)),
         "c_median": finite_median(c[:, 0]),
         "clipped_share": float(clipped.any(axis=1).sum() / max(known.sum(), 1)),

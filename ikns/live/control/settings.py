@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
+from ikns.motion.marker_ik.gate import GateLimits
+
+_LIMITS = GateLimits()
 
 
 @dataclass(frozen=True)
@@ -25,16 +28,8 @@ class ControlSettings:
         Smaller changes of flexion are ignored.
     hold_speed : float, optional
         While the hand is faster, the flexion is held, m/s. Default: never.
-    max_residual : float
-        Largest root mean square distance between pose and markers of a valid frame, m.
-    max_worst_residual : float
-        Largest distance between pose and a marker of the chain, m. The default is
-        slightly above the 70 mm found with two people in daily activities
-        (``benchmarks/stray_marker.py``).
-    max_intermarker_error : float
-        Largest change since calibration of the distance between two markers of a
-        segment of the chain, m. Two real people had up to 24 mm between skin landmarks
-        and 13 mm within clusters (same benchmark).
+    max_residual, max_worst_residual, max_intermarker_error : float
+        See :class:`ikns.motion.marker_ik.gate.GateLimits`, m.
     hold_after, safe_after : float
         See :class:`ikns.live.control.safety.SafetyMachine`, s.
     """
@@ -43,9 +38,9 @@ class ControlSettings:
     beta: float = 3.0
     dead_band: float = 0.005
     hold_speed: float | None = None
-    max_residual: float = 0.05
-    max_worst_residual: float = 0.08
-    max_intermarker_error: float = 0.04
+    max_residual: float = _LIMITS.residual
+    max_worst_residual: float = _LIMITS.worst_residual
+    max_intermarker_error: float = _LIMITS.intermarker_error
     hold_after: float = 0.1
     safe_after: float = 0.5
 
@@ -64,3 +59,10 @@ class ControlSettings:
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:
                 raise InvalidInput(f"expected a positive {name}, found {value:g}.")
+
+    @property
+    def limits(self) -> GateLimits:
+        """What the markers of a valid frame do not exceed."""
+        return GateLimits(
+            self.max_residual, self.max_worst_residual, self.max_intermarker_error
+        )

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ikns.errors import IknsError
 from ikns.finger import Finger
 from ikns.live.control.controller import Controller, Decision
-from ikns.live.control.rejection_count import RejectionCount
 from ikns.live.control.safety import Changes
 from ikns.live.runtime.cache_warmer import CacheWarmer
 from ikns.live.runtime.notices import Notices
@@ -26,6 +25,7 @@ from ikns.live.runtime.session_log import (
 )
 from ikns.live.session import RunWriter, micro
 from ikns.live.stream import Frame, Source
+from ikns.motion.marker_ik.rejection_count import RejectionCount
 
 #: Longest time between two commands to the finger and checks of the watchdog, s.
 _KEEP_ALIVE = 0.02

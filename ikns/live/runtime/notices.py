@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ikns.live.control.rejection_count import kind_of
 from ikns.live.control.safety import Transition
 from ikns.live.stream import Event, Source
+from ikns.motion.marker_ik.rejection_count import kind_of
 
 #: A run that is not active says why from this time on, s; as long as it takes until a
 #: finger that moved goes to its safe state.

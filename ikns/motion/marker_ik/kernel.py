@@ -6,12 +6,13 @@ import threading
 
 import numpy as np
 
-from ikns._kernels.body.marker_ik import solve_frames
+from ikns._kernels.body.frame_sequence import Memory, new_memory, solve_frames
 from ikns._kernels.body.marker_problem import MarkerProblem, pack, scratch_size
 from ikns._kernels.body.tree import Tree
 from ikns.arrays import Array, Indices
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
+from ikns.motion.marker_ik.gate import GateLimits, marker_gate
 from ikns.motion.marker_ik.pose import (
     LIMIT,
     LOST,
@@ -76,7 +77,9 @@ class KernelSolver:
         *,
         max_iterations: int = MAX_ITERATIONS,
         tolerance: float = STEP_TOLERANCE,
+        limits: GateLimits | None = None,
     ) -> None:
+        self.gate = marker_gate(skeleton, limits)
         self.problem = marker_problem(
             skeleton, max_iterations=max_iterations, tolerance=tolerance
         )
@@ -92,23 +95,42 @@ class KernelSolver:
         work: Array = self._of_thread.work
         return work
 
+    def new_memory(self) -> Memory:
+        """Return the memory before a first frame, for frames one after the other."""
+        return new_memory(len(self._neutral), len(SIDES))
+
     def solve(
         self,
         markers: Array,
         span: tuple[int, int, int],
         before: Array | None,
         frames: SolvedFrames,
+        *,
+        patience: int = 0,
+        memory: Memory | None = None,
     ) -> None:
         """Solve the frames of ``range(*span)``; the step is 1 or -1.
 
         Markers are (T, M, 3), NaN where not seen. The first frame starts from the pose
-        before, or from scratch; others from the one next to them. Iterations of -1
-        stand for an infinite marker, an infinite residual for a pose before that is not
-        finite.
+        before, or from scratch; others from the one next to them, or the last that fit
+        within so many frames of `patience`. Iterations of -1 stand for an infinite
+        marker, an infinite residual for a pose before that is not finite.
         """
         scratch = before is None
         start = self._neutral if before is None else before
-        solve_frames(*self.packed, markers, *span, start, scratch, self.work, *frames)
+        known = self.new_memory() if memory is None else memory
+        solve_frames(
+            *self.packed,
+            self.gate,
+            markers,
+            *span,
+            start,
+            scratch,
+            patience,
+            known,
+            self.work,
+            *frames,
+        )
 
 
 def tree_paths(tree: Tree) -> tuple[Indices, Indices]:

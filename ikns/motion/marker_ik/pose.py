@@ -62,12 +62,17 @@ class Pose:
 
 
 class SolvedFrames(NamedTuple):
-    """Solved frames, (T, nq) and (T,) arrays; see :class:`Pose`."""
+    """Solved frames, (T, nq) and (T,) arrays; see :class:`Pose`.
+
+    `fits` says of each arm, (T, 2), whether its markers and those of the thorax pass
+    the gate; see :class:`ikns.motion.marker_ik.gate.GateLimits`.
+    """
 
     q: Array
     residual: Array
     iterations: Indices
     converged: Mask
+    fits: Mask
 
     @classmethod
     def empty(cls, n: int, nq: int) -> Self:
@@ -77,6 +82,7 @@ class SolvedFrames(NamedTuple):
             np.empty(n),
             np.empty(n, dtype=np.int64),
             np.empty(n, dtype=np.bool_),
+            np.empty((n, len(SIDES)), dtype=np.bool_),
         )
 
     def pose(self, i: int) -> Pose:

@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ikns.arrays import Array
+from ikns.arrays import Array, Indices
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
@@ -28,18 +28,22 @@ from ikns.motion.marker_ik.pose import (
     Pose,
     SolvedFrames,
 )
+from ikns.motion.marker_ik.rejection import recorded_reasons
 from ikns.motion.marker_ik.visibility import (
     Visibility,
     require_sight,
     visible_segments,
 )
-from ikns.motion.motion import Motion, all_seen
+from ikns.motion.motion import Motion, all_seen, believed_joints
 from ikns.numerics.derivative import slope
 from ikns.numerics.rigid import pose_steps
 from ikns.recording.recording import Recording
 
 #: Frames between two reports of progress: milliseconds.
 _CHUNK = 500
+#: For so long frames start from the last pose whose markers fit, s; live the finger
+#: goes to its safe state after the same time.
+PATIENCE = 0.5
 
 
 class MarkerIK:
@@ -140,8 +144,10 @@ class MarkerIK:
         -------
         Motion
             NaN where a frame does not show a joint or a hand, by the rule of
-            :func:`ikns.motion.marker_ik.visibility.visible_segments`; `q` alone is a
-            pose in every frame.
+            :func:`ikns.motion.marker_ik.visibility.visible_segments`, and of arms whose
+            markers cannot be right, by the live loop's gate
+            (:class:`ikns.motion.marker_ik.gate.GateLimits`); `q` alone is a pose in
+            every frame.
 
         Raises
         ------
@@ -177,31 +183,57 @@ class MarkerIK:
         visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
         start = int(np.argmax(visible))
         frames = SolvedFrames.empty(n, *self._pose_shape)
-        self.solver.solve(markers, (start, start + 1, 1), None, frames)
+        # A single frame has no rate.
+        patience = round(PATIENCE * recording.rate) if n > 1 else 0
+        first = self.solver.new_memory()
+        self.solver.solve(
+            markers,
+            (start, start + 1, 1),
+            None,
+            frames,
+            patience=patience,
+            memory=first,
+        )
         done = 1
         for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
+            memory = type(first)(*(part.copy() for part in first))
             for at in range(begin, end, way * _CHUNK):
                 stop = min(at + _CHUNK, n) if way == 1 else max(at - _CHUNK, -1)
-                before = frames.q[at - way]
-                self.solver.solve(markers, (at, stop, way), before, frames)
+                self.solver.solve(
+                    markers,
+                    (at, stop, way),
+                    memory.start,
+                    frames,
+                    patience=patience,
+                    memory=memory,
+                )
                 done += abs(stop - at)
                 if progress is not None:
                     progress(done, n)
-        return self._motion(recording.time, frames, visibility)
+        rejected, reasons = recorded_reasons(
+            self.skeleton, self.solver.gate, markers, frames, recording.rate
+        )
+        return self._motion(recording.time, frames, visibility, rejected, reasons)
 
     def _motion(
-        self, time: Array, frames: SolvedFrames, visibility: Visibility
+        self,
+        time: Array,
+        frames: SolvedFrames,
+        visibility: Visibility,
+        rejected: Indices,
+        reasons: tuple[str, ...],
     ) -> Motion:
         """Add hands, and velocities by :func:`ikns.numerics.derivative.slope`."""
         skeleton, q = self.skeleton, frames.q
         segments, seen, known = visibility
+        known = known & believed_joints(skeleton.joint_names, rejected)
         position, rotation = skeleton.hands_in_thorax(q)
         steps = np.zeros((len(q), skeleton.nv))
         steps[1:] = np.hstack([pose_steps(q[:, :7]), np.diff(q[:, 7:], axis=0)])
         # What stays where it was, as nothing shows it, has no velocity of its own.
         root = np.tile(all_seen(segments, seen)[:, None], skeleton.nv - known.shape[1])
         arms = np.stack([all_seen(segments, seen, side) for side in SIDES], axis=1)
-        shown = np.broadcast_to(arms[..., None], position.shape)
+        shown = np.broadcast_to((arms & (rejected < 0))[..., None], position.shape)
         return Motion(
             time=np.array(time),
             q=q,
@@ -217,4 +249,6 @@ class MarkerIK:
             segments=segments,
             seen=seen,
             known=known,
+            rejected=rejected,
+            reasons=reasons,
         )

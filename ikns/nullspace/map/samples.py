@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array, Mask
 from ikns.body.skeleton import Robot
 from ikns.errors import NotEnoughData
+from ikns.motion.marker_ik.rejection import rejection_sentence
 from ikns.motion.motion import Motion
 from ikns.numerics.turns import nearest_turn, without_turns
 
@@ -100,22 +103,46 @@ def null_space_samples(
         motion, chain, max_hand_speed=max_hand_speed, min_duration=min_duration
     )
     if not gate.any():
-        speed = motion.hand_speed(chain)
-        speed = speed[np.isfinite(speed)]
-        slow = np.count_nonzero(speed < max_hand_speed)
-        found = "none has a known hand speed"
-        if lost := motion.never_seen(chain):
-            found = f"none shows it: {lost[0]} is never in sight"
-        if slow:
-            found = f"the {slow} slower ones are too short a rest or miss joints"
-        elif speed.size:
-            found = f"the slowest has {speed.min():.3g} m/s"
         raise NotEnoughData(
-            f"expected samples with the hand of {chain} slower than "
-            f"{max_hand_speed:g} m/s for {min_duration:g} s and every joint known, but "
-            f"of {len(gate)} samples {found}."
+            no_still_sample([motion], chain, max_hand_speed, min_duration=min_duration)
         )
     return motion.task_position(chain)[gate], motion.chain_angles(chain)[gate]
+
+
+def no_still_sample(
+    motions: Sequence[Motion],
+    chain: str,
+    max_hand_speed: float,
+    *,
+    min_duration: float = 0.0,
+) -> str:
+    """Say why no sample of these motions has a still hand.
+
+    Arguments as :func:`still_mask` takes them.
+    """
+    speed = np.concatenate([motion.hand_speed(chain) for motion in motions])
+    n, speed = len(speed), speed[np.isfinite(speed)]
+    slow = int(np.count_nonzero(speed < max_hand_speed))
+    believed = np.concatenate([motion.believed(chain) for motion in motions])
+    rejected = [text for m in motions if (text := rejection_sentence(m, chain))]
+    found = "none has a known hand speed"
+    if lost := [segment for m in motions for segment in m.never_seen(chain)]:
+        found = f"none shows it: {lost[0]} is never in sight"
+    elif rejected and believed.mean() < 0.5:
+        found = rejected[0]
+    elif slow:
+        found = f"the {slow} slower ones are too short a rest or miss joints"
+    elif speed.size:
+        found = (
+            f"the slowest has {speed.min():.3g} m/s and their median is "
+            f"{np.median(speed):.3g} m/s; where noise alone is that fast, low-pass the "
+            "markers or raise the limit"
+        )
+    duration = f" for {min_duration:g} s" if min_duration else ""
+    return (
+        f"expected samples with the hand of {chain} slower than {max_hand_speed:g} "
+        f"m/s{duration} and every joint known, but of {n} samples {found}."
+    )
 
 
 def robot_null_space_samples(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-#: Amounts in the sentences of :mod:`ikns.live.control.rejection`.
+#: Amounts in the sentences of :mod:`ikns.motion.marker_ik.rejection`.
 _AMOUNT = re.compile(r"(\d+) mm")
 _PLACE = "# mm"
 

@@ -1,0 +1,210 @@
+"""Frames one after the other: where each starts, and when to start from scratch.
+
+A frame starts from the pose before, which is trusted while nothing speaks against it.
+After a frame whose markers cannot be believed the next starts from the last pose that
+could; and a pose whose cost is suspicious is compared with one from scratch, as a
+minimum need not be the minimum.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ikns._kernels.body.descent import copy
+from ikns._kernels.body.marker_gate import MarkerGate, fits, gate_figures
+from ikns._kernels.body.marker_ik import far_cost, solve_frame
+from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
+from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices, Mask
+
+#: Suspicious: so many times the usual root mean square error, which is of this size at
+#: least, m; joints far beyond their limits; markers that do not fit.
+_TIMES, _LEAST = 3.0, 0.01
+#: How slowly the usual error follows, by frame.
+_USUAL = 0.02
+#: A pose from scratch is taken with less than this share of the cost.
+_BETTER = 0.5
+#: Frames between two attempts double up to this number while none is better.
+_LONGEST_WAIT = 128.0
+# When the markers of all limbs fitted last.
+_JUST_NOW, _LATELY, _LONG_AGO = 0.0, 1.0, 2.0
+# Entries of `Memory.numbers`.
+_WAIT, _SINCE, _TRIED, _COST, _BEFORE, _AGE = 0, 1, 2, 3, 4, 5
+
+
+class Memory(NamedTuple):
+    """What is known of the frames before."""
+
+    numbers: Array  # (5 + limbs,)
+    good: Array  # (nq,) of each limb the last pose whose markers fit
+    start: Array  # (nq,) where the next frame starts
+
+
+def new_memory(nq: int, limbs: int) -> Memory:
+    """Return the memory before a first frame."""
+    numbers = np.zeros(_AGE + limbs)
+    numbers[_COST] = np.nan
+    numbers[_AGE:] = np.inf
+    return Memory(numbers, np.zeros(nq), np.zeros(nq))
+
+
+@compiled
+def solve_frames(
+    whole: Indices,
+    real: Array,
+    gate: MarkerGate,
+    markers: Array,
+    first: int,
+    last: int,
+    way: int,
+    before: Array,
+    from_scratch: bool,
+    patience: int,
+    memory: Memory,
+    work: Array,
+    q: Array,
+    residual: Array,
+    iterations: Indices,
+    converged: Mask,
+    passed: Mask,
+) -> None:
+    """Solve frames from `first` to before `last`, `way` (1 or -1) one after the other.
+
+    `whole` and `real` are a packed
+    :class:`ikns._kernels.body.marker_problem.MarkerProblem`, `markers` (T, M, 3) in the
+    world, m, NaN where not seen; `before` (nq,) is the pose before the first frame,
+    unless it is solved `from_scratch`. Later frames start from the previous one, or
+    after frames that do not fit from the last that did, if no more than `patience`
+    frames passed. `work` is scratch of
+    :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
+
+    Written are the solutions `q` (T, nq), the previous pose where no marker is seen,
+    and by frame (T,) the `residual`, the root mean square distance of the seen markers
+    (m; NaN without any, infinite where the previous pose is not finite), whether it
+    `converged`, and `iterations`: `INFINITE` where a marker is infinite, not seen and
+    not NaN; and whether the markers of each limb `passed` the gate, (T, limbs).
+    """
+    problem = unpack(whole, real)
+    s = cut(problem, work)
+    groups = 1 + passed.shape[1]
+    worst, intermarker = np.empty(groups), np.empty(groups)
+    copy(before, memory.start)
+    for i in range(first, last, way):
+        residual[i], iterations[i], converged[i] = follow_frame(
+            problem,
+            s,
+            gate,
+            markers[i],
+            memory,
+            from_scratch and i == first,
+            q[i],
+            worst,
+            intermarker,
+            passed[i],
+        )
+        _remember(problem, memory, passed[i], q[i], patience)
+
+
+@compiled
+def follow_frame(
+    problem: MarkerProblem,
+    s: Scratch,
+    gate: MarkerGate,
+    markers: Array,
+    memory: Memory,
+    from_scratch: bool,
+    q: Array,
+    worst: Array,
+    intermarker: Array,
+    passed: Mask,
+) -> tuple[float, int, bool]:
+    """Solve one frame from `memory.start`, and from scratch where that is suspicious.
+
+    Written are the pose `q` (nq,), the figures of
+    :func:`ikns._kernels.body.marker_gate.gate_figures` and whether each limb `passed`.
+    """
+    before = memory.numbers[_BEFORE]
+    loose = before == _LATELY
+    residual, iterations, converged = solve_frame(
+        problem, s, markers, memory.start, from_scratch, loose, q
+    )
+    gate_figures(problem, s, gate, markers, q, worst, intermarker)
+    fit = fits(gate, residual, worst, intermarker, passed)
+    if not np.isfinite(residual):
+        return residual, iterations, converged
+    beyond = far_cost(problem, q)
+    n_seen = 0
+    for m in range(len(s.weight)):
+        n_seen += s.weight[m] > 0
+    cost = residual**2 + beyond / n_seen
+    if from_scratch:
+        if fit:
+            memory.numbers[_COST] = cost
+        return residual, iterations, converged
+    # After a long time without a pose to trust, the start is as good as any other.
+    better = 1.0 if fit and before == _LONG_AGO else _BETTER
+    if _due(memory, fit, beyond, cost) or better == 1.0:
+        copy(q, s.kept)
+        again = solve_frame(problem, s, markers, memory.start, True, False, q)
+        other = again[0] ** 2 + far_cost(problem, q) / n_seen
+        if other < better * cost:
+            residual, iterations, converged = again
+            gate_figures(problem, s, gate, markers, q, worst, intermarker)
+            fits(gate, residual, worst, intermarker, passed)
+            memory.numbers[_WAIT] = 0.0
+        else:
+            copy(s.kept, q)
+    return residual, iterations, converged
+
+
+@compiled
+def _due(memory: Memory, fit: bool, beyond: float, cost: float) -> bool:
+    """Whether a pose is suspicious, and its turn has come to be compared."""
+    known = memory.numbers
+    unusual = cost > _LEAST**2 and cost > _TIMES**2 * known[_COST]
+    if fit and not unusual and not beyond > 0:
+        if np.isnan(known[_COST]):
+            known[_COST] = cost
+        known[_COST] += _USUAL * (cost - known[_COST])
+        known[_WAIT] = known[_SINCE] = known[_TRIED] = 0.0
+        return False
+    known[_SINCE] += 1.0
+    # What was tried in vain under a ghost is worth another try once that has gone.
+    if known[_SINCE] < known[_WAIT] and cost > _BETTER * known[_TRIED]:
+        return False
+    known[_WAIT] = min(max(1.0, 2.0 * known[_WAIT]), _LONGEST_WAIT)
+    known[_SINCE], known[_TRIED] = 0.0, cost
+    return True
+
+
+@compiled
+def _remember(
+    problem: MarkerProblem, memory: Memory, passed: Mask, q: Array, patience: int
+) -> None:
+    """Write where the next frame starts, limb by limb."""
+    ages = memory.numbers[_AGE:]
+    every, recent = True, False
+    memory.numbers[_BEFORE] = _JUST_NOW
+    for limb in range(len(passed)):
+        ages[limb] = 0.0 if passed[limb] else ages[limb] + 1.0
+        every = every and ages[limb] > 0
+        recent = recent or ages[limb] <= patience
+        if ages[limb] > patience:
+            memory.numbers[_BEFORE] = _LONG_AGO
+    for limb in range(len(passed)):
+        if 0 < ages[limb] <= patience:
+            memory.numbers[_BEFORE] = _LATELY
+    for i in range(len(q)):
+        limb = problem.q_branch[i]
+        if limb < 0:
+            # The thorax, with which all limbs fit or none.
+            back = every and recent
+            if not every:
+                memory.good[i] = q[i]
+        else:
+            back = 0 < ages[limb] <= patience
+            if ages[limb] == 0:
+                memory.good[i] = q[i]
+        memory.start[i] = memory.good[i] if back else q[i]

@@ -1,0 +1,90 @@
+"""Whether the markers of a frame can be believed: three figures against three limits.
+
+Of the whole body the root mean square residual; of the thorax and of each limb the
+largest residual of a marker, and the largest error of a distance between two markers of
+the same segment.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ikns._kernels.body.descent import errors_at
+from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
+from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices, Mask
+
+#: Entries of figures by group: the thorax, then the limbs.
+THORAX = 0
+
+
+class MarkerGate(NamedTuple):
+    """M markers and N pairs of markers of the same segment."""
+
+    group: Indices  # (M,) 0 for the thorax, 1, 2 for a limb, -1 for none
+    pair: Indices  # (N, 2) columns of markers
+    apart: Array  # (N,) their distance on the person, m
+    pair_group: Indices  # (N,)
+    limits: Array  # (3,) residual, worst residual, intermarker error, m
+
+
+@compiled
+def gate_figures(
+    problem: MarkerProblem,
+    s: Scratch,
+    gate: MarkerGate,
+    markers: Array,
+    q: Array,
+    worst: Array,
+    intermarker: Array,
+) -> None:
+    """Write the figures of the current markers at `q` by group, (G,) m.
+
+    The worst residual is NaN where no marker of the group is seen, the intermarker
+    error 0 where no pair is.
+    """
+    errors_at(problem, s, q)
+    for g in range(len(worst)):
+        worst[g], intermarker[g] = -1.0, 0.0
+    for m in range(len(gate.group)):
+        g = gate.group[m]
+        if g >= 0 and s.weight[m] > 0:
+            square = 0.0
+            for k in range(3):
+                square += s.error[m, k] ** 2
+            worst[g] = max(worst[g], square)
+    for g in range(len(worst)):
+        worst[g] = np.sqrt(worst[g]) if worst[g] >= 0 else np.nan
+    for i in range(len(gate.pair)):
+        square = total = 0.0
+        for k in range(3):
+            first, second = markers[gate.pair[i, 0], k], markers[gate.pair[i, 1], k]
+            total += abs(first) + abs(second)
+            square += (first - second) ** 2
+        if np.isfinite(total):
+            g = gate.pair_group[i]
+            error = abs(np.sqrt(square) - gate.apart[i])
+            intermarker[g] = max(intermarker[g], error)
+
+
+@compiled
+def fits(
+    gate: MarkerGate, residual: float, worst: Array, intermarker: Array, passed: Mask
+) -> bool:
+    """Write whether each limb with the thorax is within the limits; return if all are.
+
+    What was not seen has no figure and disproves nothing.
+    """
+    every = True
+    for limb in range(len(passed)):
+        passed[limb] = not residual > gate.limits[0]
+        for g in (THORAX, 1 + limb):
+            passed[limb] = (
+                passed[limb]
+                and not worst[g] > gate.limits[1]
+                and not intermarker[g] > gate.limits[2]
+            )
+        every = every and passed[limb]
+    return every
