@@ -22,6 +22,7 @@ from ikns.cli.app import app
 FILES_OUT = {
     "scale": ["out"],
     "ik": ["out"],
+    "convert": ["target"],
     "control": ["out"],
     "compare": ["figure"],
     "robot": ["figure"],
@@ -45,7 +46,8 @@ NEW_OUT = {
 PERSON = {"subject": "person"}
 READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "scale": (["--stature", "1.75", "--mass", "70", "--sex", "male"], {}),
-    "ik": ([], {"recording": "free.c3d", **PERSON}),
+    "ik": ([], {"recording": "free.c3d", "static": "static.c3d", **PERSON}),
+    "convert": ([], {"source": "free.c3d"}),
     "control": ([], {"recording": "free.c3d", **PERSON}),
     "compare": ([], {"recording": "points.c3d", "reaches": "free.c3d", **PERSON}),
     "robot": (["--frame", "tip"], {"urdf": "model.urdf", "angles": "free.csv"}),

@@ -16,6 +16,7 @@ RIGHT = {
     "scale": "--stature 1.7 --mass 70 --sex male --out new.urdf",
     "calibrate": "--static {static} --exploration {points} --out new",
     "ik": "{free} --subject {person} --out new.csv",
+    "convert": "{free} new.trc",
     "control": "{free} --subject {person} --out new.csv",
     "compare": "{points} --subject {person}",
     "robot": "{urdf} {angles} --frame tip",
@@ -49,6 +50,7 @@ WRITE_FOLDER = ["", "{binary}", "{nowhere}/x", "{binary}/x", "{latin}", "{deep}"
 SOURCE = ["", "x", "replay:", "replay:{nowhere}", "replay:{binary}", "replay:{folder}"]
 FINGER = ["", "x", "sim:?safe=x", "dynamixel:", "dynamixel:{nowhere}?id=-1"]
 TEXT = ["", "a\udcff"]
+MOMENT = [*TEXT, "nan", "No Event"]
 FLAG: list[str] = []
 
 #: Wrong values of each option, by name, or by command and name where they differ.
@@ -62,6 +64,8 @@ WRONG = {
     "chain": CHOICE,
     "conditions": [*TEXT, "x", "keyboard,keyboard", "virtual,keyboard"],
     "control out": WRITE_FILE,
+    "convert source": READ_FILE,
+    "convert target": [*WRITE_FILE, "x.mat", "x"],
     "coordinates": CHOICE,
     "countdown": FROM_ZERO,
     "cutoff": POSITIVE,
@@ -76,10 +80,11 @@ WRONG = {
     "folder": WRITE_FOLDER,
     "frame": [*TEXT, "nowhere"],
     "free_seconds": POSITIVE,
+    "from_": MOMENT,
     "hold_speed": FROM_ZERO,
     "host": [*TEXT, "no.such.host.invalid", "999.1.1.1"],
     "id": [*NOT_WHOLE, "-1", "255"],
-    "ik out": WRITE_FILE,
+    "ik out": [*WRITE_FILE, "x.mat", "x"],
     "intervals": [*NOT_WHOLE, "-1"],
     "jobs": [*NOT_WHOLE, "-2", "0"],
     "labels": READ_FILE,
@@ -144,10 +149,13 @@ WRONG = {
     "stick": CHOICE,
     "stream fault": ["x", "drop=nan", "drop=2", "late=0.1:inf", "drop=-1", "drop"],
     "study run folder": READ_FOLDER,
+    "stream": [*TEXT, "lab"],
     "study": READ_FOLDER,
     "subject": READ_FOLDER,
+    "subject_prefix": [*TEXT, "Nobody"],
     "surrogates": COUNT,
     "task": CHOICE,
+    "to": MOMENT,
     "training": [*NOT_WHOLE, "-1"],
     "trial_spread": FROM_ZERO,
     "urdf": READ_FILE,
@@ -205,6 +213,16 @@ TOGETHER = [
     "scale --stature 1.7 --mass 70 --sex male",
     "ik",
     "ik {free}",
+    "ik {free} --static {binary} --out new.csv",
+    "ik {free} --static {static} --marker-set lost --out new.csv",
+    "ik {free} --subject {person} --static {static} --out new.csv",
+    "ik {free} --subject {person} --out new.csv --out new.csv",
+    "convert",
+    "convert {free}",
+    "convert {free} {points}",
+    "convert {free} new.trc --from 5 --to 1",
+    "convert {free} new.trc --from 1e6",
+    "calibrate --out new --live --source replay:{free} --subject-prefix Ann",
     "ik {free} {points} --subject {person} --out new.csv",
     "calibrate --out new",
     "calibrate --out new --static {static}",
