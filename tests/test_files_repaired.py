@@ -81,6 +81,11 @@ SIMPLE = {
         trc(labels=LABELS.replace("Time\t", "Time ")),
         [ORDER],
     ),
+    "a blank before labels": (trc(labels=LABELS.replace("\t", "\t ")), []),
+    "labels that an editor aligned": (
+        trc(labels=LABELS.replace("RSHO\t\t\t", "RSHO           ")),
+        [ORDER],
+    ),
     "labels above Z": (trc(labels="Frame#\tTime\t\t\t" + LABELS[12:]), [ORDER]),
     "labels above every column": (
         trc(labels="Frame#\tTime\t" + "\t".join(n for n in NAMES for _ in "XYZ")),
@@ -93,6 +98,11 @@ SIMPLE = {
         ),
         [],
     ),
+    "empty counts and rate": (
+        trc(values="\t100\t\t\tmm\t100\t1\t4"),
+        ["0 frames per second, its times 100"],
+    ),
+    "a blank line before the labels": (trc(labels="\n" + LABELS), []),
     "time with its unit": (trc(labels=LABELS.replace("Time", "Time (sec)")), []),
     "no line of axes": (trc(axes=()), []),
     "no blank line": (trc(axes=(AXES,)), []),
@@ -182,10 +192,19 @@ def test_a_last_line_that_is_cut_off_is_left_out(tmp_path):
             ),
             "found a rate of 0 and no times",
         ),
+        (trc(first="PathFileType\t4\t(X/Y)\tx.trc"), "found one of X and Y only"),
         # A decimal comma beside decimal points may as well group thousands.
         (trc(body=[rows()[0].replace(".", ",", 3), *rows()[1:]]), "found '"),
     ],
-    ids=["few labels", "gap", "one blank", "nine names", "no time", "both commas"],
+    ids=[
+        "few labels",
+        "gap",
+        "one blank",
+        "nine names",
+        "no time",
+        "flat",
+        "both commas",
+    ],
 )
 def test_what_a_trc_file_leaves_open_is_refused(tmp_path, text, complaint):
     assert complaint in refused(tmp_path, text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -46,7 +47,10 @@ def place_labels(
     found = _labels(line)
     n_columns = -(-(width - _BEFORE) // 3)
     names = [label for _, label in found]
-    aligned = all((at - _BEFORE) % 3 == 0 and at >= _BEFORE for at, _ in found)
+    places = [at for at, _ in found]
+    aligned = len(set(places)) == len(places) and all(
+        at >= _BEFORE and (at - _BEFORE) % 3 == 0 for at in places
+    )
     if aligned:
         last = max((at for at, _ in found), default=_BEFORE - 3)
         n = max(n_columns, (last - _BEFORE) // 3 + 1)
@@ -67,15 +71,25 @@ def place_labels(
     if surplus:
         notes.append(f"{3 * surplus} of its columns have no label and are left out.")
     # Some writers count the columns without a label, others do not.
-    if said not in (len(labels), len(found), len(labels) + surplus):
+    right = (len(labels), len(found), len(labels) + surplus)
+    if not math.isnan(said) and said not in right:
         notes.append(f"its header says {said:g} markers, found {len(found)} labels.")
     return labels
 
 
 def _labels(line: str) -> list[tuple[int, str]]:
-    """Return the labels of a line and the cells where they stand."""
+    """Return the labels of a line and the cells where they stand.
+
+    Two in one cell, with blanks in between, stood in cells of their own before an
+    editor aligned them.
+    """
     cells = line.split("\t") if "\t" in line else line.split()
-    found = [(at, cell.strip()) for at, cell in enumerate(cells) if cell.strip()]
+    found = [
+        (at, label)
+        for at, cell in enumerate(cells)
+        for label in re.split(r"\s{2,}", cell.strip())
+        if label
+    ]
     if found and _FRAME.fullmatch(found[0][1]):
         del found[0]
     if found and (time := _TIME.fullmatch(found[0][1])):
