@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
+from ikns.nullspace.readout import Method
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class ControlSettings:
         Largest change since calibration of the distance between two markers of a
         segment of the chain, m. Two real people had up to 24 mm between skin landmarks
         and 13 mm within clusters (same benchmark).
+    method : {"paper", "intent"}
+        What reads c off the posture, see :mod:`ikns.nullspace.readout`.
     hold_after, safe_after : float
         See :class:`ikns.live.control.safety.SafetyMachine`, s.
     """
@@ -46,6 +49,7 @@ class ControlSettings:
     max_residual: float = 0.05
     max_worst_residual: float = 0.08
     max_intermarker_error: float = 0.04
+    method: Method = "paper"
     hold_after: float = 0.1
     safe_after: float = 0.5
 
@@ -54,6 +58,11 @@ class ControlSettings:
         if not 0 <= self.dead_band < 1:
             raise InvalidInput(
                 f"expected a dead band from 0 to below 1, found {self.dead_band:g}."
+            )
+        if self.method not in ("paper", "intent"):
+            raise InvalidInput(
+                f"the method '{self.method}' reads recordings only; live, choose paper "
+                "or intent."
             )
         for name in (
             "hold_speed",
