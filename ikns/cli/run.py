@@ -66,6 +66,13 @@ def run(
             help="Hold the finger while the hand is faster, m/s.", min=0.0, max=100.0
         ),
     ] = None,
+    method: Annotated[
+        Literal["paper", "intent"],
+        typer.Option(
+            help="What reads c off the posture: the paper's map, or the departure from "
+            "the natural posture."
+        ),
+    ] = "paper",
     view: Annotated[
         bool, typer.Option("--view", help="Show the body live in a browser.")
     ] = False,
@@ -96,8 +103,9 @@ def run(
         raise InvalidInput("--resume needs the --session to continue.")
     if realtime:
         check_realtime()
-    settings = ControlSettings(hold_speed=hold_speed)
+    settings = ControlSettings(hold_speed=hold_speed, method=method)
     calibrated = ikns.Subject.load(subject)
+    calibrated.readout(method)  # before a source or a finger is opened
     device = open_finger(finger, safety=Safety(safe_state=safe_state))
     with ExitStack() as stack:
         stream = stack.enter_context(open_source(source, subject=calibrated))

@@ -17,6 +17,7 @@ from ikns.cli.visit_options import (
     ForIkns,
     FromStudy,
     Host,
+    LiveMethod,
     Number,
     Participant,
     Port,
@@ -115,6 +116,7 @@ def track(
         typer.Option(help="Gamepad input: left stick, up, or right trigger."),
     ] = "left",
     view: View = True,
+    method: LiveMethod = "paper",
     realtime: Realtime = False,
     rate: Annotated[
         float,
@@ -185,6 +187,7 @@ def track(
             hold_speed=None,
             view=view,
             realtime=realtime,
+            method=method,
         ),
         PageOptions(host, port, browser, rate, stick),
         conditions=design["conditions"],

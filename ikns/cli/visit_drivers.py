@@ -47,6 +47,8 @@ class ArmOptions:
         Whether the panel shows the body.
     realtime : bool
         Whether the control loop has real-time priority.
+    method : {"paper", "intent"}
+        What reads c off the posture.
     """
 
     subject: Path | None
@@ -58,6 +60,7 @@ class ArmOptions:
     hold_speed: float | None
     view: bool
     realtime: bool
+    method: Literal["paper", "intent"]
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,8 @@ def arm_subject(arm: ArmOptions) -> ikns.Subject:
     Raises
     ------
     InvalidInput
-        Without a subject or a source, or when the system does not allow real time.
+        Without a subject or a source, when the subject lacks the method, or when the
+        system does not allow real time.
     """
     from ikns.live.runtime import check_realtime
 
@@ -97,7 +101,9 @@ def arm_subject(arm: ArmOptions) -> ikns.Subject:
     assert arm.subject is not None
     if arm.realtime:
         check_realtime()
-    return ikns.Subject.load(arm.subject)
+    subject = ikns.Subject.load(arm.subject)
+    subject.readout(arm.method)  # before a source or a finger is opened
+    return subject
 
 
 def arm_is_simulated(subject: ikns.Subject, arm: ArmOptions) -> bool:
@@ -137,7 +143,7 @@ def arm_driver(
     from ikns.experiments.conduct.live import live_driver
     from ikns.live.control.settings import ControlSettings
 
-    settings = ControlSettings(hold_speed=arm.hold_speed)
+    settings = ControlSettings(hold_speed=arm.hold_speed, method=arm.method)
 
     def open_session(source: Source) -> AbstractContextManager[RunWriter]:
         assert arm.subject is not None
@@ -193,7 +199,8 @@ def describe_input(condition: str, arm: ArmOptions, pages: PageOptions) -> str:
     """Describe the input of a condition, for ``visit.json``."""
     if condition == "ikns":
         smooth = ", smoothed" if arm.smooth else ""
-        return f"{arm.source}{smooth}"
+        method = f", {arm.method}" if arm.method != "paper" else ""
+        return f"{arm.source}{smooth}{method}"
     if condition == "gamepad":
         stick = "right trigger" if pages.stick == "trigger" else "left stick, up"
         return f"{PAGE[condition]}, {stick}"

@@ -43,6 +43,13 @@ SafeState = Annotated[
     Literal["limp", "hold", "open"],
     typer.Option(help="State of the finger when poses stop coming."),
 ]
+LiveMethod = Annotated[
+    Literal["paper", "intent"],
+    typer.Option(
+        help="For ikns: what reads c off the posture, the paper's map or the departure "
+        "from the natural posture."
+    ),
+]
 View = Annotated[
     bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
 ]

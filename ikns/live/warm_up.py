@@ -15,6 +15,8 @@ from ikns.live.control import FrameSolver
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.natural_posture import NaturalPosture
+from ikns.nullspace.readout import IntentMap, Readout
 from ikns.numerics.subspace import principal_angles
 
 _CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)
@@ -104,7 +106,10 @@ def _map() -> NullSpaceMap:
 def _frame() -> None:
     body = Skeleton.load()
     markers = body.markers_in_world(body.neutral())
-    FrameSolver(body, _map(), "right_arm").solve(markers)
+    people = NaturalPosture.of_people()
+    intent = IntentMap.from_arrays(people, _CORNERS, np.zeros(8), np.ones(8))
+    readout = Readout("intent", "right_arm", intent)
+    FrameSolver(body, _map(), "right_arm", readout=readout).solve(markers)
 
 
 _BODY_STEPS: Sequence[Callable[[], None]] = (_markers, _hands)

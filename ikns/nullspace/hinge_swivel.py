@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 #: about the middle of a table's work space (ISB thorax: X forward, Y up, Z right).
 #: Opposite to it, behind and above the shoulder, the swivel is undefined.
 FORWARD = np.array([0.925, -0.174, 0.337]) / np.linalg.norm([0.925, -0.174, 0.337])
-_DOWN = np.array([0.0, -1.0, 0.0])
+#: The reference there: the downward direction normal to it.
+DOWN = np.array([0.0, -1.0, 0.0]) + FORWARD[1] * FORWARD
+DOWN /= np.linalg.norm(DOWN)
 #: Sines below this are rounding: the hand behind, or on the hinge's own axis.
 _DEGENERATE = 1e-9
 
@@ -92,12 +94,10 @@ def hinge_swivel(
         n = (w - p) / np.linalg.norm(w - p, axis=-1, keepdims=True)
         z = z / np.linalg.norm(z, axis=-1, keepdims=True)
         elbow = -np.cross(z, n)
-        down = _DOWN - (_DOWN @ FORWARD) * FORWARD
-        down /= np.linalg.norm(down)
         k = np.cross(FORWARD, n)
         behind = 1.0 + n @ FORWARD
-        kd = np.cross(k, down)
-        u = down + kd + np.cross(k, kd) / behind[..., None]
+        kd = np.cross(k, DOWN)
+        u = DOWN + kd + np.cross(k, kd) / behind[..., None]
         s = np.arctan2((elbow * np.cross(-n, u)).sum(axis=-1), (elbow * u).sum(axis=-1))
     bad = np.linalg.norm(elbow, axis=-1) < _DEGENERATE
     return np.asarray(np.where(bad | ~(behind > _DEGENERATE), np.nan, s))

@@ -21,7 +21,7 @@ from ikns.nullspace.map.checks import checked_rows
 
 #: Middle of the work space, m, and the unit of length, m: the quadratic terms are then
 #: of order 1 wherever a hand goes (ISB thorax, right arm).
-_MIDDLE, _UNIT = np.array([0.25, -0.15, 0.20]), 0.2
+MIDDLE, UNIT = np.array([0.25, -0.15, 0.20]), 0.2
 #: What of the taught places counts as taught.
 _TAUGHT = 0.99
 _PEOPLE = Path(__file__).with_name("natural_posture_people.toml")
@@ -92,7 +92,7 @@ def quadratic_terms(wrist_in_thorax: ArrayLike) -> Array:
     other dimensions they count from zero.
     """
     w = np.asarray(wrist_in_thorax, dtype=np.float64)
-    x = (w - _MIDDLE if w.shape[-1] == 3 else w) / _UNIT
+    x = (w - MIDDLE if w.shape[-1] == 3 else w) / UNIT
     i, j = np.triu_indices(w.shape[-1], 1)
     return np.concatenate([np.ones((*x.shape[:-1], 1)), x, x**2, x[..., i] * x[..., j]],
                           axis=-1)  # fmt: skip

@@ -207,6 +207,10 @@ class Skeleton:
         """From the thorax to the right and the left knuckle frame."""
         return self._frames.paths(tuple(f"{side}_knuckle" for side in SIDES))
 
+    def paths(self, links: tuple[str, ...]) -> Paths:
+        """Return the paths from the thorax to links, for a kernel."""
+        return self._frames.paths(links)
+
     @cached_property
     def _frames(self) -> LinkFrames:
         return LinkFrames(self._model)

@@ -12,11 +12,13 @@ from ikns._kernels.voronoi.diagram import INSIDE_HULL, new_work
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
+from ikns.live.control.intent import IntentSignal
 from ikns.motion.marker_ik.kernel import KernelSolver
 from ikns.motion.marker_ik.visibility import sight_needs
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.map.interpolator import NearestPoint
+from ikns.nullspace.readout import Readout
 
 Array = NDArray[np.float64]
 
@@ -75,6 +77,16 @@ class FrameSolver:
         Fitted, for `chain`.
     chain : str
         See :data:`ikns.body.chains.CHAINS`.
+    readout : Readout, optional
+        Of this skeleton and chain: what reads c instead of the map, by a second
+        compiled call. Live these are ``"paper"``, which changes nothing, and
+        ``"intent"``, for which `inside` says where natural movement was taught.
+
+    Raises
+    ------
+    InvalidInput
+        When the map is of other joints or the readout of another chain, or the kernels
+        do not know one of them.
 
     Examples
     --------
@@ -92,7 +104,12 @@ class FrameSolver:
     """
 
     def __init__(
-        self, skeleton: Skeleton, null_space_map: NullSpaceMap, chain: str
+        self,
+        skeleton: Skeleton,
+        null_space_map: NullSpaceMap,
+        chain: str,
+        *,
+        readout: Readout | None = None,
     ) -> None:
         joints = chain_joints(chain)
         n = null_space_map.directions_.shape[2]
@@ -106,7 +123,14 @@ class FrameSolver:
                 "expected a map of points in space, found points with "
                 f"{null_space_map.centers_.shape[1]} coordinates."
             )
+        if readout is not None and readout.chain != chain:
+            raise InvalidInput(
+                f"expected a readout of {chain}, found one of {readout.chain}."
+            )
         self.skeleton, self.null_space_map, self.chain = skeleton, null_space_map, chain
+        self._signal: IntentSignal | None = None
+        if readout is not None and readout.method != "paper":
+            self._signal = IntentSignal(skeleton, readout)
         self._ik = KernelSolver(skeleton)
         self._paths = skeleton.hand_paths
         self._map = _control_map(skeleton, null_space_map, chain)
@@ -131,6 +155,11 @@ class FrameSolver:
                 )
             self._q[:] = given
         self._memory.start[:] = self._q
+
+    def compile(self) -> None:
+        """Compile or load what a frame out of sight does not run."""
+        if self._signal is not None:
+            self._signal(self.skeleton.neutral()[7:])
 
     def solve(self, markers: ArrayLike) -> ControlFrame:
         """Solve the next frame.
@@ -169,6 +198,8 @@ class FrameSolver:
         self._memory.start[:] = self._q
         q = self._q.copy()
         inside = status == INSIDE_HULL
+        if self._signal is not None and known:
+            c[0], inside = self._signal(q[7:])
         return ControlFrame(
             c, q, place, known, inside, residual, worst, apart, iterations, converged
         )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
 from ikns.motion.marker_ik.gate import GateLimits
+from ikns.nullspace.readout import Method
 
 _LIMITS = GateLimits()
 
@@ -30,6 +31,8 @@ class ControlSettings:
         While the hand is faster, the flexion is held, m/s. Default: never.
     max_residual, max_worst_residual, max_intermarker_error : float
         See :class:`ikns.motion.marker_ik.gate.GateLimits`, m.
+    method : {"paper", "intent"}
+        What reads c off the posture, see :mod:`ikns.nullspace.readout`.
     hold_after, safe_after : float
         See :class:`ikns.live.control.safety.SafetyMachine`, s.
     """
@@ -41,6 +44,7 @@ class ControlSettings:
     max_residual: float = _LIMITS.residual
     max_worst_residual: float = _LIMITS.worst_residual
     max_intermarker_error: float = _LIMITS.intermarker_error
+    method: Method = "paper"
     hold_after: float = 0.1
     safe_after: float = 0.5
 
@@ -49,6 +53,11 @@ class ControlSettings:
         if not 0 <= self.dead_band < 1:
             raise InvalidInput(
                 f"expected a dead band from 0 to below 1, found {self.dead_band:g}."
+            )
+        if self.method not in ("paper", "intent"):
+            raise InvalidInput(
+                f"the method '{self.method}' reads recordings only; live, choose paper "
+                "or intent."
             )
         for name in (
             "hold_speed",

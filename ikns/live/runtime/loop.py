@@ -88,7 +88,8 @@ def run(
     Raises
     ------
     InvalidInput
-        When the system does not allow real-time priority.
+        When the system does not allow real-time priority, or the subject was
+        calibrated without the method of the settings.
     MarkerMismatch
         When the source has none of the subject's markers, or those of several people.
     FingerError
@@ -120,9 +121,15 @@ def run(
             f"{', '.join(marker_set.labels[:6])}, found "
             f"{', '.join(source.labels[:6])}."
         )
+    readout = None if settings is None else subject.readout(settings.method)
     controller, twin = (
         Controller(
-            FrameSolver(subject.skeleton, subject.null_space_map, subject.chain),
+            FrameSolver(
+                subject.skeleton,
+                subject.null_space_map,
+                subject.chain,
+                readout=readout,
+            ),
             settings,
         )
         for _ in range(2)
@@ -130,6 +137,7 @@ def run(
     loop = FrameLoop(source, controller, twin, columns, finger, session, on_notice)
     # Compile or load everything before the finger is connected.
     controller.solver.solve(np.full((len(marker_set.labels), 3), np.nan))
+    controller.solver.compile()
     controller.solver.reset()
     stopped = threading.Event() if stop is None else stop
     with realtime_priority(realtime=realtime), connected(finger):

@@ -81,7 +81,12 @@ def replay_run(run: Run) -> Replayed:
             f"{run.session}: the configuration of run {run.number} has no settings: "
             f"{error}."
         ) from None
-    solver = FrameSolver(subject.skeleton, subject.null_space_map, subject.chain)
+    solver = FrameSolver(
+        subject.skeleton,
+        subject.null_space_map,
+        subject.chain,
+        readout=subject.readout(settings.method),
+    )
     controller = Controller(solver, settings)
     machine = controller.machine
     rows = len(run.frame)

@@ -1,0 +1,100 @@
+"""The method intent live: the same c as offline, compiled, and replayed bit for bit."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import small_person
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ikns.body.skeleton import Skeleton
+from ikns.errors import InvalidInput
+from ikns.live.control import FrameSolver
+from ikns.live.control.controller import Controller
+from ikns.live.control.intent import IntentSignal
+from ikns.live.control.settings import ControlSettings
+from ikns.nullspace.hinge_swivel import arm_swivel
+from ikns.nullspace.natural_posture import NaturalPosture
+from ikns.nullspace.readout import IntentMap, Readout
+
+CORNERS = 0.3 * np.array(list(np.ndindex(2, 2, 2))) + [0.1, -0.3, 0.0]
+
+
+def readout(side: str, *, guard: bool = True) -> Readout:
+    rng = np.random.default_rng(1)
+    wrist = rng.uniform([0.1, -0.3, 0], [0.4, 0.1, 0.4], (300, 3))
+    natural = NaturalPosture(guard=guard).fit(wrist, np.sin(5 * wrist).sum(axis=1))
+    learned = IntentMap.from_arrays(natural, CORNERS, np.full(8, -0.4), np.full(8, 0.7))
+    return Readout("intent", f"{side}_arm", learned)
+
+
+@given(st.integers(0, 200), st.sampled_from(["right", "left"]), st.booleans())
+@settings(max_examples=25, deadline=None)
+def test_the_kernel_is_the_formula(seed, side, guard):
+    rng, body = np.random.default_rng(seed), Skeleton.load()
+    one = readout(side, guard=guard)
+    angles = rng.uniform(body.lower, body.upper)
+    c, taught = IntentSignal(body, one)(angles)
+    wrist, swivel = arm_swivel(body, angles, one.chain)
+    expected = one.map.control_signal(swivel[..., None], wrist)
+    # Some 100 terms of order 1 to 10; near a full turn both may differ by one.
+    turn = 2 * np.pi / (one.map.ends_[1] - one.map.ends_[0])
+    off = (c - float(expected)) / turn
+    assert np.isnan(c) == np.isnan(expected)
+    assert np.isnan(c) or abs(off - round(off)) * turn < 1e-9
+    assert taught == one.map.inside(wrist)
+
+
+def test_frames_of_a_recording_give_what_the_motion_gives():
+    subject = small_person.subject()
+    recording = small_person.protocol().points.recording
+    chosen = subject.readout("intent")
+    solver = FrameSolver(
+        subject.skeleton, subject.null_space_map, subject.chain, readout=chosen
+    )
+    motion = subject.motions[0]
+    offline = chosen.control_signal(subject.skeleton, motion)
+    inside = chosen.inside(subject.skeleton, motion)
+    markers = subject.skeleton.marker_set.pick(recording.labels, recording.markers)
+    live = [solver.solve(frame) for frame in markers[:300]]
+    c = np.array([frame.c[0] for frame in live])
+    # Poses agree to the tolerance of the marker fit, 1e-6 rad or so.
+    np.testing.assert_allclose(c, offline[:300], rtol=0, atol=1e-4)
+    seen = np.isfinite(c)
+    assert (
+        np.mean(np.array([f.inside for f in live])[seen] == inside[:300][seen]) > 0.99
+    )
+
+
+def test_the_same_frames_give_the_same_bits():
+    subject = small_person.subject()
+    recording = small_person.protocol().points.recording
+    markers = subject.skeleton.marker_set.pick(recording.labels, recording.markers)
+    runs = []
+    for _ in range(2):
+        chosen = subject.readout("intent")
+        solver = FrameSolver(
+            subject.skeleton, subject.null_space_map, subject.chain, readout=chosen
+        )
+        controller = Controller(solver, ControlSettings(method="intent"))
+        runs.append(
+            [
+                controller.frame(markers[i], i / 50, i / 50).solved.c[0]
+                for i in range(100)
+            ]
+        )
+    np.testing.assert_array_equal(*runs)
+
+
+def test_proximal_and_other_chains_are_refused_live():
+    subject = small_person.subject()
+    with pytest.raises(InvalidInput, match="reads recordings only"):
+        ControlSettings(method="proximal")
+    with pytest.raises(InvalidInput, match="reads recordings only"):
+        IntentSignal(subject.skeleton, subject.readout("proximal"))
+    other = dataclasses.replace(subject.readout("intent"), chain="left_arm")
+    with pytest.raises(InvalidInput, match="expected a readout of right_arm"):
+        FrameSolver(
+            subject.skeleton, subject.null_space_map, subject.chain, readout=other
+        )
