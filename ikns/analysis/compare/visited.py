@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +75,10 @@ def compare_visited(
     >>> found.points.tolist(), bool(found.comparison.angles.max() < np.radians(20))
     ([0, 1, 2, 3, 4, 5, 6, 7, 8, 9], True)
     """
-    gate: dict[str, Any] = {"max_hand_speed": max_hand_speed, "min_duration": min_duration}
+    gate: dict[str, Any] = {
+        "max_hand_speed": max_hand_speed,
+        "min_duration": min_duration,
+    }
     x, _ = null_space_samples(motion, chain, **gate)
     near, _ = nearest_center(x, learned.centers_, radius=learned.radius_)
     counts = np.bincount(near[near >= 0], minlength=len(learned.centers_))
