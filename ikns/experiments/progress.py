@@ -17,7 +17,7 @@ class _Step(Protocol):
     def seconds(self) -> float: ...
 
 
-class _Attempt(Protocol):
+class _TimedAttempt(Protocol):
     @property
     def key(self) -> str: ...
     @property
@@ -25,7 +25,7 @@ class _Attempt(Protocol):
 
 
 S = TypeVar("S", bound=_Step)
-A = TypeVar("A", bound=_Attempt)
+A = TypeVar("A", bound=_TimedAttempt)
 
 
 class Progress(Generic[S, A]):
