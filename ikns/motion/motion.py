@@ -226,7 +226,7 @@ class Motion:
 
     def _thorax_known(self) -> Mask:
         # Its markers are judged with each arm's.
-        judged: Mask = (self.rejected < 0).any(axis=1)
+        judged = np.asarray((self.rejected < 0).any(axis=1))
         return all_seen(self.segments, self.seen) & judged
 
     def _sides(self, chain: str) -> list[int]:
