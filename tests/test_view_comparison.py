@@ -44,12 +44,12 @@ def test_the_panels_hold_the_values_in_their_units(found, reaches):
     figure = comparison_figure(found, simulated=True, crosstalk=reaches)
     angle, inside, leak, reach = figure.axes
     for each in found.values():
-        assert holds(angle, np.degrees(each.angles[:, -1]))
+        assert holds(angle, np.degrees(each.angle_corrected))
         assert holds(angle, [np.degrees(each.chance_angles[0])] * 2)
         assert holds(inside, 100 * each.inside)
         assert holds(inside, 100 * each.inside_chance[:, 1])
     first = found["pose held"]
-    assert holds(leak, 1000 * first.leak[:, 0])
+    assert holds(leak, 1000 * first.leak_corrected[:, 0])
     bars = leak.collections[0].get_segments()
     np.testing.assert_allclose(
         [[bar[0, 0], bar[1, 0]] for bar in bars], 1000 * first.leak_interval[:, 0]
@@ -66,13 +66,17 @@ def test_without_intervals_and_reaches_it_still_draws(found):
     bare = {
         name: dataclasses.replace(
             each,
+            angle_corrected=np.full_like(each.angle_corrected, np.nan),
             angle_interval=np.full_like(each.angle_interval, np.nan),
+            leak_corrected=np.full_like(each.leak_corrected, np.nan),
             leak_interval=np.full_like(each.leak_interval, np.nan),
             points=each.points + 4,
         )
         for name, each in found.items()
     }
     figure = comparison_figure(bare, simulated=False)
+    first = bare["pose held"]
+    assert holds(figure.axes[2], 1000 * first.leak[:, 0])
     assert [tick.get_text() for tick in figure.axes[0].get_yticklabels()] == ["5", "6"]
     assert len(png(figure)) > 1000
 

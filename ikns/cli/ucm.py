@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -75,6 +76,8 @@ def ucm(
             "expected each recording once, as a repetition counts once, found "
             f"{len(recordings)} names of fewer files."
         )
+    if math.isnan(most_different):
+        raise InvalidInput("expected a number for --most-different, found nan.")
     calibrated = ikns.Subject.load(subject)
     solver = ikns.MarkerIK(calibrated.skeleton)
     with progress() as report:

@@ -45,7 +45,8 @@ def comparison_figure(
         ):
             at = np.asarray(each.points + 1 + offset, dtype=np.float64)
             style = {"color": color, "marker": mark, "label": name}
-            _dots(angle, np.degrees(each.angles[:, -1]), at, **style)
+            angles = _without_noise(each.angle_corrected, each.angles[:, -1])
+            _dots(angle, np.degrees(angles), at, **style)
             _bars(angle, np.degrees(each.angle_interval), at, color)
             chance = np.degrees(each.chance_angles[0])
             angle.axvline(chance, color=color, ls="--", lw=0.9)
@@ -58,7 +59,8 @@ def comparison_figure(
         for dof in range(first.leak.shape[1]):
             at = np.asarray(first.points + 1 + shift * dof, dtype=np.float64)
             color, mark = MARKS[dof % len(MARKS)] if dof else (INK, "o")
-            _dots(leak, 1000 * first.leak[:, dof], at, color=color, marker=mark)
+            leaks = _without_noise(first.leak_corrected, first.leak)[:, dof]
+            _dots(leak, 1000 * leaks, at, color=color, marker=mark)
             _bars(leak, 1000 * first.leak_interval[:, dof], at, color)
         ends = first.points + 1
         leak.plot(1000 * first.straight_leak, ends, "x", color=GREY, ms=5, mew=1.2)
@@ -84,6 +86,11 @@ def comparison_figure(
         handles, names = angle.get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower left", ncols=2)
     return figure
+
+
+def _without_noise(corrected: Array, found: Array) -> Array:
+    """Take corrected values, those found where there are none."""
+    return np.where(np.isnan(corrected), found, corrected)
 
 
 def _dots(axes: Axes, values: Array, at: Array, **style: Any) -> None:

@@ -175,6 +175,10 @@ def check_repeats(
     NotEnoughData
         When nothing moves.
     """
+    if not 0 <= most_different < np.inf:
+        raise InvalidInput(
+            f"expected most_different of at least 0, found {most_different:g}."
+        )
     paths = []
     for motion, name in zip(motions, names, strict=True):
         if other := other_hand_moves([motion], chain):
