@@ -15,6 +15,7 @@ from ikns.errors import IknsError, RecordingWarning
 from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
 
+TEXT = ["csv", "trc", "tsv", "motive.csv", "workstation.csv"]
 LABELS = ["S:RSHO", "S:RELB", "S:RWRA", "S:RFIN"]
 
 
@@ -35,7 +36,26 @@ def sound_files(folder):
         for i, row in enumerate(flat)
     )
     c3d = (folder / "sound.c3d").read_bytes()
-    return {"c3d": c3d, "csv": csv.encode(), "trc": trc.encode()}
+    text = {"csv": csv, "trc": trc} | others(flat)
+    return {"c3d": c3d} | {name: found.encode() for name, found in text.items()}
+
+
+def others(flat):
+    """The same recording as Qualisys, Motive and Vicon Workstation export it."""
+    rows = [list(map(str, row)) for row in flat]
+    head = "NO_OF_FRAMES\t6\nNO_OF_MARKERS\t4\nFREQUENCY\t100\nDATA_INCLUDED\t3D\n"
+    tsv = head + "MARKER_NAMES\t" + "\t".join(LABELS) + "\n"
+    tsv += "".join("\t".join(row) + "\n" for row in rows)
+    names = "".join(f",{label}" * 3 for label in LABELS)
+    motive = "Format Version,1.23,Export Frame Rate,100,Length Units,Millimeters\n\n"
+    motive += f",Type{',Marker' * 12}\n,Name{names}\n,{',Position' * 12}\n"
+    motive += f"Frame,Time (Seconds){',X,Y,Z' * 4}\n"
+    old = "TRAJECTORIES\n100,Hz\n," + ",,,".join(LABELS) + ",,\n"
+    old += f"Field #{',X,Y,Z' * 4}\n"
+    for i, row in enumerate(rows):
+        motive += f"{i},{i / 100},{','.join(row)}\n"
+        old += f"{i + 1},{','.join(row)}\n"
+    return {"tsv": tsv, "motive.csv": motive, "workstation.csv": old}
 
 
 @pytest.fixture(scope="module")
@@ -63,16 +83,17 @@ def survives(folder, ending, content):
     assert all(str(warning.message).isprintable() for warning in told)
 
 
-@pytest.mark.parametrize("ending", ["c3d", "csv", "trc"])
+@pytest.mark.parametrize("ending", ["c3d", *TEXT])
 def test_sound_files_are_read(sound, folder, ending):
     path = folder / f"sound.{ending}"
     path.write_bytes(sound[ending])
     assert read(path).labels == tuple(LABELS)
 
 
-@pytest.mark.parametrize("ending", ["csv", "trc"])
+@pytest.mark.parametrize("ending", TEXT)
 def test_text_cut_at_any_byte_survives(sound, folder, ending):
-    for end in range(len(sound[ending])):
+    step = 1 if ending in ("csv", "trc") else 3
+    for end in range(0, len(sound[ending]), step):
         survives(folder, ending, sound[ending][:end])
 
 
@@ -91,8 +112,8 @@ BYTES = st.sampled_from([0, 1, 2, 9, 10, 44, 48, 57, 127, 128, 255]) | st.intege
 )
 
 
-@pytest.mark.parametrize("ending", ["c3d", "csv", "trc"])
-@settings(max_examples=150, deadline=None)
+@pytest.mark.parametrize("ending", ["c3d", *TEXT])
+@settings(max_examples=100, deadline=None)
 @given(changes=st.lists(st.tuples(st.integers(0), BYTES), min_size=1, max_size=8))
 def test_flipped_bytes_survive(sound, folder, ending, changes):
     content = bytearray(sound[ending])
@@ -113,8 +134,8 @@ def test_heads_on_the_wrong_bodies_survive(sound, folder, ending, other, cut, st
     survives(folder, ending, head[: cut % len(head)] + body[start % len(body) :])
 
 
-@pytest.mark.parametrize("ending", ["c3d", "csv", "trc"])
-@settings(max_examples=60, deadline=None)
+@pytest.mark.parametrize("ending", ["c3d", *TEXT])
+@settings(max_examples=40, deadline=None)
 @given(place=st.integers(0), insert=st.binary(max_size=40))
 def test_inserted_garbage_survives(sound, folder, ending, place, insert):
     content = sound[ending]

@@ -49,7 +49,8 @@ def read_xdf(path: Path, stream: str | None = None) -> Recording:
         ) from None
     with _complaints() as said:
         try:
-            found = pyxdf.load_xdf(str(path))[0]
+            with path.open("rb") as file:
+                found = pyxdf.load_xdf(file)[0]
         # The library raises whatever a damaged byte leads to.
         except Exception as error:
             raise FileError(
