@@ -62,10 +62,8 @@ def view(
             raise InvalidInput(
                 f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
             )
-    if recording is None and (subject_prefix, from_, to) != (None, None, None):
-        raise InvalidInput(
-            "expected a recording for --subject-prefix, --from and --to, found none."
-        )
+    if recording is None and (from_, to) != (None, None):
+        raise InvalidInput("expected a recording for --from and --to, found none.")
     person = ikns.Subject.load(subject)
     learned, row = person.null_space_map, None if point is None else point - 1
     simulated = is_simulated(person, subject, [] if recording is None else [recording])
