@@ -268,6 +268,40 @@ def test_more_frames_than_a_word_counts_survive(tmp_path):
     np.testing.assert_allclose(again.markers, markers, rtol=1.001 * SINGLE)
 
 
+@pytest.mark.parametrize(
+    ("n_points", "n_frames"),
+    # The last frames end with a block of 512 bytes, and 16 bytes short of that.
+    [(1, 65_600), (1, 65_599), (3, 65_568)],
+)
+def test_padding_at_the_end_of_a_long_file_is_no_frame(tmp_path, n_points, n_frames):
+    # ezc3d says 65535 frames, the largest number, and pads the last block.
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+    labels = [f"M{i}" for i in range(n_points)]
+    file["parameters"]["POINT"]["LABELS"]["value"] = labels
+    points = np.ones((4, n_points, n_frames))
+    points[:3] = np.linspace(1, 500, n_frames) * np.arange(1, n_points + 1)[:, None]
+    file["data"]["points"] = points
+    path = tmp_path / "long.c3d"
+    file.write(str(path))
+    recording = read(path)
+    assert recording.markers.shape == (n_frames, n_points, 3)
+    assert not np.isnan(recording.markers).any()
+    # Singles of millimeters.
+    expected = points[:3].transpose(2, 1, 0) * 1e-3
+    np.testing.assert_allclose(recording.markers, expected, rtol=SINGLE * 2)
+
+
+@pytest.mark.parametrize("unit", ["mete", "mill", "cent", "(mm)", "Metr"])
+def test_a_unit_that_was_cut_off_is_the_only_one_that_begins_so(tmp_path, unit):
+    meters = {"mete": 1, "mill": 1e-3, "cent": 1e-2, "(mm)": 1e-3, "Metr": 1}[unit]
+    path = tmp_path / "trial.c3d"
+    path.write_bytes(c3d_bytes(POINTS * 1e-3 / meters, UNITS=[unit]))
+    markers = read(path).markers
+    np.testing.assert_allclose(markers, POINTS * 1e-3, rtol=SINGLE * 2)
+
+
 @pytest.mark.parametrize("count", [{"FRAMES": 5.0}, {"FRAMES": -1, "LONG_FRAMES": 5.0}])
 def test_frame_counts_are_read_in_every_form(tmp_path, count):
     path = tmp_path / "trial.c3d"

@@ -133,6 +133,15 @@ def test_editors_and_systems_change_nothing(tmp_path, kind, change):
     np.testing.assert_array_equal(recording.markers, POINTS * 1e-3)
 
 
+@pytest.mark.parametrize("kind", ["motive", "workstation"])
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_numbers_with_decimal_commas_are_read(tmp_path, kind, separator):
+    ending, write, _, _ = FORMATS[kind]
+    text = write().replace(",", separator).replace(".", ",")
+    recording = reading(tmp_path, text, ending=ending)
+    np.testing.assert_array_equal(recording.markers, POINTS * 1e-3)
+
+
 # Motive.
 
 

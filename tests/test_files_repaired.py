@@ -93,6 +93,11 @@ SIMPLE = {
         ),
         [],
     ),
+    "empty counts and rate": (
+        trc(values="\t100\t\t\tmm\t100\t1\t4"),
+        ["0 frames per second, its times 100"],
+    ),
+    "a blank line before the labels": (trc(labels="\n" + LABELS), []),
     "time with its unit": (trc(labels=LABELS.replace("Time", "Time (sec)")), []),
     "no line of axes": (trc(axes=()), []),
     "no blank line": (trc(axes=(AXES,)), []),

@@ -238,7 +238,8 @@ def test_nexus_time_is_the_frame_number_over_the_rate(tmp_path):
     [
         (
             DEVICES,
-            "section named Trajectories, found a file that starts with 'Devices'",
+            "or one of Vicon Workstation or OptiTrack Motive, found a file that starts "
+            "with 'Devices'",
         ),
         ("Trajectories\n100\n,,A\n", "found 2 lines, so the file is cut off"),
         (nexus().replace("Sub Frame", "Time"), "expected the columns 'Frame'"),

@@ -216,6 +216,7 @@ def test_degrees_are_those_of_joints_that_turn(tmp_path):
     ("text", "complaint"),
     [
         ("time\ta\n0\t1\n", "a header that ends with 'endheader'"),
+        (STATES.replace("inDegrees=no", "DataType=Quaternion"), "DataType 'quatern"),
         (STATES.replace("time ", "frame "), "columns that start with time"),
         (STATES.replace(" 0.01 ", " 0.00 "), "a time that increases"),
         (STATES.replace("0.6", "many"), "found 'many'"),

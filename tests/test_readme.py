@@ -56,6 +56,7 @@ def test_every_command_line_shown_is_one_that_the_program_knows(
         "check",
         "compare",
         "control",
+        "convert",
         "ik",
         "pick",
         "replay",

@@ -61,6 +61,12 @@ def read_storage(path: Path) -> CoordinateTable:
         key.strip().lower(): value.strip().lower()
         for key, _, value in (line.partition("=") for line in lines[:end])
     }
+    kind = header.get("datatype", "double")
+    if kind != "double":
+        raise FileError(
+            f"{path}: expected one number for each coordinate, found the DataType "
+            f"{shown(kind)}; run OpenSim's inverse kinematics on it first."
+        )
     names = lines[end + 1].split()
     if not names or names[0].lower() != "time":
         raise FileError(

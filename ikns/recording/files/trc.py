@@ -42,6 +42,7 @@ def read_trc(path: Path) -> Recording:
     """
     notes: list[str] = []
     lines = text_lines(path)
+    lines[0] = lines[0].lstrip()
     if not lines[0].startswith("PathFileType"):
         raise FileError(
             f"{path}: expected a TRC file, whose first word is PathFileType, "
@@ -58,17 +59,18 @@ def read_trc(path: Path) -> Recording:
     header = _header(lines[1], lines[2])
     unit = _entry(path, header, "Units")
     meters = meters_per(path, unit)
-    rate = _number(path, header, "DataRate")
+    rate = _number(path, header, "DataRate", empty=0.0)
     if rate != 0:
         rate = checked_rate(path, rate)
-    first = next(i for i in (4, 5) if i == 5 or _starts_with_number(lines[4]))
+    labels_at, first = _first_lines(lines)
     rows = [(i + 1, lines[i]) for i in range(first, len(lines)) if lines[i].strip()]
-    rows = _whole(rows, _number(path, header, "NumFrames"), lines[-1], notes)
+    n_frames = _number(path, header, "NumFrames", empty=math.nan)
+    rows = _whole(rows, n_frames, lines[-1], notes)
     rows, widths = separated_rows(path, rows)
     # A column that only a few rows have is damage, not a marker without a label.
     width = int(np.median(widths)) if rows else 0
-    said = _number(path, header, "NumMarkers")
-    labels = place_labels(path, lines[3], width, said, notes)
+    said = _number(path, header, "NumMarkers", empty=math.nan)
+    labels = place_labels(path, lines[labels_at], width, said, notes)
     values = number_table(path, rows, max(2 + 3 * len(labels), width), delimiter="\t")
     named = [i for i, label in enumerate(labels) if not is_unlabeled(label)]
     markers = values[:, 2 : 2 + 3 * len(labels)].reshape(len(rows), len(labels), 3)
@@ -92,11 +94,19 @@ def _header(names: str, values: str) -> dict[str, str]:
     return {key.strip(): value.strip() for key, value in pairs}
 
 
+def _first_lines(lines: list[str]) -> tuple[int, int]:
+    """Return the lines of the labels and of the first frame, counted from 0."""
+    filled = [i for i in range(3, len(lines)) if lines[i].strip()]
+    if len(filled) < 2:
+        return 3, len(lines)
+    return filled[0], filled[1] + (not _starts_with_number(lines[filled[1]]))
+
+
 def _whole(
     rows: list[Row], n_frames: float, last_line: str, notes: list[str]
 ) -> list[Row]:
     """Note a wrong number of frames; leave out a last one that is cut off."""
-    if n_frames == len(rows):
+    if n_frames == len(rows) or math.isnan(n_frames):
         return rows
     found, cut = len(rows), ""
     if n_frames > found > 1 and last_line.strip():
@@ -166,8 +176,10 @@ def _entry(path: Path, header: dict[str, str], name: str) -> str:
         ) from None
 
 
-def _number(path: Path, header: dict[str, str], name: str) -> float:
+def _number(path: Path, header: dict[str, str], name: str, *, empty: float) -> float:
     text = _entry(path, header, name)
+    if not text:
+        return empty
     try:
         return float(text.replace(",", "."))
     except ValueError:

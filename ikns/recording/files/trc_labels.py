@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -67,7 +68,8 @@ def place_labels(
     if surplus:
         notes.append(f"{3 * surplus} of its columns have no label and are left out.")
     # Some writers count the columns without a label, others do not.
-    if said not in (len(labels), len(found), len(labels) + surplus):
+    right = (len(labels), len(found), len(labels) + surplus)
+    if not math.isnan(said) and said not in right:
         notes.append(f"its header says {said:g} markers, found {len(found)} labels.")
     return labels
 

@@ -68,7 +68,8 @@ def _trajectories(path: Path, lines: list[str]) -> tuple[list[str], list[Row]]:
     if "Trajectories" not in titles:
         raise FileError(
             f"{path}: expected a Vicon Nexus export with a section named Trajectories, "
-            f"found a file that starts with {shown(titles[0] if titles else '')}."
+            f"or one of Vicon Workstation or OptiTrack Motive, found a file that "
+            f"starts with {shown(titles[0] if titles else '')}."
         )
     section = filled[titles.index("Trajectories") + 1 :]
     if len(section) < 4:
