@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from test_files_repaired import reading, refused
 
+from ikns.errors import FileError
+
 NAMES = ["RSHO", "RELB", "RWRA"]
 #: mm, each with the three decimals that are printed.
 POINTS = (1000 + 300 * np.random.default_rng(8).normal(size=(4, 3, 3))).round(3)
@@ -225,6 +227,17 @@ def test_frame_and_time_may_stand_before_the_positions(tmp_path, before, title):
     recording = reading(tmp_path, text, ending="tsv")
     np.testing.assert_array_equal(recording.markers, POINTS * 1e-3)
     np.testing.assert_allclose(recording.time, np.arange(4) / 100, rtol=1e-15)
+
+
+def test_events_of_qualisys_are_moments(tmp_path):
+    event = "EVENT\tReach\t2\t0.01000\nEVENT\tReturn\t4\t0.03000\nMARKER_NAMES"
+    text = qualisys().replace("MARKER_NAMES", event, 1)
+    part = reading(tmp_path, text, ending="tsv", start="reach", end="0.02")
+    np.testing.assert_allclose(part.time, [0.01, 0.02])
+    with pytest.raises(
+        FileError, match="one event 'Rest', found Reach at 0.010 s, Ret"
+    ):
+        reading(tmp_path, text, ending="tsv", start="Rest")
 
 
 def test_counts_of_qualisys_that_are_wrong_are_told(tmp_path):

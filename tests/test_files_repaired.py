@@ -81,6 +81,11 @@ SIMPLE = {
         trc(labels=LABELS.replace("Time\t", "Time ")),
         [ORDER],
     ),
+    "a blank before labels": (trc(labels=LABELS.replace("\t", "\t ")), []),
+    "labels that an editor aligned": (
+        trc(labels=LABELS.replace("RSHO\t\t\t", "RSHO           ")),
+        [ORDER],
+    ),
     "labels above Z": (trc(labels="Frame#\tTime\t\t\t" + LABELS[12:]), [ORDER]),
     "labels above every column": (
         trc(labels="Frame#\tTime\t" + "\t".join(n for n in NAMES for _ in "XYZ")),
@@ -187,10 +192,19 @@ def test_a_last_line_that_is_cut_off_is_left_out(tmp_path):
             ),
             "found a rate of 0 and no times",
         ),
+        (trc(first="PathFileType\t4\t(X/Y)\tx.trc"), "found one of X and Y only"),
         # A decimal comma beside decimal points may as well group thousands.
         (trc(body=[rows()[0].replace(".", ",", 3), *rows()[1:]]), "found '"),
     ],
-    ids=["few labels", "gap", "one blank", "nine names", "no time", "both commas"],
+    ids=[
+        "few labels",
+        "gap",
+        "one blank",
+        "nine names",
+        "no time",
+        "flat",
+        "both commas",
+    ],
 )
 def test_what_a_trc_file_leaves_open_is_refused(tmp_path, text, complaint):
     assert complaint in refused(tmp_path, text)

@@ -10,7 +10,7 @@ from test_files_c3d import c3d_bytes, parameter
 
 from ikns.errors import FileError, InvalidInput, MarkerMismatch
 from ikns.recording.files import read
-from ikns.recording.files.c3d_events import read_c3d_events
+from ikns.recording.files.file_events import read_c3d_events
 from ikns.recording.part import between, one_subject
 from ikns.recording.recording import Recording
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from ikns.errors import FileError, RecordingWarning
 from ikns.recording.files.c3d import read_c3d
-from ikns.recording.files.c3d_events import event_time
 from ikns.recording.files.c3d_write import write_c3d
+from ikns.recording.files.file_events import event_time
 from ikns.recording.files.marker_csv import read_marker_csv
 from ikns.recording.files.qualisys_tsv import read_qualisys_tsv
 from ikns.recording.files.trc import read_trc

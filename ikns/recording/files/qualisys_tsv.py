@@ -33,7 +33,7 @@ def read_qualisys_tsv(path: Path) -> Recording:
     if not lines[0].startswith(_KEYS):
         raise FileError(
             f"{path}: expected a TSV file of Qualisys Track Manager, which starts with "
-            f"{_KEYS[0]}, found {shown(lines[0])}."
+            f"{_KEYS[0]}, found {shown(lines[0])}; export it with the TSV header."
         )
     header: dict[str, list[str]] = {}
     start = 0

@@ -48,6 +48,10 @@ def read_trc(path: Path) -> Recording:
             f"{path}: expected a TRC file, whose first word is PathFileType, "
             f"found {shown(lines[0])}."
         )
+    if "(X/Y)" in lines[0]:
+        raise FileError(
+            f"{path}: expected a TRC file with X, Y and Z, found one of X and Y only."
+        )
     if lines[0].startswith("PathFileType,"):
         notes.append("its columns are separated by commas instead of tabs.")
         lines = [line.replace(",", "\t") for line in lines]

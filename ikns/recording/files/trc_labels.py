@@ -47,7 +47,10 @@ def place_labels(
     found = _labels(line)
     n_columns = -(-(width - _BEFORE) // 3)
     names = [label for _, label in found]
-    aligned = all((at - _BEFORE) % 3 == 0 and at >= _BEFORE for at, _ in found)
+    places = [at for at, _ in found]
+    aligned = len(set(places)) == len(places) and all(
+        at >= _BEFORE and (at - _BEFORE) % 3 == 0 for at in places
+    )
     if aligned:
         last = max((at for at, _ in found), default=_BEFORE - 3)
         n = max(n_columns, (last - _BEFORE) // 3 + 1)
@@ -75,9 +78,18 @@ def place_labels(
 
 
 def _labels(line: str) -> list[tuple[int, str]]:
-    """Return the labels of a line and the cells where they stand."""
+    """Return the labels of a line and the cells where they stand.
+
+    Two in one cell, with blanks in between, stood in cells of their own before an
+    editor aligned them.
+    """
     cells = line.split("\t") if "\t" in line else line.split()
-    found = [(at, cell.strip()) for at, cell in enumerate(cells) if cell.strip()]
+    found = [
+        (at, label)
+        for at, cell in enumerate(cells)
+        for label in re.split(r"\s{2,}", cell.strip())
+        if label
+    ]
     if found and _FRAME.fullmatch(found[0][1]):
         del found[0]
     if found and (time := _TIME.fullmatch(found[0][1])):

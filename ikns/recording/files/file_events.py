@@ -1,4 +1,4 @@
-"""Events of a C3D file: moments that somebody or the software named."""
+"""Events of a C3D or Qualisys TSV file: moments that somebody named."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from ikns.errors import FileError
 from ikns.recording.files.c3d_layout import read_layout
 from ikns.recording.files.conversion import shown
+from ikns.recording.files.table import text_lines
 
 
 class FileEvent(NamedTuple):
@@ -40,13 +41,32 @@ def read_c3d_events(path: Path) -> list[FileEvent]:
     return sorted((FileEvent(*each) for each in events), key=lambda event: event.time)
 
 
+def read_tsv_events(path: Path) -> list[FileEvent]:
+    """Return the events of a Qualisys TSV file, by time.
+
+    They are lines of the header: EVENT, name, frame and time.
+    """
+    events = []
+    for line in text_lines(path):
+        word, *cells = line.split("\t")
+        if word.strip() == "EVENT" and len(cells) >= 3:
+            try:
+                events.append(FileEvent(cells[0].strip(), "", float(cells[2])))
+            except ValueError:
+                raise FileError(
+                    f"{path}: expected the time of event {shown(cells[0])}, found "
+                    f"{shown(cells[2])}."
+                ) from None
+    return sorted(events, key=lambda event: event.time)
+
+
 def event_time(path: Path, name: str) -> float:
     """Return when the event of a name happened, s.
 
     Parameters
     ----------
     path : Path
-        A C3D file.
+        A C3D file, or a TSV file of Qualisys.
     name : str
         ``Foot Strike``, or with its context ``Right Foot Strike``, in any case.
 
@@ -55,12 +75,13 @@ def event_time(path: Path, name: str) -> float:
     FileError
         When there is none, or several: the sentence has their times.
     """
-    if path.suffix.lower() != ".c3d":
+    reader = {".c3d": read_c3d_events, ".tsv": read_tsv_events}.get(path.suffix.lower())
+    if reader is None:
         raise FileError(
-            f"{path}: expected a number of seconds, found {shown(name)}; only C3D "
-            f"files have events."
+            f"{path}: expected a number of seconds, found {shown(name)}; only C3D and "
+            f"TSV files have events."
         )
-    events = read_c3d_events(path)
+    events = reader(path)
     wanted = " ".join(name.split()).casefold()
     found = [
         event
