@@ -200,7 +200,6 @@ WITH = {
     "calibrate sex": "--stature 1.7 --mass 70",
     "study plan level_spread": "--spread 1",
     "study plan trial_spread": "--spread 1",
-    "view subject_prefix": "{free}",
     "track source": "--subject {person}",
     "track subject": "--source replay:{free}",
     "pick source": "--subject {person}",
