@@ -47,7 +47,7 @@ NEW_OUT = {
 PERSON = {"subject": "person"}
 READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "scale": (["--stature", "1.75", "--mass", "70", "--sex", "male"], {}),
-    "ik": ([], {"recording": "free.c3d", **PERSON}),
+    "ik": ([], {"recording": "free.c3d", "static": "static.c3d", **PERSON}),
     "check": ([], {"recordings": "free.c3d", **PERSON}),
     "convert": ([], {"source": "free.c3d"}),
     "markers list": ([], {}),
