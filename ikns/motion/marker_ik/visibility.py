@@ -119,7 +119,13 @@ def segment_pairs(skeleton: Skeleton, chain: str) -> tuple[Indices, Array]:
         How far apart they are on the person, m.
     """
     needs = sight_needs(skeleton, chain).values()
-    found = [pair for columns, _ in needs for pair in combinations(columns, 2)]
+    turns = [marker.free_turn for marker in skeleton.marker_set.markers]
+    found = [
+        pair
+        for columns, _ in needs
+        for pair in combinations(columns, 2)
+        if turns[pair[0]] == turns[pair[1]]
+    ]
     pairs = np.array(found, dtype=np.int64).reshape(-1, 2)
     # On one link, so these are its own coordinates.
     first, second = skeleton.marker_positions[pairs.T]
@@ -160,10 +166,24 @@ def _segments(skeleton: Skeleton) -> dict[str, _Segment]:
 
 
 def _way(skeleton: Skeleton, link: str, others: Iterable[str]) -> tuple[list[int], str]:
-    """Joints between a link and the next of others towards the thorax; and that."""
-    carried = {skeleton.tree_link(other)[0]: other for other in others}
-    joints, at = [], skeleton.tree_link(link)[0]
+    """Joints between a link and the next of others towards the thorax; and that.
+
+    A link of which only clusters with a free turn are seen does not show its own joint.
+    """
+    carried = {_shown(skeleton, other): other for other in others}
+    joints, at = [], _shown(skeleton, link)
     while at > 0 and at not in carried:
         joints.append(at - 1)
         at = int(skeleton.tree.parent[at])
     return joints, carried.get(at, "")
+
+
+def _shown(skeleton: Skeleton, link: str) -> int:
+    """Last joint of the tree that the markers of a link show."""
+    joint = skeleton.tree_link(link)[0]
+    own = [
+        marker.free_turn
+        for marker in skeleton.marker_set.markers
+        if marker.link == link and not marker.static_only and marker.weight > 0
+    ]
+    return int(skeleton.tree.parent[joint]) if own and all(own) else joint
