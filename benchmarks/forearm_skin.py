@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.scaling import scale
-from ikns.motion.marker_ik import MarkerIK, fitted_markers
+from ikns.motion.marker_ik import MarkerIK, turned_markers
 from ikns.motion.motion import Motion
 from ikns.numerics.rigid import rigid_transform
 from ikns.recording.files import read
@@ -76,7 +76,7 @@ def against_skin(
         if not np.isfinite(markers[own]).any():
             continue
         rigid = skeleton.markers_in_world(q)[own]
-        turn, _ = rigid_transform(rigid, fitted_markers(skeleton, q, markers)[own])
+        turn, _ = rigid_transform(rigid, turned_markers(skeleton, q, markers)[own])
         skin = turn @ link_in_world(skeleton, q, f"{side}_forearm")
         hand = link_in_world(skeleton, q, f"{side}_hand")
         # X is the axis of flexion, Z of deviation, in links of the zero pose.

@@ -52,10 +52,16 @@ def turn(axis: Array, angle: Array) -> Array:
     return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
 
 
-def draw_arm(rng: np.random.Generator, carrying: float, sizes: Array) -> Arm:
-    """Draw an arm; `sizes` are clavicle, upper arm, forearm and hand, m."""
+def draw_arm(
+    rng: np.random.Generator, carrying: float, sizes: Array, wrist_sd: float
+) -> Arm:
+    """Draw an arm; `sizes` are clavicle, upper arm, forearm and hand, m.
+
+    Axes lie off the nominal ones by 2 to 3 deg about either of two directions, those of
+    the wrist by `wrist_sd`, deg.
+    """
     clavicle, upper, fore, hand = sizes
-    tilts = np.radians([0, 0, 0, 3, 2, 3, 3])[:, None] * rng.normal(size=(7, 3))
+    tilts = np.radians([0, 0, 0, 3, 2, wrist_sd, wrist_sd])[:, None] * rng.normal(size=(7, 3))
     axes = NOMINAL + np.cross(tilts, NOMINAL)
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     mm = rng.normal(size=(30, 3)) / 1000
@@ -83,7 +89,7 @@ def draw_arm(rng: np.random.Generator, carrying: float, sizes: Array) -> Arm:
     return Arm(axes, offsets, carrying, markers)
 
 
-def draw_person(seed: int) -> Person:
+def draw_person(seed: int, *, wrist_sd: float = 3.0) -> Person:
     """Draw a person whose carrying angle lies between 0 and 20 deg."""
     rng = np.random.default_rng([20, seed])
     carrying = np.radians(rng.uniform(0, 20))
@@ -97,8 +103,8 @@ def draw_person(seed: int) -> Person:
         "CLAV": np.array([0.007, -0.003, 0]) + 3 * mm[2],
         "STRN": np.array([0.036, -0.17, 0]) * stature + [7, 12, 4] * mm[3],
     }
-    arms = [draw_arm(rng, carrying, sizes * (1 + 0.007 * rng.normal(size=4)))
-            for _ in range(2)]  # fmt: skip
+    both = sizes * (1 + 0.007 * rng.normal(size=(2, 4)))
+    arms = [draw_arm(rng, carrying, own, wrist_sd) for own in both]
     return Person(*arms, thorax)
 
 
@@ -145,8 +151,7 @@ def hold(arm: Arm, start: Array, sweep: Array, wander: Array) -> Array:
 
     `wander` (T, P, 6) is how far the hands stray, m and rad.
     """
-    q, (_, p0, R0) = start.copy(), place(arm, start)
-    before, path = np.zeros(7), []
+    q, (_, p0, R0), path = start.copy(), place(arm, start), []
     n = np.linalg.svd(hand_jacobian(arm, q))[2][:, -1]
     way = n * np.sign(n[:, :1])  # the shoulder abducts
     for at, off in zip(np.diff(sweep, prepend=0.0), wander, strict=True):
@@ -163,7 +168,6 @@ def hold(arm: Arm, start: Array, sweep: Array, wander: Array) -> Array:
             error = np.hstack([p0 - p, spin]) + off
             q = q + np.einsum("pij,pj->pi", np.linalg.pinv(J), error)
         path.append(q)
-    assert before is not None
     return np.array(path)
 
 
@@ -211,7 +215,7 @@ def exploration(
     size = np.linalg.norm(arm.offsets[3]) + np.linalg.norm(arm.offsets[5])
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     box = np.vstack([0.13 * corners, [[0, 0, 0], [0.02, 0.06, -0.05]]])
-    targets = np.array([0.62, -0.40, 0.18]) * [size, size, 1] + box
+    targets = np.array([0.56, -0.40, 0.18]) * [size, size, 1] + box
     start = reach(arm, targets)
     t = np.arange(int(seconds * rate)) / rate
     sweep = np.radians(28) * np.sin(2 * np.pi * t / seconds * 1.5)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
-from ikns.motion.marker_ik import MarkerIK, fitted_markers
+from ikns.motion.marker_ik import MarkerIK, turned_markers
 from ikns.motion.marker_ik.pose import LIMIT, PRIOR
 from ikns.motion.marker_ik.visibility import visible_segments
 
@@ -73,7 +73,7 @@ def test_turned_skin_changes_no_joint(body, seed, right, left):
     assert pose.converged
     # Ten times the tolerance of the solver's steps, and so much on a lever of 0.5 m.
     assert np.abs(body.difference(q, pose.q)).max() < 1e-4
-    np.testing.assert_allclose(fitted_markers(body, pose.q, seen), seen, atol=5e-5)
+    np.testing.assert_allclose(turned_markers(body, pose.q, seen), seen, atol=5e-5)
 
 
 @settings(deadline=None, max_examples=8)
@@ -90,7 +90,7 @@ def test_a_frame_is_solved_to_the_minimum_of_the_cost(body, seed, noise, hidden)
     columns = np.setdiff1d(np.arange(24), body.columns(body.marker_set.held))
 
     def cost(q):
-        square = ((fitted_markers(body, q, seen) - seen) ** 2).sum(axis=1)
+        square = ((turned_markers(body, q, seen) - seen) ** 2).sum(axis=1)
         moved = body.difference(before, q)
         beyond = np.maximum(q[7:] - body.upper, 0) + np.minimum(q[7:] - body.lower, 0)
         return (
@@ -120,11 +120,11 @@ def test_no_cluster_shows_pronation_without_the_hand(body):
     assert not known["right_forearm_pronation"]
 
 
-def test_fitted_markers_turn_about_the_pronation_axis_only(body):
+def test_clusters_turn_about_the_pronation_axis_only(body):
     rng = np.random.default_rng(2)
     q = posture(body, rng)
     seen = body.markers_in_world(q) + rng.normal(0, 0.05, (len(body.marker_set.labels), 3))
-    placed, plain = fitted_markers(body, q, seen), body.markers_in_world(q)
+    placed, plain = turned_markers(body, q, seen), body.markers_in_world(q)
     free = np.array([m.free_turn for m in body.marker_set.markers])
     np.testing.assert_array_equal(placed[~free], plain[~free])
     # The best turn: no other is nearer, and distances within a cluster are kept.

@@ -185,7 +185,10 @@ class _Problem:
         squares = self.trust * (self.errors(shape, q)[1:] ** 2).sum(axis=2)
         shown = self.shown[1:]
         freedom = 3 * shown.sum() - len(self.free) * len(shown) - 3 * shown.shape[1]
+        # The variance is known to sqrt(2 / freedom) of itself; what hides within twice
+        # that is counted as skin motion.
         variance = squares.sum() / max(freedom, 1)
+        variance *= 1 + 2 * np.sqrt(2 / max(freedom, 1))
         return float(np.sqrt(max(variance - camera_sd**2, 0.0)))
 
     def slopes(self, shape: _Shape, q: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ def turning_clusters(skeleton: Skeleton) -> tuple[Indices, Indices]:
     return joints, np.where(free, cluster, -1).astype(np.int64)
 
 
-def fitted_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
+def turned_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
     """Where a pose has the markers, (M, 3) m in the world.
 
     As :meth:`Skeleton.markers_in_world`, with every cluster of a free turn turned to
@@ -40,7 +40,7 @@ def fitted_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
     >>> body = Skeleton.load(marker_set="ue_adl")
     >>> q = body.neutral()
     >>> markers = body.markers_in_world(q)
-    >>> bool(np.allclose(fitted_markers(body, q, markers), markers))
+    >>> bool(np.allclose(turned_markers(body, q, markers), markers))
     True
     """
     placed = skeleton.markers_in_world(q)
