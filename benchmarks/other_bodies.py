@@ -1,4 +1,4 @@
-"""Is a person found whose joints are not the package's? Virtual bodies of another making.
+"""Is a person found whose joints are not the model's? Bodies of another making.
 
 The bodies and their movements come from tests/other_body.py, plain numpy that shares no
 code with the package: carrying angles from 0 to 20 deg, other axes at elbow, forearm
@@ -94,7 +94,9 @@ def table(rows: list[dict]) -> None:
             f"| {name} | {np.median(values):.1f} | {values.max():.1f} "
             f"| {np.sum(values <= 6)} of {n} |"
         )
-    print("\n| length | from | rms mm | worst | stated sd | in 5 mm | in 95 % interval |")
+    print(
+        "\n| length | from | rms mm | worst | stated sd | in 5 mm | in 95 % interval |"
+    )
     print("|---|---|---|---|---|---|---|")
     for part in ("upper_arm", "forearm", "hand"):
         for kind in ("static", "both"):

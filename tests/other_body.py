@@ -61,7 +61,9 @@ def draw_arm(
     the wrist by `wrist_sd`, deg.
     """
     clavicle, upper, fore, hand = sizes
-    tilts = np.radians([0, 0, 0, 3, 2, wrist_sd, wrist_sd])[:, None] * rng.normal(size=(7, 3))
+    tilts = np.radians([0, 0, 0, 3, 2, wrist_sd, wrist_sd])[:, None] * rng.normal(
+        size=(7, 3)
+    )
     axes = NOMINAL + np.cross(tilts, NOMINAL)
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     mm = rng.normal(size=(30, 3)) / 1000

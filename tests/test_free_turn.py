@@ -117,20 +117,26 @@ def test_no_cluster_shows_pronation_without_the_hand(body):
     known = dict(
         zip(body.joint_names, visible_segments(body, markers).known[0], strict=True)
     )
-    assert known["right_elbow_flexion"] and known["left_forearm_pronation"]
+    assert known["right_elbow_flexion"]
+    assert known["left_forearm_pronation"]
     assert not known["right_forearm_pronation"]
 
 
 def test_clusters_turn_about_the_pronation_axis_only(body):
     rng = np.random.default_rng(2)
     q = posture(body, rng)
-    seen = body.markers_in_world(q) + rng.normal(0, 0.05, (len(body.marker_set.labels), 3))
+    seen = body.markers_in_world(q) + rng.normal(
+        0, 0.05, (len(body.marker_set.labels), 3)
+    )
     placed, plain = turned_markers(body, q, seen), body.markers_in_world(q)
     free = np.array([m.free_turn for m in body.marker_set.markers])
     np.testing.assert_array_equal(placed[~free], plain[~free])
     # The best turn: no other is nearer, and distances within a cluster are kept.
     right = [k for k, label in enumerate(body.marker_set.labels) if "RLAR" in label]
-    spans = [np.linalg.norm(p[right][:, None] - p[right][None], axis=2) for p in (placed, plain)]
+    spans = [
+        np.linalg.norm(p[right][:, None] - p[right][None], axis=2)
+        for p in (placed, plain)
+    ]
     np.testing.assert_allclose(*spans, atol=1e-12)
     best = np.sum((placed[right] - seen[right]) ** 2)
     for turn in np.linspace(-3, 3, 61):

@@ -147,7 +147,8 @@ def test_too_few_frames_leave_the_static_trials_body():
     again, report = fit_explorations(
         Skeleton.load(), skeleton, static, [short], [motion]
     )
-    assert report is None and again is skeleton
+    assert report is None
+    assert again is skeleton
 
 
 def test_frames_with_exchanged_markers_are_not_used():

@@ -118,9 +118,7 @@ def fit_explorations(
     return body.with_markers(body.marker_set.only(kept.labels)), report
 
 
-def _chosen(
-    motions: Sequence[Motion], seen: Sequence[Array]
-) -> tuple[Indices, Array]:
+def _chosen(motions: Sequence[Motion], seen: Sequence[Array]) -> tuple[Indices, Array]:
     """Frames far apart in joint angles among those that show most: rows, postures."""
     q = np.concatenate([motion.q for motion in motions])
     markers = np.concatenate(seen)

@@ -181,7 +181,7 @@ class _Problem:
         )
 
     def skin_sd(self, shape: _Shape, q: Array, camera_sd: float) -> float:
-        """What the cameras do not explain of the residual, m per axis."""
+        """Return what cameras do not explain of the residual, m per axis."""
         squares = self.trust * (self.errors(shape, q)[1:] ** 2).sum(axis=2)
         shown = self.shown[1:]
         freedom = 3 * shown.sum() - len(self.free) * len(shown) - 3 * shown.shape[1]

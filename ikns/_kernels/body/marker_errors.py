@@ -52,7 +52,8 @@ def marker_errors(
 ) -> tuple[float, float]:
     """Write joints and markers relative to the first joint, and the markers' errors.
 
-    Clusters are turned; their markers' places in the joint are written too. Returns the sum of squared errors, weighted and unweighted.
+    Clusters are turned; their markers' places in the joint are written too. Returns the
+    sum of squared errors, weighted and unweighted.
     """
     place_joints(tree, q, rotation, translation)
     for k in range(3):

@@ -27,7 +27,9 @@ class MarkerProblem(NamedTuple):
 
     tree: Tree
     marker_joint: Indices  # (M,) joint of the tree that carries the marker
-    marker_carrier: Indices  # (M,) the joint that moves it: of a cluster, the one before
+    marker_carrier: (
+        Indices  # (M,) the joint that moves it: of a cluster, the one before
+    )
     marker_turn: Indices  # (M,) cluster of each marker, or -1
     turn_joint: Indices  # (K,) joint about whose axis the cluster turns
     marker_position: Array  # (M, 3) in the frame of its joint, m
