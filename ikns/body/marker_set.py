@@ -35,6 +35,8 @@ class Marker:
     The deviation of its placement along each axis is small on a bony landmark, large
     for a technical marker; one number in the file is used for all three. Its weight in
     inverse kinematics relative to the others is less where soft tissue moves under it.
+    Markers with a free turn, all of a link together, sit on skin that follows the
+    link's joint in part only (forearm and pronation).
     """
 
     label: str
@@ -44,6 +46,7 @@ class Marker:
     static_only: bool = False  # used in the static trial only
     aliases: tuple[str, ...] = ()  # other labels of the same marker
     weight: float = 1.0
+    free_turn: bool = False  # turns about its link's joint by an angle of its own
 
 
 @dataclass(frozen=True)
@@ -237,6 +240,7 @@ def _read_marker(label: str, table: Mapping[str, Any]) -> Marker:
         bool(table.get("static_only", False)),
         tuple(table.get("aliases", ())),
         float(table.get("weight", 1.0)),
+        bool(table.get("free_turn", False)),
     )
 
 
@@ -252,4 +256,6 @@ def _write_marker(marker: Marker) -> dict[str, object]:
         table["aliases"] = list(marker.aliases)
     if marker.weight != 1:
         table["weight"] = marker.weight
+    if marker.free_turn:
+        table["free_turn"] = True
     return table

@@ -14,12 +14,14 @@ from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
+from ikns.calibration.exploration_fit import fit_explorations
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import refused
 from ikns.calibration.judge.subjects import other_subject
 from ikns.calibration.places import recorded_places
 from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.report import (
+    body_report,
     exploration_report,
     extrinsic_report,
     points_report,
@@ -32,6 +34,7 @@ from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
 from ikns.motion.excursion import other_hand_moves
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.marker_ik.rejection import rejection_sentence
+from ikns.motion.motion import Motion
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.nullspace.map.samples import no_still_sample
 from ikns.recording.recording import Recording
@@ -150,15 +153,21 @@ def calibrate(
         for recording in explorations
         for sentence in _judged(static, recording, skeleton, chain)
     ]
-    solver = MarkerIK(skeleton)
-    tracked = tuple(
-        solver.track(
-            recording,
-            chain=chain,
-            progress=progress and partial(progress, Path(recording.source).name),
+    recordings = (*explorations, *natural)
+    tracked = _tracked(skeleton, recordings, chain, progress)
+    fitted = None
+    if static is not None:
+        skeleton, fitted = fit_explorations(
+            body,
+            skeleton,
+            static,
+            explorations,
+            tracked[: len(explorations)],
+            marker_set=marker_set,
+            min_duration=min_static,
         )
-        for recording in (*explorations, *natural)
-    )
+    if fitted is not None:
+        tracked = _tracked(skeleton, recordings, chain, progress)
     motions = tracked[: len(explorations)]
     gates = [
         still_mask(motion, chain, max_hand_speed=max_hand_speed, min_duration=min_rest)
@@ -220,6 +229,7 @@ def calibrate(
         },
         "methods": methods,
         "static": static_report(static, scaling),
+        "body": body_report(fitted),
         "explorations": [
             exploration_report(recording, motion, gate, chain)
             for recording, (motion, gate) in zip(explorations, pairs, strict=True)
@@ -281,11 +291,29 @@ def _say_side(other: str, chain: str) -> str:
     return f"{other[0].upper()}{other[1:]}: {chain} seems to be the wrong side."
 
 
+def _tracked(
+    skeleton: Skeleton,
+    recordings: Sequence[Recording],
+    chain: str,
+    progress: Callable[[str, int, int], None] | None,
+) -> tuple[Motion, ...]:
+    """Marker inverse kinematics of every recording."""
+    solver = MarkerIK(skeleton)
+    return tuple(
+        solver.track(
+            recording,
+            chain=chain,
+            progress=progress and partial(progress, Path(recording.source).name),
+        )
+        for recording in recordings
+    )
+
+
 def _left_out(
     static: Recording,
     scaling: ScalingReport,
     marker_set: str | Path,
-    explorations: Sequence[Recording],
+    recordings: Sequence[Recording],
     chain: str,
 ) -> list[str]:
     """Name markers, of the chain or seen later, that the static trial lacks.
@@ -295,7 +323,7 @@ def _left_out(
     worn = MarkerSet.load(marker_set)
     own = ("thorax", *chain_sides(chain))
     counts = np.array([marker.link.startswith(own) for marker in worn.markers])
-    for recording in explorations:
+    for recording in recordings:
         markers = worn.pick(recording.labels, recording.markers)
         counts |= np.isfinite(markers).all(axis=2).any(axis=0)
     named = [label for label, count in zip(worn.labels, counts, strict=True) if count]

@@ -9,7 +9,9 @@ import numpy as np
 
 from ikns.arrays import Mask
 from ikns.body.chains import chain_joints
+from ikns.body.joint_axes import TILTS
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.exploration_fit import BodyReport
 from ikns.calibration.scaling import ScalingReport
 from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
@@ -30,6 +32,27 @@ def static_report(static: Recording | None, scaling: ScalingReport) -> dict[str,
         "unused": list(scaling.unused),
         "dropped": list(scaling.dropped),
         "held": list(scaling.held),
+    }
+
+
+def body_report(fitted: BodyReport | None) -> dict[str, Any] | None:
+    """Results of the static trial and the explorations together; None without them."""
+    if fitted is None:
+        return None
+    return {
+        "lengths_m": fitted.lengths,
+        "length_sd_m": fitted.length_sd,
+        "tilts_rad": {name: tilt for name, (tilt, _) in fitted.tilts.items()},
+        "tilt_sd_rad": {name: sd for name, (_, sd) in fitted.tilts.items()},
+        # Those of which the explorations say more than that people differ.
+        "tilts_shown": [
+            f"{joint}_{'xyz'[component]}"
+            for joint, component, spread in TILTS
+            if fitted.tilts[f"{joint}_{'xyz'[component]}"][1] < spread / 2
+        ],
+        "camera_sd_m": fitted.camera_sd,
+        "skin_sd_m": fitted.skin_sd,
+        "frames": fitted.frames,
     }
 
 

@@ -254,9 +254,21 @@ def _check_input(context: typer.Context, *, live: bool) -> None:
         )
 
 
+def _axes(body: dict[str, Any]) -> list[str]:
+    """Say how the axes lie that the explorations show, against the generic body's."""
+    told = [
+        f"{name[:-2].replace('_', ' ')} {math.degrees(body['tilts_rad'][name]):+.1f} "
+        f"about {name[-1].upper()} (sd {math.degrees(body['tilt_sd_rad'][name]):.1f})"
+        for name in body.get("tilts_shown", [])
+    ]
+    return [f"Axes against the generic body's, deg: {', '.join(told)}."] if told else []
+
+
 def calibration_parts(report: dict[str, Any]) -> list[Any]:
     """Return tables and sentences on the quality of a calibration."""
     static, extrinsic = report["static"], report["extrinsic"]
+    # Folders from before explorations were used have no body of both.
+    body = report.get("body") or static
     least = report["settings"]["min_samples"]
     seen = [item for item in extrinsic["joints_deg"].items() if item[1] is not None]
     moved = sorted(seen, key=lambda item: -item[1])[:2]
@@ -266,10 +278,11 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
             + ", assumed from stature" * (static["source"] is None),
             {"segment": "s", "length mm": ".1f", "sd mm": ".1f"},
             [
-                [name, 1000 * length, 1000 * static["length_sd_m"][name]]
-                for name, length in static["lengths_m"].items()
+                [name, 1000 * length, 1000 * body["length_sd_m"][name]]
+                for name, length in body["lengths_m"].items()
             ],
         ),
+        *_axes(body),
         table(
             "Explorations",
             {"recording": "s", "s": ".1f", "still s": ".1f", "residual mm": ".1f"},

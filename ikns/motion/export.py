@@ -112,12 +112,15 @@ def fitted_markers(skeleton: Skeleton, motion: Motion) -> Recording:
     Returns
     -------
     Recording
-        NaN while a marker's segment is out of sight.
+        NaN while a marker's segment is out of sight, and for clusters with a free turn,
+        whose angle is not part of a motion.
     """
     markers = np.stack([skeleton.markers_in_world(q) for q in motion.q])
     seen = dict(zip(motion.segments, motion.seen.T, strict=True))
     for column, marker in enumerate(skeleton.marker_set.markers):
-        if marker.link in seen:
+        if marker.free_turn:
+            markers[:, column] = np.nan
+        elif marker.link in seen:
             markers[~seen[marker.link], column] = np.nan
     return Recording(
         motion.time, markers, skeleton.marker_set.labels, "the fitted markers"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ikns._kernels.body.free_turn import release_clusters
 from ikns._kernels.body.marker_errors import add_penalties, marker_errors, penalties
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
 from ikns._kernels.body.normal_equations import linearize
@@ -39,6 +40,8 @@ def errors_at(problem: MarkerProblem, s: Scratch, q: Array) -> tuple[float, floa
     return marker_errors(
         problem.tree,
         problem.marker_joint,
+        problem.marker_turn,
+        problem.turn_joint,
         problem.marker_position,
         s.weight,
         s.target,
@@ -48,6 +51,7 @@ def errors_at(problem: MarkerProblem, s: Scratch, q: Array) -> tuple[float, floa
         s.translation,
         s.x,
         s.error,
+        s.turned,
     )
 
 
@@ -67,6 +71,8 @@ def descend(
         trial_cost, trial_distance = marker_errors(
             problem.tree,
             problem.marker_joint,
+            problem.marker_turn,
+            problem.turn_joint,
             problem.marker_position,
             s.weight,
             s.target,
@@ -76,6 +82,7 @@ def descend(
             s.translation,
             s.x,
             s.error,
+            s.turned,
         )
         trial_cost += penalties(
             problem.tree,
@@ -138,13 +145,27 @@ def _linearize(problem: MarkerProblem, s: Scratch, pull: float) -> None:
         problem.path,
         problem.depth,
         s.axes,
-        problem.marker_joint,
+        problem.marker_carrier,
         s.weight,
         s.x,
         s.error,
         s.moments,
         s.forces,
         s.gradient,
+        s.hessian,
+        s.curvature,
+    )
+    release_clusters(
+        problem.tree,
+        problem.path,
+        problem.depth,
+        s.axes,
+        problem.turn_joint,
+        problem.marker_turn,
+        s.weight,
+        s.x,
+        s.error,
+        s.forces,
         s.hessian,
         s.curvature,
     )

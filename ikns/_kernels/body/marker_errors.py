@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ikns._kernels.body.free_turn import turn_clusters
 from ikns._kernels.body.step import displacement
 from ikns._kernels.body.tree import Tree, place_joints
 from ikns._kernels.compiled import compiled
@@ -36,6 +37,8 @@ def take_markers(
 def marker_errors(
     tree: Tree,
     joint: Indices,
+    marker_turn: Indices,
+    turn_joint: Indices,
     position: Array,
     weight: Array,
     target: Array,
@@ -45,10 +48,12 @@ def marker_errors(
     translation: Array,
     x: Array,
     error: Array,
+    turned: Array,
 ) -> tuple[float, float]:
     """Write joints and markers relative to the first joint, and the markers' errors.
 
-    Returns the sum of squared errors, weighted and unweighted.
+    Clusters are turned; their markers' places in the joint are written too. Returns the
+    sum of squared errors, weighted and unweighted.
     """
     place_joints(tree, q, rotation, translation)
     for k in range(3):
@@ -56,16 +61,30 @@ def marker_errors(
     for j in range(len(translation)):
         for k in range(3):
             translation[j, k] -= origin[k]
+    turn_clusters(
+        turn_joint,
+        marker_turn,
+        position,
+        weight,
+        target,
+        origin,
+        rotation,
+        translation,
+        turned,
+    )
     weighted = plain = 0.0
     for m in range(len(weight)):
         if weight[m] > 0:
             j, square = joint[m], 0.0
+            p0, p1, p2 = position[m, 0], position[m, 1], position[m, 2]
+            if marker_turn[m] >= 0:
+                p0, p1 = turned[m, 0], turned[m, 1]
             for k in range(3):
                 x[m, k] = (
                     translation[j, k]
-                    + rotation[j, k, 0] * position[m, 0]
-                    + rotation[j, k, 1] * position[m, 1]
-                    + rotation[j, k, 2] * position[m, 2]
+                    + rotation[j, k, 0] * p0
+                    + rotation[j, k, 1] * p1
+                    + rotation[j, k, 2] * p2
                 )
                 error[m, k] = x[m, k] - (target[m, k] - origin[k])
                 square += error[m, k] ** 2

@@ -21,12 +21,18 @@ class MarkerProblem(NamedTuple):
 
     `path` and `depth` are the degrees of freedom from the root to each one, and how
     many precede it; see :mod:`ikns._kernels.body.tree_cholesky`. The best start is
-    chosen by limb, from 0 to ``n_branches - 1``.
+    chosen by limb, from 0 to ``n_branches - 1``. K clusters of markers turn about the
+    axis of a joint by an angle of their own; see :mod:`ikns._kernels.body.free_turn`.
     """
 
     tree: Tree
     marker_joint: Indices  # (M,) joint of the tree that carries the marker
-    marker_position: Array  # (M, 3) in that joint's frame, m
+    marker_carrier: (
+        Indices  # (M,) the joint that moves it: of a cluster, the one before
+    )
+    marker_turn: Indices  # (M,) cluster of each marker, or -1
+    turn_joint: Indices  # (K,) joint about whose axis the cluster turns
+    marker_position: Array  # (M, 3) in the frame of its joint, m
     marker_weight: Array  # (M,) zero for markers that are not used
     path: Indices  # (n, D)
     depth: Indices  # (n,)
@@ -57,6 +63,7 @@ class Scratch(NamedTuple):
     target: Array
     x: Array
     error: Array
+    turned: Array
     moments: Array
     forces: Array
     gradient: Array
@@ -81,7 +88,8 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
     p, tree = problem, problem.tree
     J, n, M = len(tree.kind), len(p.free), len(p.marker_joint)
     S, nq = p.starts.shape
-    header = [J, n, M, S, nq, p.path.shape[1], p.n_branches, p.max_iterations]
+    D, K = p.path.shape[1], len(p.turn_joint)
+    header = [J, n, M, S, nq, D, p.n_branches, p.max_iterations, K]
     whole = [
         np.array(header),
         tree.kind,
@@ -93,8 +101,11 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
         p.depth,
         p.angle,
         p.marker_joint,
+        p.marker_carrier,
+        p.marker_turn,
         p.marker_branch,
         p.q_branch,
+        p.turn_joint,
     ]
     settings = [p.pull, p.pull_from_scratch, p.limit, p.tolerance, p.lost]
     real = [
@@ -118,13 +129,14 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
 def unpack(whole: Indices, real: Array) -> MarkerProblem:
     """Unpack a problem."""
     J, n, M, S, nq, D = whole[0], whole[1], whole[2], whole[3], whole[4], whole[5]
-    i = 8
+    i, K = 9, whole[8]
     tree_at, i = i, i + 4 * J + n
     path_at, i = i, i + n * D
     depth_at, i = i, i + n
     angle_at, i = i, i + n
-    marker_at, i = i, i + 2 * M
-    branch_at = i
+    marker_at, i = i, i + 4 * M
+    branch_at, i = i, i + nq
+    turn_at = i
     r = 5
     rotation_at, r = r, r + 9 * J
     translation_at, r = r, r + 3 * J
@@ -144,6 +156,9 @@ def unpack(whole: Indices, real: Array) -> MarkerProblem:
     return MarkerProblem(
         tree,
         whole[marker_at : marker_at + M],
+        whole[marker_at + M : marker_at + 2 * M],
+        whole[marker_at + 2 * M : marker_at + 3 * M],
+        whole[turn_at : turn_at + K],
         _table(real, position_at, M, 3),
         real[weight_at : weight_at + M],
         whole[path_at : path_at + n * D].reshape(n, D),
@@ -153,7 +168,7 @@ def unpack(whole: Indices, real: Array) -> MarkerProblem:
         real[dof_at + n : dof_at + 2 * n],
         real[dof_at + 2 * n : dof_at + 3 * n],
         _table(real, starts_at, S, nq),
-        whole[marker_at + M : marker_at + 2 * M],
+        whole[marker_at + 3 * M : marker_at + 4 * M],
         whole[branch_at : branch_at + nq],
         whole[6],
         whole[7],
@@ -174,7 +189,7 @@ def scratch_size(problem: MarkerProblem) -> int:
         35
         + J * (12 + MOMENTS)
         + n * (19 + 3 * D)
-        + 10 * M
+        + 13 * M
         + nq * (4 + S)
         + S * (1 + problem.n_branches)
     )
@@ -193,7 +208,7 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
     e = d + n * 9
     f = e + n * 4
     g = f + n * 3 * D
-    h = g + M * 10
+    h = g + M * 13
     k = h + nq * 4
     m = k + nq * S
     return Scratch(
@@ -205,6 +220,7 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
         _table(work, g + M, M, 3),
         _table(work, g + 4 * M, M, 3),
         _table(work, g + 7 * M, M, 3),
+        _table(work, g + 10 * M, M, 3),
         _table(work, b, J, MOMENTS),
         _table(work, d, n, 9),
         work[e : e + n],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -34,6 +34,10 @@ class Markers:
                 for f, m in zip(frames, marker_set.markers, strict=True)
             ]
         ).reshape(-1, 3)
+        # Which markers each joint moves.
+        self._beyond = [
+            np.isin(self.joint, list(subtree)) for subtree in model.subtrees
+        ]
         self._carried = []
         for joint in np.unique(self.joint):
             rows = np.flatnonzero(self.joint == joint)
@@ -79,14 +83,37 @@ class Markers:
             carrier = self._carrier[segment]
             rotation = data.oMi[carrier].rotation
             for joint in model.children[carrier]:
-                moved = np.isin(self.joint, list(model.subtrees[joint]))
-                by_size[moved, :, s] = (
+                by_size[self._beyond[joint], :, s] = (
                     rotation @ model.jointPlacements[joint].translation
                 )
             own = self.joint == carrier
             by_size[own, :, s] = along[own] @ rotation.T
         by_place = np.stack([data.oMi[int(j)].rotation for j in self.joint])
         return by_size, by_place
+
+    def by_tilt(self, q: Array, tilts: Sequence[tuple[str, int]]) -> Array:
+        """Differentiate by tilts of joints, (M, 3, K) m/rad.
+
+        A tilt is a joint and the axis of its frame, 0 to 2, about which it turns before
+        it moves.
+        """
+        model, data = self._model, self._data
+        pin.forwardKinematics(model, data, q)
+        positions = self._positions()
+        joints = [model.getJointId(name) for name, _ in tilts]
+        frames = [
+            data.oMi[model.parents[joint]] * model.jointPlacements[joint]
+            for joint in joints
+        ]
+        axes = np.array(
+            [
+                frame.rotation[:, component]
+                for frame, (_, component) in zip(frames, tilts, strict=True)
+            ]
+        )
+        arms = positions[:, None] - np.array([frame.translation for frame in frames])
+        moved = np.stack([self._beyond[joint] for joint in joints], axis=1)
+        return np.swapaxes(np.cross(axes, arms) * moved[..., None], 1, 2)
 
     def _positions(self) -> Array:
         positions = np.empty_like(self.in_joint)

@@ -11,7 +11,7 @@ alone, (..., 18), and returns NaN where they hold NaN.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from ikns._kernels.body.tree import Tree
 from ikns.arrays import Array, Indices
 from ikns.body.anthropometry import Segment, segments
 from ikns.body.chains import SIDES
+from ikns.body.joint_axes import tilt_urdf
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import (
     GENERIC_STATURE,
@@ -212,6 +213,10 @@ class Skeleton:
         return self._frames.paths(links)
 
     @cached_property
+    def _along(self) -> Array:
+        return part_along(self.urdf, self.marker_set, self._markers.in_joint)
+
+    @cached_property
     def _frames(self) -> LinkFrames:
         return LinkFrames(self._model)
 
@@ -230,8 +235,19 @@ class Skeleton:
         :data:`ikns.body.model_file.SEGMENTS`, (M, 3, S) m, and d position / d (marker
         position in its link), which is the link's orientation, (M, 3, 3).
         """
-        along = part_along(self.urdf, self.marker_set, self._markers.in_joint)
-        return self._markers.by_size(q, along)
+        return self._markers.by_size(q, self._along)
+
+    def tilt_jacobian(self, q: Array, tilts: Sequence[tuple[str, int]]) -> Array:
+        """Differentiate the marker positions by tilts of joints, (M, 3, K) m/rad.
+
+        A tilt is a joint and an axis of its frame, 0 to 2, see
+        :mod:`ikns.body.joint_axes`.
+        """
+        return self._markers.by_tilt(q, tilts)
+
+    def tilted(self, tilts: Mapping[str, Array]) -> Skeleton:
+        """Return a skeleton with joints tilted by rotation vectors (3,) rad."""
+        return Skeleton(tilt_urdf(self.urdf, tilts), self.marker_set)
 
     def link_in_thorax(self, q: ArrayLike, link: str) -> tuple[Array, Array]:
         """Origin of a link, (..., 3) m, and orientation, (..., 3, 3)."""

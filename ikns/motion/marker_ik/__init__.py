@@ -5,5 +5,6 @@ The formula is in `solver`; `kernel` hands it to compiled code.
 
 from ikns.motion.marker_ik.pose import LIMIT, PRIOR, Pose
 from ikns.motion.marker_ik.solver import MarkerIK
+from ikns.motion.marker_ik.turns import turned_markers
 
-__all__ = ["LIMIT", "PRIOR", "MarkerIK", "Pose"]
+__all__ = ["LIMIT", "PRIOR", "MarkerIK", "Pose", "turned_markers"]

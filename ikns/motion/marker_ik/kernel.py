@@ -23,6 +23,7 @@ from ikns.motion.marker_ik.pose import (
     SolvedFrames,
     starting_poses,
 )
+from ikns.motion.marker_ik.turns import turning_clusters
 
 
 def marker_problem(
@@ -44,9 +45,13 @@ def marker_problem(
     lower[-n_joints:], upper[-n_joints:] = skeleton.lower, skeleton.upper
     q_branch = np.full(starts.shape[1], -1, dtype=np.int64)
     q_branch[-n_joints:] = [_side(name) for name in skeleton.joint_names]
+    turn_joint, turn = turning_clusters(skeleton)
     return MarkerProblem(
         tree=skeleton.tree,
         marker_joint=joint,
+        marker_carrier=np.where(turn >= 0, skeleton.tree.parent[joint], joint),
+        marker_turn=turn,
+        turn_joint=turn_joint,
         marker_position=position,
         marker_weight=np.array(weight, dtype=np.float64),
         path=path,

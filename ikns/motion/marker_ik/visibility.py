@@ -39,6 +39,7 @@ class _Segment(NamedTuple):
     before: str  # next such segment on the way to the thorax; empty for the thorax
     joints: list[int]  # joints between the two
     free: int  # how many of these are not held
+    turns: int  # 1 where the markers have a turn of their own, which takes one number
 
 
 def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], int]]:
@@ -72,16 +73,17 @@ def visible_segments(skeleton: Skeleton, markers: Array) -> Visibility:
     seen = {link: count[link] >= segment.need for link, segment in segments.items()}
     determined = {"thorax": seen["thorax"]}
     known: Mask = np.zeros((n, len(skeleton.joint_names)), dtype=bool)
-    for link, (_, _, before, joints, free) in segments.items():
+    for link, (_, _, before, joints, free, turns) in segments.items():
         if link == "thorax":
             continue
         # Markers show three numbers each; what they have left over shows one more.
         spare = np.zeros(n, dtype=bool)
         for other, after in segments.items():
             if after.before == link:
-                spare |= 3 * count[other] > after.free
-        tied = determined[before] & (2 * count[link] + spare >= free)
-        determined[link] = seen[link] & (tied | (count[link] >= _ENOUGH))
+                spare |= 3 * count[other] - after.turns > after.free
+        tied = determined[before] & (2 * count[link] - turns + spare >= free)
+        alone = (count[link] >= _ENOUGH) & (not turns)
+        determined[link] = seen[link] & (tied | alone)
         known.T[joints] = determined[before] & determined[link]
     names, shown = tuple(segments), np.stack(list(seen.values()), axis=1)
     for side in SIDES:
@@ -119,7 +121,13 @@ def segment_pairs(skeleton: Skeleton, chain: str) -> tuple[Indices, Array]:
         How far apart they are on the person, m.
     """
     needs = sight_needs(skeleton, chain).values()
-    found = [pair for columns, _ in needs for pair in combinations(columns, 2)]
+    turns = [marker.free_turn for marker in skeleton.marker_set.markers]
+    found = [
+        pair
+        for columns, _ in needs
+        for pair in combinations(columns, 2)
+        if turns[pair[0]] == turns[pair[1]]
+    ]
     pairs = np.array(found, dtype=np.int64).reshape(-1, 2)
     # On one link, so these are its own coordinates.
     first, second = skeleton.marker_positions[pairs.T]
@@ -154,16 +162,37 @@ def _segments(skeleton: Skeleton) -> dict[str, _Segment]:
     for link in sorted(columns, key=lambda link: skeleton.tree_link(link)[0]):
         own = columns[link]
         joints, before = _way(skeleton, link, segments)
-        need = max(1, min(_ENOUGH, len(own))) if link == "thorax" else 1
-        segments[link] = _Segment(own, need, before, joints, len(set(joints) - held))
+        turns = int(_turns(skeleton, link))
+        need = max(1, min(_ENOUGH if link == "thorax" else 1 + turns, len(own)))
+        free = len(set(joints) - held)
+        segments[link] = _Segment(own, need, before, joints, free, turns)
     return segments
 
 
 def _way(skeleton: Skeleton, link: str, others: Iterable[str]) -> tuple[list[int], str]:
-    """Joints between a link and the next of others towards the thorax; and that."""
-    carried = {skeleton.tree_link(other)[0]: other for other in others}
-    joints, at = [], skeleton.tree_link(link)[0]
+    """Joints between a link and the next of others towards the thorax; and that.
+
+    A link of which only clusters with a free turn are seen does not show its own joint.
+    """
+    carried = {_shown(skeleton, other): other for other in others}
+    joints, at = [], _shown(skeleton, link)
     while at > 0 and at not in carried:
         joints.append(at - 1)
         at = int(skeleton.tree.parent[at])
     return joints, carried.get(at, "")
+
+
+def _shown(skeleton: Skeleton, link: str) -> int:
+    """Last joint of the tree that the markers of a link show."""
+    joint = skeleton.tree_link(link)[0]
+    return int(skeleton.tree.parent[joint]) if _turns(skeleton, link) else joint
+
+
+def _turns(skeleton: Skeleton, link: str) -> bool:
+    """Whether a link is seen by markers with a free turn only."""
+    own = [
+        marker.free_turn
+        for marker in skeleton.marker_set.markers
+        if marker.link == link and not marker.static_only and marker.weight > 0
+    ]
+    return bool(own) and all(own)
