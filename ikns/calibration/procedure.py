@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from ikns.body.chains import chain_joints, chain_sides
-from ikns.body.marker_set import MarkerSet
+from ikns.arrays import Array, Mask
+from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
-from ikns.calibration.exploration_fit import fit_explorations
-from ikns.calibration.judge.exploration import judge_exploration
-from ikns.calibration.judge.finding import refused
-from ikns.calibration.judge.subjects import other_subject
+from ikns.calibration.measured_body import measured_body
 from ikns.calibration.places import recorded_places
 from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.report import (
@@ -27,12 +23,9 @@ from ikns.calibration.report import (
     points_report,
     static_report,
 )
-from ikns.calibration.scaled_body import scaled_body
-from ikns.calibration.scaling import ScalingReport, scale
 from ikns.calibration.subject import Subject
-from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
+from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion.excursion import other_hand_moves
-from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.marker_ik.rejection import rejection_sentence
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
@@ -136,55 +129,22 @@ def calibrate(
         if not 0 <= seconds < np.inf:
             raise InvalidInput(f"expected {name} of at least 0 s, found {seconds:g}.")
     names = ", ".join(recording.source for recording in explorations)
-    body = Skeleton.load() if generic is None else generic
-    if static is None:
-        if generic is None:
-            raise InvalidInput(
-                "expected a static trial, or a body from stature, mass and sex."
-            )
-        skeleton, scaling = scaled_body(body, explorations, marker_set=marker_set)
-    else:
-        with naming(static.source):
-            skeleton, scaling = scale(
-                body, static, marker_set=marker_set, min_duration=min_static
-            )
-    warned = [
-        sentence
-        for recording in explorations
-        for sentence in _judged(static, recording, skeleton, chain)
-    ]
-    recordings = (*explorations, *natural)
-    tracked = _tracked(skeleton, recordings, chain, progress)
-    fitted = None
-    if static is not None:
-        skeleton, fitted = fit_explorations(
-            body,
-            skeleton,
-            static,
-            explorations,
-            tracked[: len(explorations)],
-            marker_set=marker_set,
-            min_duration=min_static,
-        )
-    if fitted is not None:
-        tracked = _tracked(skeleton, recordings, chain, progress)
-    motions = tracked[: len(explorations)]
+    measured = measured_body(
+        static,
+        explorations,
+        natural,
+        generic=generic,
+        marker_set=marker_set,
+        chain=chain,
+        min_static=min_static,
+        progress=progress,
+    )
+    skeleton, motions = measured.skeleton, measured.explorations
     gates = [
         still_mask(motion, chain, max_hand_speed=max_hand_speed, min_duration=min_rest)
         for motion in motions
     ]
-    other = other_hand_moves(motions, chain, times=_OTHER_SIDE)
-    if not any(gate.any() for gate in gates):
-        raise NotEnoughData(
-            f"{names}: "
-            + no_still_sample(motions, chain, max_hand_speed, min_duration=min_rest)
-            + (f" {_say_side(other, chain)}" if other else "")
-        )
     pairs = list(zip(motions, gates, strict=True))
-    hands = [motion.task_position(chain)[gate] for motion, gate in pairs]
-    x = np.concatenate(hands)
-    q = np.concatenate([motion.chain_angles(chain)[gate] for motion, gate in pairs])
-    posture = np.concatenate([motion.angles[gate] for motion, gate in pairs])
     enough = int(np.ceil(min_still * explorations[0].rate))
     learned = NullSpaceMap(
         n_points,
@@ -193,28 +153,26 @@ def calibrate(
         radius=radius,
         outside=outside,
         interpolation=interpolation,
-        reference=elbow_reference(skeleton, posture.mean(axis=0), chain, n_dof=n_dof),
         # Fewer samples than joints do not determine all components.
         min_samples=max(enough, len(chain_joints(chain)) + 1),
     )
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", MapWarning)
-        with naming(names):
-            try:
-                learned.fit(x, q, groups=recorded_places(hands, n_points=n_points))
-            except NotEnoughData as error:
-                if not other:
-                    raise
-                raise NotEnoughData(f"{error} {_say_side(other, chain)}") from None
+    other = other_hand_moves(motions, chain, times=_OTHER_SIDE)
+    side = f"{_say_side(other, chain)}" if other else ""
+    if not any(gate.any() for gate in gates):
+        found = no_still_sample(motions, chain, max_hand_speed, min_duration=min_rest)
+        raise NotEnoughData(f"{names}: {found} {side}".rstrip())
+    with naming(names):
+        hands, caught = _fit(learned, skeleton, pairs, chain, side)
     with naming(", ".join(recording.source for recording in natural) or names):
         readouts, methods = learn_readouts(
             skeleton,
             learned,
             pairs,
             chain,
-            natural=tracked[len(explorations) :],
+            natural=measured.natural,
             max_hand_speed=max_hand_speed,
         )
+    arms = two_arms_fault(chain, n_dof, learned.n_components_)
     report = {
         "chain": chain,
         "marker_set": skeleton.marker_set.name,
@@ -228,8 +186,8 @@ def calibrate(
             "clusters_start": learned.start_,
         },
         "methods": methods,
-        "static": static_report(static, scaling),
-        "body": body_report(fitted),
+        "static": static_report(static, measured.scaling),
+        "body": body_report(measured.fitted),
         "explorations": [
             exploration_report(recording, motion, gate, chain)
             for recording, (motion, gate) in zip(explorations, pairs, strict=True)
@@ -237,94 +195,50 @@ def calibrate(
         "points": points_report(learned, rate=explorations[0].rate),
         "extrinsic": extrinsic_report(skeleton, pairs, chain),
         "warnings": [
-            *(
-                [_assumed(scaling)]
-                if static is None
-                else _left_out(static, scaling, marker_set, explorations, chain)
-            ),
-            *warned,
+            *measured.warnings,
             *(
                 f"{recording.source}: {left_out}."
                 for recording, motion in zip(explorations, motions, strict=True)
                 if (left_out := rejection_sentence(motion, chain))
             ),
-            *([f"{names}: {_say_side(other, chain)}"] if other else []),
-            *(
-                f"{names}: {fault}."
-                for fault in [two_arms_fault(chain, n_dof, learned.n_components_)]
-                if fault
-            ),
-            *(str(warning.message) for warning in caught),
+            *(f"{names}: {fault}" for fault in (side, arms and f"{arms}.") if fault),
+            *caught,
         ],
     }
-    step = len(x) // _SHOWN + 1
-    shown = np.column_stack([x, learned.labels_ + 1.0])[::step]
+    step = len(hands) // _SHOWN + 1
+    shown = np.column_stack([hands, learned.labels_ + 1.0])[::step]
     return Subject(skeleton, learned, chain, report, motions, shown, readouts)
 
 
-def _assumed(scaling: ScalingReport) -> str:
-    """Say what is not known without a static trial."""
-    arm = [sd for name, sd in scaling.length_sd.items() if name.endswith("arm")]
-    return (
-        "no static trial: segments have the lengths of an average person of this "
-        f"stature, and people differ from that by {1000 * min(arm):.0f} to "
-        f"{1000 * max(arm):.0f} mm (standard deviation of an arm's segments)."
+def _fit(
+    learned: NullSpaceMap,
+    skeleton: Skeleton,
+    pairs: Sequence[tuple[Motion, Mask]],
+    chain: str,
+    side: str,
+) -> tuple[Array, list[str]]:
+    """Fit the map to the still samples; return their hand positions, and warnings.
+
+    `side` is what to add where there are too few.
+    """
+    hands = [motion.task_position(chain)[gate] for motion, gate in pairs]
+    x = np.concatenate(hands)
+    q = np.concatenate([motion.chain_angles(chain)[gate] for motion, gate in pairs])
+    posture = np.concatenate([motion.angles[gate] for motion, gate in pairs])
+    learned.reference = elbow_reference(
+        skeleton, posture.mean(axis=0), chain, n_dof=learned.n_dof
     )
-
-
-def _judged(
-    static: Recording | None, recording: Recording, skeleton: Skeleton, chain: str
-) -> list[str]:
-    """Return warnings of a recording, or refuse it."""
-    worn = skeleton.marker_set
-    # Without a static trial the person's own distances are not known.
-    known = None if static is None else skeleton
-    findings = judge_exploration(recording, worn, skeleton, skeleton=known, chain=chain)
-    if static is not None:
-        findings += other_subject(static, recording, worn)
-    if faults := refused(findings):
-        raise MarkerMismatch(faults[0].sentence)
-    return [finding.sentence for finding in findings if finding.severity == "warn"]
+    places = recorded_places(hands, n_points=learned.n_points)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", MapWarning)
+        try:
+            learned.fit(x, q, groups=places)
+        except NotEnoughData as error:
+            if not side:
+                raise
+            raise NotEnoughData(f"{error} {side}") from None
+    return x, [str(warning.message) for warning in caught]
 
 
 def _say_side(other: str, chain: str) -> str:
     return f"{other[0].upper()}{other[1:]}: {chain} seems to be the wrong side."
-
-
-def _tracked(
-    skeleton: Skeleton,
-    recordings: Sequence[Recording],
-    chain: str,
-    progress: Callable[[str, int, int], None] | None,
-) -> tuple[Motion, ...]:
-    """Marker inverse kinematics of every recording."""
-    solver = MarkerIK(skeleton)
-    return tuple(
-        solver.track(
-            recording,
-            chain=chain,
-            progress=progress and partial(progress, Path(recording.source).name),
-        )
-        for recording in recordings
-    )
-
-
-def _left_out(
-    static: Recording,
-    scaling: ScalingReport,
-    marker_set: str | Path,
-    recordings: Sequence[Recording],
-    chain: str,
-) -> list[str]:
-    """Name markers, of the chain or seen later, that the static trial lacks.
-
-    The other arm's may be missing from all of them: nobody asked for it.
-    """
-    worn = MarkerSet.load(marker_set)
-    own = ("thorax", *chain_sides(chain))
-    counts = np.array([marker.link.startswith(own) for marker in worn.markers])
-    for recording in recordings:
-        markers = worn.pick(recording.labels, recording.markers)
-        counts |= np.isfinite(markers).all(axis=2).any(axis=0)
-    named = [label for label, count in zip(worn.labels, counts, strict=True) if count]
-    return scaling.sentences(static.source, only=named)

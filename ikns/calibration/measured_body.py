@@ -1,0 +1,155 @@
+"""The body of a calibration, measured: scaled, judged, tracked, and fitted again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ikns.body.chains import chain_sides
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.exploration_fit import BodyReport, fit_explorations
+from ikns.calibration.judge.exploration import judge_exploration
+from ikns.calibration.judge.finding import refused
+from ikns.calibration.judge.subjects import other_subject
+from ikns.calibration.scaled_body import scaled_body
+from ikns.calibration.scaling import ScalingReport, scale
+from ikns.errors import InvalidInput, MarkerMismatch, naming
+from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.motion import Motion
+from ikns.recording.recording import Recording
+
+
+class MeasuredBody(NamedTuple):
+    """A person's body and movements."""
+
+    skeleton: Skeleton
+    scaling: ScalingReport
+    fitted: BodyReport | None  # None where the explorations do not show more
+    explorations: tuple[Motion, ...]
+    natural: tuple[Motion, ...]
+    warnings: list[str]
+
+
+def measured_body(
+    static: Recording | None,
+    explorations: Sequence[Recording],
+    natural: Sequence[Recording],
+    *,
+    generic: Skeleton | None,
+    marker_set: str | Path,
+    chain: str,
+    min_static: float,
+    progress: Callable[[str, int, int], None] | None,
+) -> MeasuredBody:
+    """Scale the body, judge and track the recordings; see :func:`ikns.calibrate`."""
+    body = Skeleton.load() if generic is None else generic
+    if static is None:
+        if generic is None:
+            raise InvalidInput(
+                "expected a static trial, or a body from stature, mass and sex."
+            )
+        skeleton, scaling = scaled_body(body, explorations, marker_set=marker_set)
+        missing = [_assumed(scaling)]
+    else:
+        with naming(static.source):
+            skeleton, scaling = scale(
+                body, static, marker_set=marker_set, min_duration=min_static
+            )
+        missing = _left_out(static, scaling, marker_set, explorations, chain)
+    warned = [
+        sentence
+        for recording in explorations
+        for sentence in _judged(static, recording, skeleton, chain)
+    ]
+    recordings = (*explorations, *natural)
+    tracked = _tracked(skeleton, recordings, chain, progress)
+    fitted = None
+    if static is not None:
+        skeleton, fitted = fit_explorations(
+            body,
+            skeleton,
+            static,
+            explorations,
+            tracked[: len(explorations)],
+            marker_set=marker_set,
+            min_duration=min_static,
+        )
+    if fitted is not None:
+        tracked = _tracked(skeleton, recordings, chain, progress)
+    return MeasuredBody(
+        skeleton,
+        scaling,
+        fitted,
+        tracked[: len(explorations)],
+        tracked[len(explorations) :],
+        [*missing, *warned],
+    )
+
+
+def _assumed(scaling: ScalingReport) -> str:
+    """Say what is not known without a static trial."""
+    arm = [sd for name, sd in scaling.length_sd.items() if name.endswith("arm")]
+    return (
+        "no static trial: segments have the lengths of an average person of this "
+        f"stature, and people differ from that by {1000 * min(arm):.0f} to "
+        f"{1000 * max(arm):.0f} mm (standard deviation of an arm's segments)."
+    )
+
+
+def _judged(
+    static: Recording | None, recording: Recording, skeleton: Skeleton, chain: str
+) -> list[str]:
+    """Return warnings of a recording, or refuse it."""
+    worn = skeleton.marker_set
+    # Without a static trial the person's own distances are not known.
+    known = None if static is None else skeleton
+    findings = judge_exploration(recording, worn, skeleton, skeleton=known, chain=chain)
+    if static is not None:
+        findings += other_subject(static, recording, worn)
+    if faults := refused(findings):
+        raise MarkerMismatch(faults[0].sentence)
+    return [finding.sentence for finding in findings if finding.severity == "warn"]
+
+
+def _tracked(
+    skeleton: Skeleton,
+    recordings: Sequence[Recording],
+    chain: str,
+    progress: Callable[[str, int, int], None] | None,
+) -> tuple[Motion, ...]:
+    """Marker inverse kinematics of every recording."""
+    solver = MarkerIK(skeleton)
+    return tuple(
+        solver.track(
+            recording,
+            chain=chain,
+            progress=progress and partial(progress, Path(recording.source).name),
+        )
+        for recording in recordings
+    )
+
+
+def _left_out(
+    static: Recording,
+    scaling: ScalingReport,
+    marker_set: str | Path,
+    recordings: Sequence[Recording],
+    chain: str,
+) -> list[str]:
+    """Name markers, of the chain or seen later, that the static trial lacks.
+
+    The other arm's may be missing from all of them: nobody asked for it.
+    """
+    worn = MarkerSet.load(marker_set)
+    own = ("thorax", *chain_sides(chain))
+    counts = np.array([marker.link.startswith(own) for marker in worn.markers])
+    for recording in recordings:
+        markers = worn.pick(recording.labels, recording.markers)
+        counts |= np.isfinite(markers).all(axis=2).any(axis=0)
+    named = [label for label, count in zip(worn.labels, counts, strict=True) if count]
+    return scaling.sentences(static.source, only=named)
