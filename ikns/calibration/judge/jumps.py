@@ -1,8 +1,8 @@
 """Markers that jump from one frame to the next: to another's place, or anywhere.
 
 Each position is compared with where the marker was, and with where its speed would have
-carried it. A label that changes to another trajectory breaks both, and the other label
-breaks them at the same frame in the opposite way: no body moves so.
+carried it. When two labels are exchanged, the line from one marker to the other turns
+round within a frame: no body does.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from ikns.arrays import Array, Mask
 
 #: Smaller jumps are not looked at, m: markers closer than this are one place.
 _SHORTEST = 0.012
-#: Largest distance from the other's place, over the distance jumped.
+#: How far the line between two exchanged markers may miss the opposite of what it was,
+#: over its length.
 _EXCHANGED = 0.4
 #: A marker that jumps alone leaves its path by more than this, m, and faster than a
 #: hand that hits something, m/s^2 (60 g).
@@ -64,13 +65,7 @@ def find_jumps(time: Array, markers: Array) -> Jumps:
     alone: dict[int, list[int]] = {}
     for t in np.flatnonzero((jump > _SHORTEST).any(axis=1)):
         found = np.flatnonzero(jump[t] > _SHORTEST)
-        to = markers[t, found][:, None]
-        off = np.minimum(
-            _norm(to - here[t, found][None]), _norm(to - ahead[t, found][None])
-        )
-        limit = _EXCHANGED * jump[t, found]
-        pairs = (off < limit[:, None]) & (off < limit[None])
-        pairs &= pairs.T
+        pairs = _turned(here[t, found], markers[t, found])
         for i, j in np.argwhere(np.triu(pairs, 1)):
             pair = int(found[i]), int(found[j])
             events.setdefault(pair, []).append(int(t))
@@ -83,6 +78,25 @@ def find_jumps(time: Array, markers: Array) -> Jumps:
         {pair: _between(at, n) for pair, at in events.items()},
         {marker: _between(at, n) for marker, at in alone.items()},
     )
+
+
+def _turned(before: Array, now: Array) -> Mask:
+    """Which two of K markers, (K, 3) m each, have changed places, (K, K).
+
+    The line from one to the other points the other way, and its middle stays nearby: so
+    it does not matter how the two move meanwhile. Of several, the best match counts.
+    """
+    line = before[:, None] - before[None]
+    apart = _norm(line)
+    over = _norm(line + now[:, None] - now[None])
+    way = now - before
+    middle = _norm(way[:, None] + way[None]) / 2
+    limit = _EXCHANGED * apart
+    likely = (over < limit) & (middle < np.maximum(limit, _ASTRAY))
+    likely &= apart > _SHORTEST
+    score = np.where(likely, over / np.maximum(apart, _SHORTEST), np.inf)
+    best = score == score.min(axis=1, keepdims=True)
+    return np.asarray(likely & best & best.T)
 
 
 def _between(events: list[int], n: int) -> Mask:

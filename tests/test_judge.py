@@ -1,0 +1,300 @@
+"""What the judge says of static trials and recordings, clean and wrong."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import ikns
+from ikns.body.marker_set import MarkerSet
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.recordings import check_recordings
+from ikns.calibration.scaling import judge_static, scale
+from ikns.cli import main
+from ikns.errors import FileError, InvalidInput, MarkerMismatch, NotEnoughData
+from ikns.recording.files import read, write_c3d
+from ikns.recording.recording import Recording
+
+RATE = 50.0
+REST = {"elbow_flexion": 1.0, "shoulder_abduction": 0.3, "forearm_pronation": 0.2}
+
+
+@cache
+def generic() -> Skeleton:
+    return Skeleton.load()
+
+
+def pose(body: Skeleton, angles: dict[str, float]) -> np.ndarray:
+    """Both arms at these angles, rad."""
+    q = body.neutral()
+    for i, name in enumerate(body.joint_names):
+        q[7 + i] = angles.get(name.split("_", 1)[1], 0.0)
+    return q
+
+
+def recorded(body: Skeleton, poses: list[np.ndarray], source: str) -> Recording:
+    """Put the markers where the poses have them, with 0.3 mm of noise."""
+    markers = np.array([body.markers_in_world(q) for q in poses])
+    markers += np.random.default_rng(1).normal(0, 3e-4, markers.shape)
+    labels = [f"Ann:{label}" for label in body.marker_set.labels]
+    return Recording(np.arange(len(poses)) / RATE, markers, labels, source)
+
+
+@cache
+def standing() -> Recording:
+    return recorded(generic(), [pose(generic(), REST)] * 60, "static.c3d")
+
+
+@cache
+def reaching(body: Skeleton | None = None) -> Recording:
+    """Elbows, shoulders and wrists bend to and fro for four seconds."""
+    poses = []
+    for t in np.arange(200) / RATE:
+        moved = {
+            "elbow_flexion": 1.0 + 0.6 * np.sin(2 * t),
+            "shoulder_flexion": 0.5 + 0.5 * np.sin(1.3 * t),
+            "shoulder_abduction": 0.3 + 0.2 * np.sin(0.7 * t),
+            "forearm_pronation": 0.7 * np.sin(1.1 * t),
+            "wrist_flexion": 0.5 * np.sin(1.7 * t),
+        }
+        poses.append(pose(body or generic(), moved))
+    return recorded(body or generic(), poses, "reaching.c3d")
+
+
+def changed(recording: Recording, markers: np.ndarray) -> Recording:
+    return Recording(recording.time, markers, recording.labels, recording.source)
+
+
+def swapped(recording: Recording, a: str, b: str, rows=slice(None)) -> Recording:
+    i, j = (recording.labels.index(f"Ann:{name}") for name in (a, b))
+    markers = np.array(recording.markers)
+    markers[rows, i] = recording.markers[rows, j]
+    markers[rows, j] = recording.markers[rows, i]
+    return changed(recording, markers)
+
+
+@cache
+def person() -> Skeleton:
+    return scale(generic(), standing())[0]
+
+
+def check(recording: Recording):
+    """Judge a recording of the person of the static trial."""
+    return check_recordings([recording], skeleton=person())
+
+
+def test_a_clean_person_passes():
+    found = check_recordings([reaching(), standing()], static=standing())
+    assert found.usable
+    assert not found.findings
+    alone = check_recordings([reaching(), standing()])
+    assert not alone.findings
+    assert [kind for _, kind in alone.judged] == [
+        "movement, by itself",
+        "static trial",
+    ]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("RWRA", "RWRB"),  # pronation 144 deg off, every residual below 0.3 mm
+        ("RELB", "RMEP"),
+        ("LFIN", "LWRA"),
+        ("C7", "CLAV"),
+        ("RSHO", "LSHO"),
+    ],
+)
+def test_names_exchanged_everywhere_are_refused_with_what_repairs_them(names):
+    static = swapped(standing(), *names)
+    with pytest.raises(MarkerMismatch) as caught:
+        scale(generic(), static)
+    sentence = str(caught.value)
+    assert sentence.startswith("static.c3d: ")
+    pairs = {f"exchange {a} and {b}:" for a, b in (names, names[::-1])}
+    assert any(pair in sentence for pair in pairs), sentence
+
+
+def test_both_wrists_exchanged_are_mended_together():
+    static = swapped(swapped(standing(), "RWRA", "RWRB"), "LWRA", "LWRB")
+    (found,) = judge_static(generic(), static).findings
+    assert found.kind == "exchanged"
+    assert set(found.markers) == {"RWRA", "RWRB", "LWRA", "LWRB"}
+
+
+def test_a_mirror_image_is_told():
+    for markers in (
+        standing().markers * [1.0, 1.0, -1.0],
+        standing().markers[:, [*range(4), *range(14, 24), *range(4, 14)]],
+    ):
+        (found,) = judge_static(generic(), changed(standing(), markers)).findings
+        assert found.kind == "mirrored"
+        assert found.severity == "refuse"
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1 / 25.4, 0.1, 10.0, 25.4, 1e3])
+def test_another_unit_is_refused_in_either_recording(factor):
+    static = changed(standing(), factor * standing().markers)
+    with pytest.raises(MarkerMismatch, match="unit"):
+        scale(generic(), static)
+    moving = changed(reaching(), factor * reaching().markers)
+    for found in (check(moving), check_recordings([moving])):
+        assert [finding.kind for finding in found.findings] == ["unit"]
+        assert not found.usable
+
+
+def test_a_person_who_moves_is_refused_and_a_ghost_is_left_out():
+    with pytest.raises(NotEnoughData, match=r"static\.c3d: the person moved: .FIN by"):
+        scale(generic(), changed(standing(), reaching().markers[:60]))
+    markers = np.array(standing().markers)
+    markers[20:30, 5] += 0.5
+    clean, _ = scale(generic(), standing())
+    ghost, report = scale(generic(), changed(standing(), markers))
+    assert "in frames 21-30" in report.warnings[0]
+    for name, length in clean.segment_lengths.items():
+        # Ten of sixty frames fewer: the mean of 0.3 mm of noise changes by less than
+        # 0.3 / sqrt(50) mm, four times that for the fit's two ends and chance.
+        assert abs(ghost.segment_lengths[name] - length) < 2e-4
+
+
+def test_numbers_for_not_seen_are_refused_with_the_marker():
+    for number in (-16.512, 9999.999):
+        for recording in (standing(), reaching()):
+            markers = np.array(recording.markers)
+            markers[10:20, 9] = number
+            wrong = changed(recording, markers)
+            (found,) = check_recordings([wrong]).findings
+            assert (found.kind, found.severity) == ("not seen", "refuse")
+            assert found.markers == (generic().marker_set.labels[9],)
+            assert found.frames == "11-20"
+
+
+@pytest.mark.parametrize(
+    "names", [("RWRA", "RFIN"), ("RELB", "LELB"), ("RUPA", "RFRM"), ("RSHO", "LSHO")]
+)
+def test_names_exchanged_in_a_recording_are_told(names):
+    assert names[0] in generic().marker_set.labels
+    for rows in (slice(None), slice(50, 110), slice(50, 60)):
+        found = check(swapped(reaching(), *names, rows))
+        told = found.findings[0]
+        assert told.kind == "exchanged"
+        assert set(told.markers) == set(names)
+        assert found.usable == (rows != slice(None))
+        assert told.frames == ("" if found.usable is False else f"51-{rows.stop}")
+
+
+def test_a_marker_put_elsewhere_is_told():
+    markers = np.array(reaching().markers)
+    first, second = (reaching().labels.index(f"Ann:{m}") for m in ("RFRM", "RWRA"))
+    line = markers[:, first] - markers[:, second]
+    markers[:, first] += 0.03 * line / np.linalg.norm(line, axis=1, keepdims=True)
+    (found,) = check(changed(reaching(), markers)).findings
+    assert (found.kind, found.severity) == ("marker moved", "warn")
+    assert "30 mm farther apart" in found.found
+
+
+def test_another_persons_static_trial_is_told_by_distances_and_by_name():
+    rng = np.random.default_rng(3)
+    worn = generic().marker_set
+    # Two people's markers differ by as much as the set says they are misplaced.
+    places = generic().marker_positions + rng.normal(
+        0, [m.placement_sd for m in worn.markers]
+    )
+    other = generic().with_markers(worn.at(places))
+    found = check(reaching(other))
+    assert "another person" in [finding.kind for finding in found.findings]
+    assert not found.usable
+    labels = [label.replace("Ann", "Ben") for label in standing().labels]
+    ben = Recording(standing().time, standing().markers, labels, "ben.c3d")
+    (found,) = check_recordings([reaching()], static=ben).findings
+    assert found.kind == "another person"
+    assert "ben" in found.found
+    assert not found.right == ""
+
+
+def test_a_body_of_no_adult_is_told():
+    tall = generic().resized(dict.fromkeys(generic().segment_lengths, 1.35))
+    findings = judge_static(
+        generic(), recorded(tall, [pose(tall, REST)] * 60, "tall.c3d")
+    ).findings
+    assert "length" in [finding.kind for finding in findings]
+
+
+def test_a_marker_set_in_meters_is_refused(tmp_path):
+    worn = MarkerSet.load("oxford24")
+    for factor in (1e-3, 1e3):
+        wrong = tuple(
+            replace(m, position=tuple(factor * x for x in m.position))
+            for m in worn.markers
+        )
+        path = tmp_path / "own.toml"
+        path.write_text(replace(worn, markers=wrong).toml(), encoding="utf-8")
+        with pytest.raises(FileError, match=r"own\.toml: .* unit"):
+            MarkerSet.load(path)
+
+
+def test_either_a_static_trial_or_a_person():
+    with pytest.raises(InvalidInput, match="both"):
+        check_recordings([reaching()], static=standing(), skeleton=person())
+
+
+def test_the_command_exits_with_2_only_for_what_must_not_be_used(tmp_path, capsys):
+    paths = {}
+    for name, recording in (
+        ("static", standing()),
+        ("reaching", reaching()),
+        ("wrong", swapped(standing(), "RELB", "RMEP")),
+    ):
+        paths[name] = tmp_path / f"{name}.c3d"
+        write_c3d(paths[name], recording)
+    clean = ["check", str(paths["reaching"]), "--static", str(paths["static"])]
+    assert main(clean) == 0
+    assert "Nothing is wrong." in capsys.readouterr().out
+    wrong = ["check", str(paths["reaching"]), "--static", str(paths["wrong"])]
+    assert main(wrong) == 2
+    out, err = capsys.readouterr()
+    assert "do not use" in out
+    assert err.count("\n") == 1
+    assert "exchange RELB and RMEP" in err
+    assert main([*wrong, "--json"]) == 2
+    result = json.loads(capsys.readouterr().out)
+    assert result["usable"] is False
+    assert result["findings"][0]["markers"] == ["RELB", "RMEP"]
+
+
+def test_real_people_pass_and_their_wrong_recordings_do_not(data):
+    folder = data / "ue_adl"
+    if len(list(folder.glob("ADL*"))) < 3:
+        pytest.skip(f"the people of UE_ADL are not in {folder}")
+    statics = {}
+    for name in ("ADL003", "ADL008"):
+        static = statics[name] = read(folder / name / f"{name}_static.csv")
+        files = [folder / name / f"{name}{trial}.csv" for trial in ("CL1", "FR1")]
+        found = check_recordings(
+            [read(path) for path in files], static=static, marker_set="ue_adl"
+        )
+        assert [f for f in found.findings if f.severity != "note"] == []
+    reach = read(folder / "ADL008" / "ADL008FR1.csv")
+    found = check_recordings([reach], static=statics["ADL003"], marker_set="ue_adl")
+    assert found.findings[0].kind == "another person"
+    markers = np.array(statics["ADL008"].markers)
+    labels = [label.partition(":")[2] for label in statics["ADL008"].labels]
+    pair = [labels.index("RSPR"), labels.index("RSPU")]
+    markers[:, pair] = markers[:, pair[::-1]]
+    (told, *_) = judge_static(
+        generic(),
+        changed(statics["ADL008"], markers),
+        marker_set="ue_adl",
+        min_duration=0.5,
+    ).findings
+    assert told.kind == "exchanged"
+    assert told.markers == ("RSPR", "RSPU")
+    lifts = sorted((data / "stoop").glob("*.c3d"))
+    neutral = read(lifts[0])
+    found = check_recordings(
+        [read(lifts[1])], static=neutral, marker_set="plug_in_gait"
+    )
+    assert not found.findings
+    assert ikns.check_recordings is check_recordings

@@ -1,0 +1,149 @@
+"""The judge of single traces, and of names that are exchanged for a while."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ikns.calibration.judge.distances import all_distances, exchanged_by_distance
+from ikns.calibration.judge.finding import say_frames
+from ikns.calibration.judge.jumps import find_jumps
+from ikns.calibration.judge.traces import frozen, stand_ins
+from ikns.calibration.judge.unit import wrong_unit
+
+RATE, FRAMES, MARKERS = 100.0, 120, 6
+TIME = np.arange(FRAMES) / RATE
+
+
+def swinging(seed: int) -> np.ndarray:
+    """Six markers at least 60 mm apart, each swinging by up to 0.3 m at up to 1 Hz.
+
+    Noise of 1 mm turns the line between two by less than a tenth, and a step of 33 mm
+    is less than the 60 mm by which a ghost leaves its path.
+    """
+    rng = np.random.default_rng(seed)
+    places = np.arange(MARKERS)[:, None] * [0.06, 0.02, 0.0]
+    phase = rng.uniform(0, 2 * np.pi, 3)
+    swing = rng.uniform(0.05, 0.3) * np.sin(2 * np.pi * TIME[:, None] + phase)
+    noise = rng.normal(0, 1e-3, (FRAMES, MARKERS, 3))
+    return places + swing[:, None] + noise
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=20)
+def test_ordinary_movement_is_no_jump(seed):
+    found = find_jumps(TIME, swinging(seed))
+    assert not found.exchanged
+    assert not found.astray
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    pair=st.lists(st.integers(0, MARKERS - 1), min_size=2, max_size=2, unique=True),
+    first=st.integers(1, 80),
+    count=st.integers(1, 35),
+)
+@settings(max_examples=40)
+def test_two_names_exchanged_for_a_while_are_told_with_their_frames(
+    seed, pair, first, count
+):
+    markers = swinging(seed)
+    rows = slice(first, first + count)
+    markers[rows, pair] = markers[rows, pair[::-1]]
+    found = find_jumps(TIME, markers)
+    assert list(found.exchanged) == [tuple(sorted(pair))]
+    (frames,) = found.exchanged.values()
+    assert np.flatnonzero(frames).tolist() == list(range(first, first + count))
+    assert not found.astray
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    marker=st.integers(0, MARKERS - 1),
+    first=st.integers(1, 80),
+    count=st.integers(1, 35),
+    # Beyond the markers' row, which is 0.3 m long and swings by as much.
+    away=st.floats(0.7, 5.0),
+)
+@settings(max_examples=40)
+def test_a_ghost_is_told_with_its_frames(seed, marker, first, count, away):
+    markers = swinging(seed)
+    markers[first : first + count, marker] += [0.0, 0.0, away]
+    found = find_jumps(TIME, markers)
+    assert list(found.astray) == [marker]
+    inside = np.flatnonzero(found.astray[marker]).tolist()
+    assert inside == list(range(first, first + count))
+    assert not found.exchanged
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    number=st.sampled_from([-16.512, 9999.999, 0.0, -1.0, 1e-3]),
+    marker=st.integers(0, MARKERS - 1),
+    rows=st.sets(st.integers(0, FRAMES - 1), min_size=1, max_size=60),
+)
+@settings(max_examples=40)
+def test_numbers_that_stand_for_not_seen_are_found_and_nothing_else(
+    seed, number, marker, rows
+):
+    markers = swinging(seed)
+    assert not stand_ins(markers).any()
+    markers[sorted(rows), marker] = number
+    found = np.argwhere(stand_ins(markers))
+    assert found.tolist() == [[row, marker] for row in sorted(rows)]
+
+
+def test_two_markers_at_one_place_are_a_number_for_not_seen():
+    markers = swinging(1)
+    markers[40:50, [2, 4]] = [0.3, 1.2, 0.4]
+    found = stand_ins(markers)
+    assert np.flatnonzero(found.any(axis=1)).tolist() == list(range(40, 50))
+    assert np.flatnonzero(found.any(axis=0)).tolist() == [2, 4]
+
+
+def test_a_frozen_marker_is_told_unless_everything_rests():
+    markers = swinging(2)
+    markers[30:80, 3] = markers[30, 3]
+    found = frozen(TIME, markers)
+    assert np.flatnonzero(found.any(axis=0)).tolist() == [3]
+    assert say_frames(found[:, 3]) == "31-80"
+    resting = np.tile(markers[:1], (FRAMES, 1, 1))
+    assert not frozen(TIME, resting).any()
+
+
+def test_no_frames_and_no_markers_have_no_faults():
+    for shape in ((0, 3, 3), (1, 3, 3), (5, 0, 3)):
+        markers = np.full(shape, np.nan)
+        time = np.arange(shape[0]) / RATE
+        assert not any(find_jumps(time, markers))
+        assert not stand_ins(markers).any()
+        assert not frozen(time, markers).any()
+
+
+@given(seed=st.integers(0, 10**6), a=st.integers(0, 2), b=st.integers(3, 5))
+@settings(max_examples=20)
+def test_two_rigid_bodies_with_names_exchanged_between_them_are_mended(seed, a, b):
+    rng = np.random.default_rng(seed)
+    bodies = rng.normal(0, 0.1, (MARKERS, 3))
+    # The second body goes 0.5 m away and back; all distances between the two change.
+    way = 0.5 * np.sin(np.pi * TIME / TIME[-1])
+    markers = np.tile(bodies, (FRAMES, 1, 1))
+    markers[:, 3:, 0] += 1.0 + way[:, None]
+    markers += rng.normal(0, 1e-3, markers.shape)
+    pairs = np.array([[0, 1], [0, 2], [1, 2], [3, 4], [3, 5], [4, 5]])
+    assert exchanged_by_distance(all_distances(markers), pairs, None)[0] == []
+    markers[:, [a, b]] = markers[:, [b, a]]
+    exchanges, left = exchanged_by_distance(all_distances(markers), pairs, None)
+    assert exchanges == [(a, b)]
+    assert not left.any()
+
+
+@given(
+    person=st.floats(0.75, 1.3),
+    factor=st.sampled_from([0.001, 0.01, 1 / 25.4, 0.1, 10.0, 25.4, 100.0, 1000.0]),
+)
+def test_every_mistake_of_units_is_named_whatever_the_persons_size(person, factor):
+    assert wrong_unit(person) is None
+    found = wrong_unit(person * factor)
+    assert found is not None
+    assert np.isclose(found[0], factor)
+    assert found[1]
