@@ -48,8 +48,15 @@ def test_every_chain_and_task_is_in_the_json(result: dict) -> None:
         assert len(each["points"][0]["direction"][0]) == joints
         low, high = each["pooled"]["leak_m"]["interval"]
         assert 0 <= low < high
+        assert low <= each["pooled"]["leak_corrected_m"]["value"] <= high
     assert result["simulated"] is True
-    assert result["settings"] == {"resamples": 20, "seed": 0, "level": 0.95}
+    assert result["settings"] == {
+        "resamples": 20,
+        "seed": 0,
+        "level": 0.95,
+        "max_hand_speed_m_s": 0.05,  # as calibrated
+        "min_duration_s": 0.0,
+    }
     assert result["crosstalk"]["reaches"] == len(result["crosstalk"]["changes"]) > 0
 
 

@@ -104,5 +104,12 @@ def compare_visited(
         **gate,
         reference=some.directions_.sum(axis=0),
     )
-    found = compare(some, analytic, motion, chain=chain, **gate)
+    found = compare(
+        some,
+        analytic,
+        motion,
+        chain=chain,
+        max_hand_speed=max_hand_speed,
+        min_duration=min_duration,
+    )
     return VisitedComparison(counts, points, some, analytic, found)

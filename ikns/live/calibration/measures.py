@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
+from ikns.motion.marker_ik.rejection import rejection_sentence
+from ikns.motion.motion import Motion
 from ikns.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -19,18 +21,12 @@ SEEN_SHARE = 0.5
 
 
 def tracking_fault(
-    skeleton: Skeleton,
-    recording: Recording,
-    known: NDArray[np.bool_],
-    *,
-    chain: str,
+    skeleton: Skeleton, recording: Recording, motion: Motion, *, chain: str
 ) -> str:
     """Describe a fault of markers or tracking; empty if there is none.
 
     A fault of some frames only is none, as these can be left out.
     """
-    if known.mean() < SEEN_SHARE:
-        return f"The arm was in sight in {percent(known):.0f} % of the frames only."
     findings = judge_exploration(
         recording, skeleton.marker_set, skeleton, skeleton=skeleton, chain=chain
     )
@@ -39,7 +35,12 @@ def tracking_fault(
             finding.severity == "warn" and not finding.frames
         ):
             return finding.reason[0].upper() + finding.reason[1:]
-    return ""
+    known = np.isfinite(motion.hand_speed(chain))
+    if known.mean() >= SEEN_SHARE:
+        return ""
+    if left_out := rejection_sentence(motion, chain):
+        return f"Only {percent(known):.0f} % of the frames can be used: {left_out}."
+    return f"The arm was in sight in {percent(known):.0f} % of the frames only."
 
 
 def missing_percent(recording: Recording, skeleton: Skeleton) -> float:

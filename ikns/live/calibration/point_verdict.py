@@ -86,7 +86,7 @@ def judge_point(
     }
     # As in the calibration, which leaves points with fewer samples out.
     enough = max(int(np.ceil(min_still * recording.rate)), len(chain_joints(chain)) + 1)
-    reason = tracking_fault(skeleton, recording, known, chain=chain)
+    reason = tracking_fault(skeleton, recording, motion, chain=chain)
     if gate.sum() < enough:
         speed = median(motion.hand_speed(chain))
         return Verdict(

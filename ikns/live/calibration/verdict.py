@@ -181,7 +181,7 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
         return Verdict(False, False, "The hand was hardly ever in sight.", values)
     box = minimum_bounding_box(explored)
     values["box_cm"] = np.round(200 * box.half_lengths, 1).tolist()
-    reason = tracking_fault(skeleton, recording, known, chain=chain)
+    reason = tracking_fault(skeleton, recording, motion, chain=chain)
     if not reason and 2 * box.half_lengths.min() < LEAST_BOX:
         reason = (
             f"The hand explored a volume only {200 * box.half_lengths.min():.0f} cm "

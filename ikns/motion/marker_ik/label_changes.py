@@ -167,8 +167,8 @@ def exchanges(
         wrong[i], late, mended = watch.step(frame, 1 / rate if i else np.nan, error[i])
         if late:
             own = mended ^ wrong[i - 1]
-            shown = np.isfinite(worn[i - late : i, own])
-            hidden = np.logical_not(shown.all(axis=(1, 2)))
+            shown = np.isfinite(worn[i - late : i, own]).all(axis=(1, 2))
+            hidden = np.asarray(~shown)
             wrong[i - late + _step(error[i - late : i], hidden) : i] = mended
     ways, way = np.unique(wrong, axis=0, return_inverse=True)
     way = way.reshape(-1)
