@@ -269,6 +269,22 @@ def test_what_is_no_storage_file_is_refused(tmp_path, text, complaint):
         read_storage(path)
 
 
+@settings(max_examples=60, deadline=None)
+@given(changes=st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1))
+def test_flipped_bytes_survive(tmp_path_factory, changes):
+    content = bytearray(STATES.encode())
+    for place, byte in changes:
+        content[place % len(content)] = byte
+    path = tmp_path_factory.mktemp("flipped") / "flipped.sto"
+    path.write_bytes(content)
+    try:
+        found = read_storage(path)
+    except FileError as error:
+        assert str(error).isprintable()  # noqa: PT017
+    else:
+        assert found.values.shape == (len(found.time), len(found.names))
+
+
 def test_angles_go_from_format_to_format(tmp_path):
     write_storage(tmp_path / "a.mot", TABLE)
     assert convert_file(tmp_path / "a.mot", tmp_path / "b.csv").kind == "joint angles"
