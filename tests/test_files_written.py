@@ -105,6 +105,44 @@ def test_a_part_is_converted(tmp_path):
     np.testing.assert_allclose(part.time, [0.21, 0.22, 0.23], atol=1e-9)
 
 
+def markers_by_the_book(path):
+    """Read a TRC file as OpenSim documents it: every cell ends with a tab."""
+    lines = path.read_text().split("\n")
+    labels = lines[3].split("\t")[2::3]
+    rows = [line.split("\t") for line in lines[6:-1]]
+    assert {len(row) for row in rows} == {2 + 3 * len(labels) + 1}
+    table = np.array([[float(cell or "nan") for cell in row[:-1]] for row in rows])
+    return labels, table[:, 1], table[:, 2:].reshape(len(rows), len(labels), 3)
+
+
+def markers_by_opensim(path):
+    import opensim
+
+    found = opensim.TimeSeriesTableVec3(str(path))
+    labels = list(found.getColumnLabels())
+    time = np.array(found.getIndependentColumn())
+    matrix, size = found.getMatrix(), (len(time), len(labels))
+    places = [[matrix.getElt(*at)[k] for k in range(3)] for at in np.ndindex(*size)]
+    return labels, time, np.array(places).reshape(*size, 3)
+
+
+@pytest.mark.parametrize(
+    "reader",
+    [markers_by_the_book]
+    + [markers_by_opensim] * (importlib.util.find_spec("opensim") is not None),
+)
+@pytest.mark.parametrize("gap", [(2, 0), (2, 1)], ids=["first marker", "last marker"])
+def test_others_read_markers_and_gaps(tmp_path, reader, gap):
+    places = PLACES.copy()
+    places[gap] = np.nan
+    path = tmp_path / "trial.trc"
+    write(path, Recording(RECORDING.time, places, NAMES))
+    labels, time, found = reader(path)
+    assert labels == NAMES
+    np.testing.assert_allclose(time, RECORDING.time, atol=1e-9)
+    np.testing.assert_allclose(found * 1e-3, places, atol=PRINTED)
+
+
 # OpenSim's tables.
 
 TABLE = CoordinateTable(
@@ -229,6 +267,22 @@ def test_what_is_no_storage_file_is_refused(tmp_path, text, complaint):
     path.write_text(text)
     with pytest.raises(FileError, match=complaint):
         read_storage(path)
+
+
+@settings(max_examples=60, deadline=None)
+@given(changes=st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1))
+def test_flipped_bytes_survive(tmp_path_factory, changes):
+    content = bytearray(STATES.encode())
+    for place, byte in changes:
+        content[place % len(content)] = byte
+    path = tmp_path_factory.mktemp("flipped") / "flipped.sto"
+    path.write_bytes(content)
+    try:
+        found = read_storage(path)
+    except FileError as error:
+        assert str(error).isprintable()  # noqa: PT017
+    else:
+        assert found.values.shape == (len(found.time), len(found.names))
 
 
 def test_angles_go_from_format_to_format(tmp_path):

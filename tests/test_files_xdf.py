@@ -10,6 +10,8 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from test_files_repaired import refused
 
 from ikns.errors import FileError, IknsError, RecordingWarning
@@ -156,6 +158,19 @@ def test_a_file_cut_at_any_byte_survives(tmp_path):
             with suppress(IknsError):
                 read(path)
         assert all(issubclass(each.category, RecordingWarning) for each in told)
+
+
+@settings(max_examples=60, deadline=None)
+@given(changes=st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1))
+def test_flipped_bytes_survive(tmp_path_factory, changes):
+    content = bytearray(xdf(stream(POINTS[:2, :1], desc=described(["A"]))))
+    for place, byte in changes:
+        content[place % len(content)] = byte
+    path = tmp_path_factory.mktemp("flipped") / "flipped.xdf"
+    path.write_bytes(content)
+    with warnings.catch_warnings(record=True), suppress(IknsError):
+        warnings.simplefilter("always", RecordingWarning)
+        assert read(path).markers.shape[1:] == (1, 3)
 
 
 def test_without_pyxdf_the_extra_is_named(tmp_path, monkeypatch):

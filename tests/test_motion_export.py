@@ -7,11 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ikns.body.skeleton import Skeleton
-from ikns.errors import InvalidInput
+from ikns.errors import InvalidInput, RecordingWarning
 from ikns.motion.export import fitted_markers, motion_coordinates, write_motion
 from ikns.motion.motion import Motion
+from ikns.motion.unseen import warn_unseen
 from ikns.recording.files import read
 from ikns.recording.files.storage import read_storage
+from ikns.recording.recording import Recording
 
 SKELETON = Skeleton.load()
 T, J = 6, len(SKELETON.joint_names)
@@ -125,6 +127,31 @@ def test_fitted_markers_are_where_the_body_carries_them(tmp_path, ending):
     np.testing.assert_array_equal(
         np.isnan(fitted_markers(SKELETON, moved).markers[..., 0]), gap
     )
+
+
+@pytest.mark.parametrize(
+    ("chain", "lost"),
+    [
+        (None, {"RFIN", "LFIN"}),
+        ("right_arm", {"RFIN"}),
+        ("both_arms", {"RFIN", "LFIN"}),
+    ],
+)
+def test_markers_that_a_recording_lacks_are_told(chain, lost):
+    carried = np.stack([SKELETON.markers_in_world(q) for q in motion().q])
+    labels = SKELETON.marker_set.labels
+    hidden = [labels.index(label) for label in ("RFIN", "RMEP")]
+    carried[:, hidden] = np.nan
+    kept = [i for i, label in enumerate(labels) if label != "LFIN"]
+    seen = Recording(
+        motion().time, carried[:, kept], [labels[i] for i in kept], "reach.c3d"
+    )
+    # RMEP is taken off after the static trial, so nobody misses it.
+    with pytest.warns(RecordingWarning, match="reach.c3d: no frame shows") as told:
+        assert set(warn_unseen(SKELETON, seen, chain)) == lost
+    assert len(told) == 1
+    whole = Recording(motion().time, np.nan_to_num(carried, nan=1.0), labels)
+    assert warn_unseen(SKELETON, whole, chain) == ()
 
 
 def test_an_unknown_ending_is_refused(tmp_path):

@@ -150,6 +150,7 @@ def calibrate(
     free exploration, then the hand held at ten points while the elbow moves.
     """
     from ikns.calibration.subject import FILES
+    from ikns.motion.unseen import warn_unseen
 
     if side == "both" and clavicle:
         raise InvalidInput("--clavicle goes with --side right or left, not with both.")
@@ -196,10 +197,11 @@ def calibrate(
             min_rest=min_rest,
         )
     assert exploration is not None
+    explorations = [read(path) for path in exploration]
     with progress() as report:
         subject = ikns.calibrate(
             None if static is None else read(static),
-            [read(path) for path in exploration],
+            explorations,
             natural=[read(path) for path in natural or []],
             generic=generic,
             marker_set=marker_set,
@@ -216,6 +218,8 @@ def calibrate(
             min_rest=min_rest,
             progress=report,
         )
+    for frames in explorations:
+        warn_unseen(subject.skeleton, frames, chain)
     subject.save(out, force=force)
     show(
         {"subject": out} | subject.report | ({"takes": takes} if live else {}),

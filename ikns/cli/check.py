@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, OptionalMarkerSet
+from ikns.cli.options import MARKER_FILES, AsJson, OptionalMarkerSet
 from ikns.cli.output import show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput, MarkerMismatch
@@ -19,7 +19,7 @@ def check(
     read: Read,
     recordings: Annotated[
         list[Path],
-        typer.Argument(help="Recordings of one person: .c3d, .trc or Vicon .csv."),
+        typer.Argument(help=f"Recordings of one person: {MARKER_FILES}."),
     ],
     static: Annotated[
         Path | None,

@@ -82,17 +82,20 @@ def compare(
     from ikns.analysis.compare import motion_crosstalk
     from ikns.calibration.simulated import is_simulated
     from ikns.motion.marker_ik.rejection import rejection_sentence
+    from ikns.motion.unseen import warn_unseen
 
     refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
     learned, own = calibrated.null_space_map, calibrated.chain
     with progress() as report:
         solver = ikns.MarkerIK(calibrated.skeleton)
-        tracked = [
-            solver.track(read(path), chain=own, progress=partial(report, path.name))
-            for path in (recording, reaches)
-            if path is not None
-        ]
+        tracked = []
+        for path in (recording, reaches):
+            if path is not None:
+                frames = read(path)
+                warn_unseen(calibrated.skeleton, frames, own)
+                step = partial(report, path.name)
+                tracked.append(solver.track(frames, chain=own, progress=step))
     motion, reaching = tracked[0], tracked[-1]
     gate = calibrated.gate
     first: Literal["pose", "position"] = "position" if task == "position" else "pose"

@@ -53,10 +53,12 @@ def control(
     """
     from ikns.live.control.recorded import control_table
     from ikns.motion.marker_ik.rejection import say_rejections
+    from ikns.motion.unseen import warn_unseen
 
     refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
     frames = read(recording, start=from_, end=to)
+    warn_unseen(calibrated.skeleton, frames, calibrated.chain)
     with progress() as report:
         motion = ikns.MarkerIK(calibrated.skeleton).track(
             frames, chain=calibrated.chain, progress=partial(report, recording.name)

@@ -55,6 +55,7 @@ def ik(
     from ikns.motion.export import check_motion_file, write_motion
     from ikns.motion.marker_ik.rejection import say_rejections
     from ikns.motion.table import motion_table
+    from ikns.motion.unseen import warn_unseen
 
     outputs = out or [Path("motion.csv")]
     for path in outputs:
@@ -86,6 +87,7 @@ def ik(
             )
         left_out = scaling.sentences(still.source)
     frames = read(recording, start=from_, end=to)
+    warn_unseen(skeleton, frames)
     with progress() as report, naming(frames.source):
         motion = ikns.MarkerIK(skeleton).track(
             frames, progress=lambda done, total: report("joint angles", done, total)

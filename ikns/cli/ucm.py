@@ -69,6 +69,7 @@ def ucm(
     """
     from ikns.calibration.simulated import is_simulated
     from ikns.motion.marker_ik.rejection import rejection_sentence
+    from ikns.motion.unseen import warn_unseen
 
     refuse_picture(figure, force=force, inputs=[*recordings, subject])
     if len({path.resolve() for path in recordings}) < len(recordings):
@@ -81,14 +82,12 @@ def ucm(
     calibrated = ikns.Subject.load(subject)
     solver = ikns.MarkerIK(calibrated.skeleton)
     with progress() as report:
-        motions = [
-            solver.track(
-                read(path),
-                chain=calibrated.chain,
-                progress=partial(report, path.name),
-            )
-            for path in recordings
-        ]
+        motions = []
+        for path in recordings:
+            frames = read(path)
+            warn_unseen(calibrated.skeleton, frames, calibrated.chain)
+            step = partial(report, path.name)
+            motions.append(solver.track(frames, chain=calibrated.chain, progress=step))
     rejected = [
         f"{path}: {sentence}."
         for path, motion in zip(recordings, motions, strict=True)

@@ -51,6 +51,7 @@ def view(
     With a recording the page plays it, together with the map.
     """
     from ikns.calibration.simulated import is_simulated
+    from ikns.motion.unseen import warn_unseen
 
     inputs = [subject, recording]
     refuse_overwriting(out, force=force, inputs=inputs)
@@ -82,6 +83,7 @@ def view(
             point=row,
         )
     else:
+        warn_unseen(person.skeleton, frames, person.chain)
         with progress() as report:
             motion = ikns.MarkerIK(person.skeleton).track(
                 frames,

@@ -37,7 +37,8 @@ def write_trc(path: Path, recording: Recording, *, force: bool = False) -> None:
         "",
     ]
     for i, row in enumerate(_cells(recording)):
-        lines.append("\t".join([str(first + i), f"{recording.time[i]:.6f}", *row]))
+        # OpenSim takes no notice of what follows the last tab, an empty cell say.
+        lines.append("\t".join([str(first + i), f"{recording.time[i]:.6f}", *row, ""]))
     write_text(path, "\n".join(lines) + "\n", force=force)
 
 
