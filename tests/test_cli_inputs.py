@@ -45,23 +45,27 @@ NEW_OUT = {
 }
 #: A command that reads, and one valid use of all paths that it reads, by option.
 PERSON = {"subject": "person"}
+NAMES = {"labels": "names.txt"}
 READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "scale": (["--stature", "1.75", "--mass", "70", "--sex", "male"], {}),
-    "ik": ([], {"recording": "free.c3d", "static": "static.c3d", **PERSON}),
-    "check": ([], {"recordings": "free.c3d", **PERSON}),
+    "ik": ([], {"recording": "free.c3d", "static": "static.c3d", **PERSON, **NAMES}),
+    "check": ([], {"recordings": "free.c3d", **PERSON, **NAMES}),
     "convert": ([], {"source": "free.c3d"}),
     "markers list": ([], {}),
-    "markers show": ([], {}),
+    "markers show": (["oxford24"], {}),
     "markers sites": ([], {}),
-    "markers check": ([], {"static": "static.c3d"}),
-    "markers new": ([], {"static": "static.c3d", "sites": "sites.txt"}),
-    "control": ([], {"recording": "free.c3d", **PERSON}),
-    "compare": ([], {"recording": "points.c3d", "reaches": "free.c3d", **PERSON}),
+    "markers check": (["oxford24"], {"static": "static.c3d", **NAMES}),
+    "markers new": ([], {"static": "static.c3d", "sites": "sites.txt", **NAMES}),
+    "control": ([], {"recording": "free.c3d", **PERSON, **NAMES}),
+    "compare": (
+        [],
+        {"recording": "points.c3d", "reaches": "free.c3d", **PERSON, **NAMES},
+    ),
     "robot": (["--frame", "tip"], {"urdf": "model.urdf", "angles": "free.csv"}),
-    "ucm": ([], {"recordings": "points.c3d", **PERSON}),
-    "view": ([], {"subject": "person", "recording": "free.c3d"}),
+    "ucm": ([], {"recordings": "points.c3d", **PERSON, **NAMES}),
+    "view": ([], {"subject": "person", "recording": "free.c3d", **NAMES}),
     "replay": ([], {"session": "session"}),
-    "calibrate": ([], {"static": "static.c3d", "exploration": "points.c3d"}),
+    "calibrate": ([], {"static": "static.c3d", "exploration": "points.c3d", **NAMES}),
     "demo": ([], {}),
     "run": (["--source", "replay:free.c3d"], PERSON),
     "servo": ([], {}),
@@ -71,7 +75,7 @@ READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "study init": ([], {}),
     "study run": ([], {"folder": "study"}),
     "study plan": ([], {"study": "study", "pilot": "pilot"}),
-    "stream": ([], {"recording": "free.c3d"}),
+    "stream": ([], {"recording": "free.c3d", **NAMES}),
 }
 
 
@@ -123,7 +127,9 @@ def desk(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("study", "pilot", "session"):
         (place / name / "visits").mkdir(parents=True)
         (place / name / "study.toml").write_text("declared")
-    for name in ("model.urdf", "free.csv", "sites.txt"):
+    (place / "names.txt").write_text("ELBOW=RELB")
+    (place / "sites.txt").write_text("RELB=right_lateral_epicondyle")
+    for name in ("model.urdf", "free.csv"):
         (place / name).write_text("needed")
     return place
 

@@ -35,6 +35,11 @@ RIGHT = {
     "track": "new --no-browser --conditions virtual",
     "pick": "new --no-browser --conditions ring",
     "report": "{study} --out new",
+    "markers list": "",
+    "markers sites": "",
+    "markers show": "oxford24",
+    "markers check": "oxford24 {static}",
+    "markers new": "{static} --guess --out new.toml",
     "study init": "new",
     "study run": "{study}",
     "study plan": "--margin 5",
@@ -179,6 +184,10 @@ WRONG = {
     "view subject": READ_FOLDER,
     "visit": WRITE_FOLDER,
     "wait": FROM_ZERO,
+    "guess": FLAG,
+    "markers new name": TEXT,
+    "markers new out": [*WRITE_FILE, "x.txt"],
+    "sites": READ_FILE,
 }
 FLAGS = {
     *("as_json", "auto", "browser", "clavicle", "dry_run", "everywhere", "force"),

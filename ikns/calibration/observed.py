@@ -24,6 +24,9 @@ _POSTURES = {
     "elbow_flexion": (1.3, 0.5),
 }
 _SPREAD, _DRAWS = 0.3, 20
+#: Added to the normal equations, m^2, so that they have an inverse: the square of a
+#: motion of 1 um, far below what any marker shows.
+_RIDGE = 1e-12
 #: Which of several joints that move the same markers is held: the one with the least
 #: range of motion comes first.
 _ORDER = ("clavicle_elevation", "clavicle_protraction", "wrist_", "forearm_pronation")
@@ -49,18 +52,17 @@ def unshown_joints(skeleton: Skeleton) -> tuple[str, ...]:
     names = dict(enumerate(body.joint_names, start=body.nv - len(body.joint_names)))
     found: list[str] = []
     while True:
-        unsure = {
-            column: sd
-            for column, sd in zip(free, _deviations(jacobians[:, :, free]), strict=True)
-            if column in names and sd > _UNSHOWN
-        }
+        sd = dict(zip(free, _deviations(jacobians[:, :, free]), strict=True))
+        unsure = [c for c in free if c in names and sd[c] > _UNSHOWN]
         if not unsure:
             return tuple(sorted(found, key=body.joint_names.index))
-        first = min(
-            unsure, key=lambda column: (_place(names[column]), -unsure[column], column)
-        )
-        found.append(names[first])
-        free.remove(first)
+        first = min(unsure, key=lambda c: (_place(names[c]), -sd[c], c))
+        # Both sides alike, where the other is not much better.
+        own = names[first].partition("_")[2]
+        for column in [c for c in free if c in names]:
+            if names[column].endswith(own) and sd[column] > 0.8 * _UNSHOWN:
+                found.append(names[column])
+                free.remove(column)
 
 
 def with_unshown_held(generic: Skeleton, worn: MarkerSet) -> MarkerSet:
@@ -92,14 +94,10 @@ def _jacobians(body: Skeleton) -> Array:
 def _deviations(jacobians: Array) -> Array:
     """Median standard deviation of each column's coordinate, (k,) rad or m.
 
-    The noise over the part of a column that is orthogonal to all others; infinite where
-    there is none.
+    The noise over the part of a column that is orthogonal to all others, as the inverse
+    of the normal equations has it; thousands of rad where there is none.
     """
-    k = jacobians.shape[2]
-    found = np.empty((len(jacobians), k))
-    for own, J in zip(found, jacobians, strict=True):
-        for j in range(k):
-            others = np.delete(J, j, axis=1)
-            left = J[:, j] - others @ np.linalg.lstsq(others, J[:, j], rcond=1e-9)[0]
-            own[j] = _NOISE / max(float(np.linalg.norm(left)), 1e-12)
-    return np.asarray(np.median(found, axis=0))
+    normal = np.swapaxes(jacobians, 1, 2) @ jacobians
+    inverse = np.linalg.inv(normal + _RIDGE * np.eye(normal.shape[1]))
+    variance = np.diagonal(inverse, axis1=1, axis2=2)
+    return np.asarray(_NOISE * np.sqrt(np.median(variance, axis=0)))

@@ -30,7 +30,7 @@ _STATIC, _SKIP = "static", "skip"
 class PlacedLabel:
     """Where a label sits, as a person said."""
 
-    label: str
+    label: str  # without the subject's name
     site: Site
     static_only: bool
 
@@ -61,7 +61,7 @@ def read_answers(answers: Mapping[str, str]) -> tuple[PlacedLabel, ...]:
             where = site(" ".join(words[:-1] if static_only else words))
         except InvalidInput as error:
             raise InvalidInput(f"{label}: {error}") from None
-        placed.append(PlacedLabel(label, where, static_only))
+        placed.append(PlacedLabel(_bare(label), where, static_only))
     return tuple(placed)
 
 
@@ -132,20 +132,26 @@ def own_marker_set(
     return OwnMarkerSet(
         with_unshown_held(generic, worn),
         placed,
-        tuple(label for label in static.labels if label not in by_label),
+        tuple(label for label in static.labels if _bare(label) not in by_label),
         _assumed(placed),
     )
 
 
+def _bare(label: str) -> str:
+    return label.rpartition(":")[2].strip()
+
+
 def _check(placed: tuple[PlacedLabel, ...], static: Recording) -> None:
+    labels = [_bare(label).casefold() for label in static.labels]
     for one in placed:
-        if one.label not in static.labels:
+        columns = [k for k, label in enumerate(labels) if label == one.label.casefold()]
+        if len(columns) != 1:
+            found = [static.labels[k] for k in columns] or static.labels[:8]
             raise MarkerMismatch(
-                f"{static.source}: expected a marker {one.label}, found "
-                f"{', '.join(static.labels[:8])} and so on."
+                f"{static.source}: expected one marker {one.label}, found "
+                f"{', '.join(found)}{'' if columns else ' and so on'}."
             )
-        column = static.labels.index(one.label)
-        if not np.isfinite(static.markers[:, column]).all(axis=1).any():
+        if not np.isfinite(static.markers[:, columns[0]]).all(axis=1).any():
             raise MarkerMismatch(
                 f"{static.source}: the marker {one.label} is never seen; leave it out, "
                 "or take a static trial that shows it."

@@ -13,11 +13,14 @@ import typer
 
 import ikns
 from ikns.errors import InvalidInput
+from ikns.output.inputs import refuse_input, refuse_input_folder
 
 #: What a command calls to read a marker file, with ``start`` and ``end`` of
 #: :func:`ikns.read` if it likes; it returns the recording.
 Read = Callable[..., Any]
 
+#: Options of these commands that name something to write.
+_OUTPUTS = ("out", "png", "figure")
 _OPTIONS = {
     "subject_prefix": (
         Annotated[
@@ -86,6 +89,7 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
             raise InvalidInput(
                 f"expected a --cutoff above 0 Hz, found {given['cutoff']:g}."
             )
+        _keep(given["labels"], values)
         names = _names(given["rename"] or [], given["labels"])
         said = set(given["rename"] or [])
         seen: list[str] = []
@@ -113,10 +117,19 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
         if seen and (sentence := _unused(names, said, seen)):
             sys.stderr.write(f"ikns: {sentence}\n")
 
-    # Typer reads the options from here.
+    # Typer reads the options from here, and nobody from the command below.
+    del run.__wrapped__  # type: ignore[attr-defined]
     run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
+
+
+def _keep(labels: Path | None, values: dict[str, Any]) -> None:
+    """Refuse to write over the file with the labels."""
+    for output in (values.get(name) for name in _OUTPUTS):
+        if labels is not None and output is not None:
+            refuse = refuse_input_folder if output.is_dir() else refuse_input
+            refuse(output, [labels])
 
 
 def _names(rename: list[str], labels: Path | None) -> dict[str, str]:
