@@ -123,7 +123,9 @@ def _chosen(motions: Sequence[Motion], seen: Sequence[Array]) -> tuple[Indices, 
     q = np.concatenate([motion.q for motion in motions])
     markers = np.concatenate(seen)
     residual = np.concatenate([motion.residual for motion in motions])
-    good = np.concatenate([motion.converged for motion in motions])
+    good = np.concatenate(
+        [motion.converged & (motion.rejected < 0).all(axis=1) for motion in motions]
+    )
     good &= residual <= _WORST * np.nanmedian(residual)
     count = seen_markers(markers).sum(axis=1) * good
     if good.sum() < _FEWEST:

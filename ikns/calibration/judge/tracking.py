@@ -9,7 +9,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.distances import quantile
 from ikns.calibration.judge.finding import Finding
 from ikns.calibration.judge.pose_cost import PoseCost
-from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.marker_ik import MarkerIK, turned_markers
 from ikns.recording.recording import Recording
 
 #: Frames looked at, evenly spaced.
@@ -39,7 +39,12 @@ def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Findi
         return []
     seconds = np.arange(len(some), dtype=np.float64)
     motion = MarkerIK(skeleton).track(Recording(seconds, some, worn.labels, where))
-    placed = np.stack([skeleton.markers_in_world(q) for q in motion.q])
+    placed = np.stack(
+        [
+            turned_markers(skeleton, q, seen)
+            for q, seen in zip(motion.q, some, strict=True)
+        ]
+    )
     weight = np.array([marker.weight for marker in worn.markers])
     apart = np.linalg.norm(placed - some, axis=2)
     weighed = np.where(np.isfinite(apart), weight, 0.0).sum(axis=1)

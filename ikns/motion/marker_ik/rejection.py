@@ -16,6 +16,7 @@ from ikns.motion.marker_ik.label_changes import exchanges
 from ikns.motion.marker_ik.pose import SolvedFrames
 from ikns.motion.marker_ik.rejection_count import RejectionCount
 from ikns.motion.marker_ik.size import power_of_ten, say_size
+from ikns.motion.marker_ik.turns import turned_markers
 from ikns.motion.marker_ik.visibility import say_apart, segment_pairs, sight_needs
 from ikns.motion.motion import Motion
 
@@ -73,7 +74,8 @@ def misfit_reason(
             return f"{say_size(power)}; the unit may be wrong"
         k = int(np.nanargmax(np.abs(change)))
         return f"{say_apart(skeleton, worn.pairs[k], change[k])} than at calibration"
-    away = np.linalg.norm(skeleton.markers_in_world(q) - markers, axis=1)[worn.columns]
+    placed = turned_markers(skeleton, q, markers)
+    away = np.linalg.norm(placed - markers, axis=1)[worn.columns]
     if np.nanmax(away, initial=0.0) > limits.worst_residual:
         k = int(np.nanargmax(away))
         label = skeleton.marker_set.labels[worn.columns[k]]
