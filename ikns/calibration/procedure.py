@@ -196,11 +196,7 @@ def calibrate(
         "extrinsic": extrinsic_report(skeleton, pairs, chain),
         "warnings": [
             *measured.warnings,
-            *(
-                f"{recording.source}: {left_out}."
-                for recording, motion in zip(explorations, motions, strict=True)
-                if (left_out := rejection_sentence(motion, chain))
-            ),
+            *_rejections(explorations, motions, chain),
             *(f"{names}: {fault}" for fault in (side, arms and f"{arms}.") if fault),
             *caught,
         ],
@@ -238,6 +234,17 @@ def _fit(
                 raise
             raise NotEnoughData(f"{error} {side}") from None
     return x, [str(warning.message) for warning in caught]
+
+
+def _rejections(
+    recordings: Sequence[Recording], motions: Sequence[Motion], chain: str
+) -> list[str]:
+    """Say which frames were left out."""
+    return [
+        f"{recording.source}: {left_out}."
+        for recording, motion in zip(recordings, motions, strict=True)
+        if (left_out := rejection_sentence(motion, chain))
+    ]
 
 
 def _say_side(other: str, chain: str) -> str:

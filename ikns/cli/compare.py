@@ -82,20 +82,11 @@ def compare(
     from ikns.analysis.compare import motion_crosstalk
     from ikns.calibration.simulated import is_simulated
     from ikns.motion.marker_ik.rejection import rejection_sentence
-    from ikns.motion.unseen import warn_unseen
 
     refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
-    learned, own = calibrated.null_space_map, calibrated.chain
-    with progress() as report:
-        solver = ikns.MarkerIK(calibrated.skeleton)
-        tracked = []
-        for path in (recording, reaches):
-            if path is not None:
-                frames = read(path)
-                warn_unseen(calibrated.skeleton, frames, own)
-                step = partial(report, path.name)
-                tracked.append(solver.track(frames, chain=own, progress=step))
+    own = calibrated.chain
+    tracked = _tracked(read, calibrated, [p for p in (recording, reaches) if p])
     motion, reaching = tracked[0], tracked[-1]
     gate = calibrated.gate
     first: Literal["pose", "position"] = "position" if task == "position" else "pose"
@@ -121,7 +112,7 @@ def compare(
     with naming(str(reaches or recording)):
         try:
             across = motion_crosstalk(
-                learned,
+                calibrated.null_space_map,
                 reaching,
                 chain=own,
                 max_hand_speed=gate["max_hand_speed"],
@@ -174,6 +165,20 @@ def compare(
         *notes(warned),
         as_json=as_json,
     )
+
+
+def _tracked(read: Read, subject: ikns.Subject, paths: list[Path]) -> list[ikns.Motion]:
+    """Track recordings, and say what they lack."""
+    from ikns.motion.unseen import warn_unseen
+
+    solver, found = ikns.MarkerIK(subject.skeleton), []
+    with progress() as report:
+        for path in paths:
+            frames = read(path)
+            warn_unseen(subject.skeleton, frames, subject.chain)
+            step = partial(report, path.name)
+            found.append(solver.track(frames, chain=subject.chain, progress=step))
+    return found
 
 
 def _combinations(

@@ -118,7 +118,7 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
             sys.stderr.write(f"ikns: {sentence}\n")
 
     # Typer reads the options from here, and nobody from the command below.
-    del run.__wrapped__  # type: ignore[attr-defined]
+    del run.__wrapped__
     run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run

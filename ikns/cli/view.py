@@ -6,7 +6,7 @@ import sys
 import webbrowser
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -51,7 +51,6 @@ def view(
     With a recording the page plays it, together with the map.
     """
     from ikns.calibration.simulated import is_simulated
-    from ikns.motion.unseen import warn_unseen
 
     inputs = [subject, recording]
     refuse_overwriting(out, force=force, inputs=inputs)
@@ -71,35 +70,17 @@ def view(
     name = subject.resolve().name
     frames = None if recording is None else read(recording, start=from_, end=to)
 
-    from ikns.view.scene import map_scene, recording_scene, scene_html, scene_picture
+    from ikns.view.scene import scene_html, scene_picture
 
-    if frames is None:
-        scene = map_scene(
-            person.skeleton,
-            learned,
-            person.chain,
-            simulated=simulated,
-            title=f"Null-space map of {name}",
-            point=row,
-        )
-    else:
-        warn_unseen(person.skeleton, frames, person.chain)
-        with progress() as report:
-            motion = ikns.MarkerIK(person.skeleton).track(
-                frames,
-                chain=person.chain,
-                progress=partial(report, Path(frames.source).name),
-            )
-        scene = recording_scene(
-            person.skeleton,
-            learned,
-            person.chain,
-            motion,
-            frames,
-            simulated=simulated,
-            title=f"{Path(recording or '').name}, {name}",
-            point=row,
-        )
+    scene = _scene(
+        person,
+        frames,
+        simulated=simulated,
+        title=f"Null-space map of {name}"
+        if recording is None
+        else f"{recording.name}, {name}",
+        point=row,
+    )
     page = scene_html(scene)
     picture = None if png is None else scene_picture(scene)
     write_text(out, page, force=force)
@@ -135,6 +116,30 @@ def view(
         f"Wrote {out}" if png is None else f"Wrote {out} and {png}",
         as_json=as_json,
     )
+
+
+def _scene(
+    person: ikns.Subject,
+    frames: ikns.Recording | None,
+    *,
+    simulated: bool,
+    title: str,
+    point: int | None,
+) -> Scene:
+    """Track the recording, if there is one, and make the scene."""
+    from ikns.motion.unseen import warn_unseen
+    from ikns.view.scene import map_scene, recording_scene
+
+    own: dict[str, Any] = {"simulated": simulated, "title": title, "point": point}
+    body, learned, chain = person.skeleton, person.null_space_map, person.chain
+    if frames is None:
+        return map_scene(body, learned, chain, **own)
+    warn_unseen(body, frames, chain)
+    with progress() as report:
+        motion = ikns.MarkerIK(body).track(
+            frames, chain=chain, progress=partial(report, Path(frames.source).name)
+        )
+    return recording_scene(body, learned, chain, motion, frames, **own)
 
 
 def _seconds(scene: Scene) -> float:

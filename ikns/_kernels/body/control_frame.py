@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.frame_sequence import Memory, follow_frame
+from ikns._kernels.body.frame_sequence import FrameMemory, follow_frame
 from ikns._kernels.body.marker_gate import THORAX, MarkerGate
 from ikns._kernels.body.marker_problem import cut, unpack
 from ikns._kernels.body.paths import Paths, place_frames
@@ -47,7 +47,7 @@ def control_frame(
     control_map: ControlMap,
     markers: Array,
     from_scratch: bool,
-    memory: Memory,
+    memory: FrameMemory,
     q: Array,
     work: Array,
     cavity_work: Array,

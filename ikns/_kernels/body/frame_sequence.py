@@ -30,11 +30,11 @@ _BETTER = 0.5
 _LONGEST_WAIT = 128.0
 # When the markers of all limbs fitted last.
 _JUST_NOW, _LATELY, _LONG_AGO = 0.0, 1.0, 2.0
-# Entries of `Memory.numbers`.
+# Entries of `FrameMemory.numbers`.
 _WAIT, _SINCE, _TRIED, _COST, _BEFORE, _AGE = 0, 1, 2, 3, 4, 5
 
 
-class Memory(NamedTuple):
+class FrameMemory(NamedTuple):
     """What is known of the frames before."""
 
     numbers: Array  # (5 + limbs,)
@@ -42,12 +42,12 @@ class Memory(NamedTuple):
     start: Array  # (nq,) where the next frame starts
 
 
-def new_memory(nq: int, limbs: int) -> Memory:
+def new_memory(nq: int, limbs: int) -> FrameMemory:
     """Return the memory before a first frame."""
     numbers = np.zeros(_AGE + limbs)
     numbers[_COST] = np.nan
     numbers[_AGE:] = np.inf
-    return Memory(numbers, np.zeros(nq), np.zeros(nq))
+    return FrameMemory(numbers, np.zeros(nq), np.zeros(nq))
 
 
 @compiled
@@ -62,7 +62,7 @@ def solve_frames(
     before: Array,
     from_scratch: bool,
     patience: int,
-    memory: Memory,
+    memory: FrameMemory,
     work: Array,
     q: Array,
     residual: Array,
@@ -113,7 +113,7 @@ def follow_frame(
     s: Scratch,
     gate: MarkerGate,
     markers: Array,
-    memory: Memory,
+    memory: FrameMemory,
     from_scratch: bool,
     q: Array,
     worst: Array,
@@ -160,7 +160,7 @@ def follow_frame(
 
 
 @compiled
-def _due(memory: Memory, fit: bool, beyond: float, cost: float) -> bool:
+def _due(memory: FrameMemory, fit: bool, beyond: float, cost: float) -> bool:
     """Whether a pose is suspicious, and its turn has come to be compared."""
     known = memory.numbers
     unusual = cost > _LEAST**2 and cost > _TIMES**2 * known[_COST]
@@ -181,7 +181,7 @@ def _due(memory: Memory, fit: bool, beyond: float, cost: float) -> bool:
 
 @compiled
 def _remember(
-    problem: MarkerProblem, memory: Memory, passed: Mask, q: Array, patience: int
+    problem: MarkerProblem, memory: FrameMemory, passed: Mask, q: Array, patience: int
 ) -> None:
     """Write where the next frame starts, limb by limb."""
     ages = memory.numbers[_AGE:]
