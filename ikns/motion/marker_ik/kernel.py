@@ -6,7 +6,7 @@ import threading
 
 import numpy as np
 
-from ikns._kernels.body.frame_sequence import Memory, new_memory, solve_frames
+from ikns._kernels.body.frame_sequence import FrameMemory, new_memory, solve_frames
 from ikns._kernels.body.marker_problem import MarkerProblem, pack, scratch_size
 from ikns._kernels.body.tree import Tree
 from ikns.arrays import Array, Indices
@@ -100,7 +100,7 @@ class KernelSolver:
         work: Array = self._of_thread.work
         return work
 
-    def new_memory(self) -> Memory:
+    def new_memory(self) -> FrameMemory:
         """Return the memory before a first frame, for frames one after the other."""
         return new_memory(len(self._neutral), len(SIDES))
 
@@ -112,7 +112,7 @@ class KernelSolver:
         frames: SolvedFrames,
         *,
         patience: int = 0,
-        memory: Memory | None = None,
+        memory: FrameMemory | None = None,
     ) -> None:
         """Solve the frames of ``range(*span)``; the step is 1 or -1.
 
