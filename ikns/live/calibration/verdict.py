@@ -178,7 +178,10 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
     values["hand_seen_percent"] = percent(known)
     values["residual_mm"] = millimeters(median(motion.residual))
     if len(explored) < 4:
-        return Verdict(False, False, "The hand was hardly ever in sight.", values)
+        reason = tracking_fault(skeleton, recording, motion, chain=chain)
+        return Verdict(
+            False, False, reason or "The hand was hardly ever in sight.", values
+        )
     box = minimum_bounding_box(explored)
     values["box_cm"] = np.round(200 * box.half_lengths, 1).tolist()
     reason = tracking_fault(skeleton, recording, motion, chain=chain)
