@@ -37,23 +37,25 @@ def stand_ins(markers: Array) -> Mask:
     [[2, 1]]
     """
     seen: Mask = np.asarray(np.isfinite(markers).all(axis=2))
-    same = seen & (np.ptp(markers, axis=2) == 0)
-    order = np.argsort(np.where(seen, markers[..., 0], np.inf), axis=1)
-    sorted_ = np.take_along_axis(markers, order[..., None], axis=1)
+    x, y, z = np.moveaxis(markers, 2, 0)
+    bad = seen & (x == y) & (y == z)
+    # Most frames have no two equal numbers, so only the others are looked at in full.
     with np.errstate(invalid="ignore"):
-        equal = np.abs(np.diff(sorted_, axis=1)).max(axis=2, initial=0) < _SAME_PLACE
-    twin = np.zeros_like(seen)
-    twin[:, 1:] |= equal
-    twin[:, :-1] |= equal
-    shared = np.zeros_like(seen)
-    np.put_along_axis(shared, order, twin, axis=1)
-    bad = same | (shared & seen)
-    rest = np.where((seen & ~bad)[..., None], markers, np.nan)
+        alike = (np.diff(np.sort(x, axis=1), axis=1) < _SAME_PLACE).any(axis=1)
+    for t in np.flatnonzero(alike).tolist():
+        order = np.flatnonzero(seen[t])[np.lexsort(markers[t, seen[t]].T)]
+        equal = np.abs(np.diff(markers[t, order], axis=0)).max(axis=1) < _SAME_PLACE
+        bad[t, order[1:][equal]] = bad[t, order[:-1][equal]] = True
+    rest = np.where((seen & ~bad)[..., None], markers, np.nan)[
+        :: len(markers) // 100 + 1
+    ]
     if not np.isfinite(rest).any():
-        return np.asarray(bad)
+        return bad
     middle = np.nanmedian(rest.reshape(-1, 3), axis=0)
     with np.errstate(invalid="ignore"):
-        far = np.asarray(np.abs(markers - middle).max(axis=2) > _FAR)
+        far = np.zeros_like(seen)
+        for values, usual in zip((x, y, z), middle, strict=True):
+            far |= np.abs(values - usual) > _FAR
     # A volume so large that people walk through it: compare within the frame too.
     for t in np.flatnonzero((far & seen).any(axis=1)).tolist():
         here = markers[t, seen[t]]
@@ -72,7 +74,9 @@ def frozen(time: Array, markers: Array) -> Mask:
         return found
     step = float(np.median(np.diff(time)))
     least = max(_FROZEN_FRAMES, round(_FROZEN_TIME / step))
-    equal = (np.diff(markers, axis=0) == 0).all(axis=2)
+    equal = markers[1:, :, 0] == markers[:-1, :, 0]
+    for axis in (1, 2):
+        equal &= markers[1:, :, axis] == markers[:-1, :, axis]
     for column in np.flatnonzero(equal.sum(axis=0) >= least - 1).tolist():
         padded = np.concatenate([[0], equal[:, column].astype(np.int8), [0]])
         edges = np.flatnonzero(np.diff(padded))
