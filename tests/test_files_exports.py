@@ -229,6 +229,16 @@ def test_frame_and_time_may_stand_before_the_positions(tmp_path, before, title):
     np.testing.assert_allclose(recording.time, np.arange(4) / 100, rtol=1e-15)
 
 
+@pytest.mark.parametrize(
+    "word", ["NULL", "null", "NaN", "-1.#IND", "1.#QNAN0", "0.000"]
+)
+def test_a_word_for_what_was_not_seen_is_a_gap(tmp_path, word):
+    text = qualisys(title=False).replace("\t\t\t\t", f"\t{word}\t{word}\t{word}\t")
+    assert text.count(word) >= 3
+    recording = reading(tmp_path, text, ending="tsv")
+    np.testing.assert_array_equal(recording.markers, POINTS * 1e-3)
+
+
 def test_events_of_qualisys_are_moments(tmp_path):
     event = "EVENT\tReach\t2\t0.01000\nEVENT\tReturn\t4\t0.03000\nMARKER_NAMES"
     text = qualisys().replace("MARKER_NAMES", event, 1)

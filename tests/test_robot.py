@@ -267,3 +267,18 @@ def test_a_chain_may_start_at_a_link():
 def test_a_chain_that_does_not_lead_to_the_frame_is_refused(base, says):
     with pytest.raises(InvalidInput, match=says):
         Robot(planar(), "l1", base=base)
+
+
+def test_joints_that_slide_are_named() -> None:
+    # Along an axis of the frame, and along none of them.
+    kinds = {"rail": "1 0 0", "lift": "0.6 0.8 0", "turn": "0 0 1"}
+    links = "".join(f'<link name="l{k}"/>' for k in range(4))
+    joints = "".join(
+        f'<joint name="{name}" type="{"revolute" if name == "turn" else "prismatic"}">'
+        f'<parent link="l{k}"/><child link="l{k + 1}"/><axis xyz="{axis}"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for k, (name, axis) in enumerate(kinds.items())
+    )
+    robot = Robot(f'<robot name="r">{links}{joints}</robot>', "l3")
+    assert robot.joint_names == ("rail", "lift", "turn")
+    assert robot.sliding == ("rail", "lift")

@@ -12,8 +12,10 @@ from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import existing_file, shown
 
-#: How Microsoft's library prints NaN.
-_NOT_A_NUMBER = re.compile(r"-?1\.#(?:QNAN|SNAN|IND)\d*")
+#: How Microsoft's library prints NaN, and Qualisys' software what was not seen.
+_NOT_A_NUMBER = re.compile(
+    r"-?1\.#(?:QNAN|SNAN|IND)\d*|(?<![a-z])null(?![a-z])", re.IGNORECASE
+)
 
 #: A line and its number in the file, from 1.
 Row = tuple[int, str]
@@ -74,7 +76,8 @@ def number_table(
     # Blanks around a number mean nothing; between two they are a missing delimiter.
     if " " in text:
         text = re.sub(f" *([{delimiter}\n]) *", r"\1", text)
-    text = _NOT_A_NUMBER.sub("nan", text) if "#" in text else text
+    if "#" in text or "null" in text.lower():
+        text = _NOT_A_NUMBER.sub("nan", text)
     # Twice, because neighboring gaps share a delimiter.
     for _ in range(2):
         text = text.replace(2 * delimiter, f"{delimiter}nan{delimiter}")
