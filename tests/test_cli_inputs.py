@@ -48,7 +48,7 @@ PERSON = {"subject": "person"}
 NAMES = {"labels": "names.txt"}
 READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "scale": (["--stature", "1.75", "--mass", "70", "--sex", "male"], {}),
-    "ik": ([], {"recording": "free.c3d", "static": "static.c3d", **PERSON, **NAMES}),
+    "ik": ([], {"recording": "free.c3d", **PERSON, **NAMES}),
     "check": ([], {"recordings": "free.c3d", **PERSON, **NAMES}),
     "convert": ([], {"source": "free.c3d"}),
     "markers list": ([], {}),

@@ -111,10 +111,10 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(read=read, **values)
         except ikns.IknsError as error:
-            if seen and (sentence := _unused(names, said, seen)):
+            if seen and (sentence := _unused(said, seen)):
                 raise type(error)(f"{str(error).rstrip('.')}; {sentence}") from None
             raise
-        if seen and (sentence := _unused(names, said, seen)):
+        if seen and (sentence := _unused(said, seen)):
             sys.stderr.write(f"ikns: {sentence}\n")
 
     # Typer reads the options from here, and nobody from the command below.
@@ -126,8 +126,9 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
 
 def _keep(labels: Path | None, values: dict[str, Any]) -> None:
     """Refuse to write over the file with the labels."""
-    for output in (values.get(name) for name in _OUTPUTS):
-        if labels is not None and output is not None:
+    for name in _OUTPUTS if labels is not None else ():
+        given = values.get(name) or []
+        for output in given if isinstance(given, list) else [given]:
             refuse = refuse_input_folder if output.is_dir() else refuse_input
             refuse(output, [labels])
 
@@ -141,7 +142,7 @@ def _names(rename: list[str], labels: Path | None) -> dict[str, str]:
     return names | name_pairs(rename, where="--rename")
 
 
-def _unused(names: dict[str, str], said: set[str], seen: list[str]) -> str:
+def _unused(said: set[str], seen: list[str]) -> str:
     """Say which labels given on the command line no recording had."""
     if not said:
         return ""
