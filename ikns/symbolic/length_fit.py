@@ -156,6 +156,8 @@ def fit_lengths(
     )
     worn = reference.marker_set
     q, markers = _chosen(scaled, recordings, n_frames)
+    # Skin with a turn of its own is where no joint has it.
+    markers[:, [marker.free_turn for marker in scaled.marker_set.markers]] = np.nan
     first = MarkerIK(reference.with_markers(worn.all_tracked())).solve(target)
     seen = np.asarray(np.isfinite(markers).all(axis=2))
     worth = min(independent_frames / len(q), 1.0)
