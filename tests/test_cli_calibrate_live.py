@@ -294,7 +294,7 @@ def test_without_a_source_or_without_live_is_reported(calibrated, tmp_path, capf
         (["--live", *out], "--source"),
         (["--source", "lsl:Nobody", *out], "--live"),
         (["--auto", "--resume", *out], "--resume and --auto needs --live"),
-        (out, "--static and --exploration"),
+        (out, "and --exploration, or --live"),
         (["--static", "s.c3d", *out], "expected --exploration"),
         (["--live", "--source", "tape:1", *out], "unknown source"),
         (["--live", "--source", "replay:no.c3d", *out], "no.c3d"),

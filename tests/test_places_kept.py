@@ -92,6 +92,17 @@ def test_places_too_near_to_tell_apart_are_kept_where_recordings_tell():
     assert len(set(homes(found.labels_, which))) == 11
 
 
+def test_points_that_were_skipped_stay_empty_where_recordings_tell():
+    rng = np.random.default_rng(13)
+    places = (BOX + rng.normal(scale=0.06, size=BOX.shape))[:8]
+    which = np.repeat(np.arange(8), 60)
+    x = places[which] + rng.normal(scale=0.006, size=(480, 3))
+    found = BoundingBoxKMeans(10).fit(x, groups=which)
+    assert found.start_ == "groups"
+    assert len(set(homes(found.labels_, which))) == 8
+    assert (found.counts_ == 0).sum() == 2
+
+
 def test_groups_change_nothing_where_the_box_kept_every_place():
     x, which = held(np.random.default_rng(2), BOX)
     alone, told = (BoundingBoxKMeans().fit(x, groups=g) for g in (None, which))

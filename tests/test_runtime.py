@@ -64,11 +64,14 @@ def test_every_frame_is_taken_and_the_finger_follows(subject, exploring):
     assert finger.state().mode == "relaxed"
 
 
-def test_a_session_of_the_loop_replays_bit_for_bit(subject, exploring, tmp_path):
-    folder = tmp_path / "session"
-    with session_for(subject, folder, tmp_path) as session:
+@pytest.mark.parametrize("method", ["paper", "intent"])
+def test_a_session_of_the_loop_replays_bit_for_bit(
+    subject, exploring, tmp_path, method
+):
+    folder, chosen = tmp_path / "session", ControlSettings(method=method)
+    with session_for(subject, folder, tmp_path, chosen) as session:
         with source(exploring, speed=4) as stream:
-            run(stream, subject, SimulatedFinger(), session=session)
+            run(stream, subject, SimulatedFinger(), settings=chosen, session=session)
     recorded = read_run(folder)
     assert len(recorded.frame) == len(exploring.time)
     again = replay_run(recorded)

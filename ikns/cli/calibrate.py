@@ -175,7 +175,7 @@ def calibrate(
     if live:
         if radius is not None and not radius > 0:
             raise InvalidInput(f"expected a radius above 0 m, found {radius:g}.")
-        static, exploration, takes = record_live(
+        static, exploration, movement, takes = record_live(
             LiveOptions(
                 source=source or "",
                 recordings=recordings or out.with_name(f"{out.name}-recordings"),
@@ -196,6 +196,7 @@ def calibrate(
             min_still=min_still,
             min_rest=min_rest,
         )
+        natural = [*(natural or []), *movement]
     assert exploration is not None
     explorations = [read(path) for path in exploration]
     with progress() as report:

@@ -67,7 +67,7 @@ def record_live(
     min_static: float,
     min_still: float,
     min_rest: float,
-) -> tuple[Path, list[Path], list[dict[str, Any]]]:
+) -> tuple[Path, list[Path], list[Path], list[dict[str, Any]]]:
     """Record the calibration of a person, step by step.
 
     Returns
@@ -75,6 +75,8 @@ def record_live(
     static : Path
         Accepted recording.
     points : list of Path
+    movement : list of Path
+        The free exploration, where it was accepted.
     takes : list of dict
         Every take with its verdict.
     """
@@ -82,6 +84,7 @@ def record_live(
         Judge,
         LiveProtocol,
         RecordingsFolder,
+        accepted_movement,
         accepted_recordings,
         check_labels,
         paper_steps,
@@ -154,7 +157,8 @@ def record_live(
             f"{options.recordings}: stopped with {done} of {options.points} points "
             "accepted; the recordings are kept, continue with --resume."
         )
-    return *accepted_recordings(folder, steps), folder.takes
+    static, points = accepted_recordings(folder, steps)
+    return static, points, accepted_movement(folder, steps), folder.takes
 
 
 class _Screen:

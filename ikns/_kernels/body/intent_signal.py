@@ -10,7 +10,6 @@ handed in.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,29 +17,25 @@ from ikns._kernels.body.paths import Paths, place_frames
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array
 
-
-class IntentNumbers(NamedTuple):
-    """Constants of one arm's map; the wrist of a left arm is mirrored to the right."""
-
-    coefficients: Array  # (10,) rad
-    people: Array  # (10,) rad
-    leverage: Array  # (10, 10)
-    offset: float  # rad
-    taught_leverage: float
-    guard: bool
-    lower: float  # a, rad
-    upper: float  # b, rad
-    mirror: float  # -1 for a left arm, else 1
-    middle: Array  # (3,) m, of the quadratic terms
-    unit: float  # m
-    forward: Array  # (3,) where the swivel's reference starts
-    down: Array  # (3,) the reference there
+# One array of numbers takes less time to hand over than a dozen. Its layout; all of the
+# right arm, to which a left one is mirrored:
+OWN = 0  # 10 coefficients less those of other people, rad
+PEOPLE = 10  # 10 of other people, rad
+OFFSET = 20  # rad
+TAUGHT = 21  # 99th percentile of the taught leverage
+GUARD = 22  # 1 where the own part fades outside what was taught, else 0
+LOWER, UPPER = 23, 24  # a and b, rad
+MIRROR = 25  # -1 for a left arm, else 1
+MIDDLE, UNIT = 26, 29  # of the quadratic terms, 3 and 1, m
+FORWARD, DOWN = 30, 33  # where the swivel's reference starts, and it there, 3 each
+SIZE = 36
 
 
 @compiled
 def intent_signal(
     paths: Paths,
-    numbers: IntentNumbers,
+    numbers: Array,
+    leverage: Array,
     angles: Array,
     rotation: Array,
     position: Array,
@@ -52,7 +47,9 @@ def intent_signal(
     ----------
     paths : Paths
         From the thorax to the upper arm and to the hand's link.
-    numbers : IntentNumbers
+    numbers : (SIZE,) array
+        See the layout above.
+    leverage : (10, 10) array
     angles : (1, J) array
         Joint angles, rad.
     rotation, position, terms : (1, 2, 3, 3), (1, 2, 3) and (10,) arrays
@@ -65,34 +62,33 @@ def intent_signal(
     taught : bool
     """
     place_frames(paths, angles, rotation, position)
-    m = numbers.mirror
     s = _swivel(numbers, rotation[0, 0], position[0, 0], position[0, 1])
-    x = (position[0, 1, 0] - numbers.middle[0]) / numbers.unit
-    y = (position[0, 1, 1] - numbers.middle[1]) / numbers.unit
-    z = (m * position[0, 1, 2] - numbers.middle[2]) / numbers.unit
-    terms[0], terms[1], terms[2], terms[3] = 1.0, x, y, z
-    terms[4], terms[5], terms[6] = x * x, y * y, z * z
-    terms[7], terms[8], terms[9] = x * y, x * z, y * z
+    terms[0] = 1.0
+    for k in range(3):
+        at = position[0, 1, k] * (numbers[MIRROR] if k == 2 else 1.0)
+        terms[1 + k] = (at - numbers[MIDDLE + k]) / numbers[UNIT]
+        terms[4 + k] = terms[1 + k] ** 2
+    terms[7], terms[8] = terms[1] * terms[2], terms[1] * terms[3]
+    terms[9] = terms[2] * terms[3]
     people = own = h = 0.0
     for i in range(10):
-        people += terms[i] * numbers.people[i]
-        own += terms[i] * (numbers.coefficients[i] - numbers.people[i])
+        people += terms[i] * numbers[PEOPLE + i]
+        own += terms[i] * numbers[OWN + i]
         for j in range(10):
-            h += terms[i] * numbers.leverage[i, j] * terms[j]
-    beyond = h / numbers.taught_leverage
-    if numbers.guard and beyond > 1.0:
-        own = numbers.offset + (own - numbers.offset) / beyond
+            h += terms[i] * leverage[i, j] * terms[j]
+    beyond = h / numbers[TAUGHT]
+    if numbers[GUARD] > 0 and beyond > 1.0:
+        own = numbers[OFFSET] + (own - numbers[OFFSET]) / beyond
     rest = s - people - own
     rest -= 2 * math.pi * math.floor((rest + math.pi) / (2 * math.pi))
-    return (rest - numbers.lower) / (numbers.upper - numbers.lower), beyond <= 1.0
+    width = numbers[UPPER] - numbers[LOWER]
+    return (rest - numbers[LOWER]) / width, beyond <= 1.0
 
 
 @compiled
-def _swivel(
-    numbers: IntentNumbers, upper_arm: Array, shoulder: Array, wrist: Array
-) -> float:
+def _swivel(numbers: Array, upper_arm: Array, shoulder: Array, wrist: Array) -> float:
     """Angle of the elbow by its hinge, the third axis of the upper arm, rad."""
-    m, f, d = numbers.mirror, numbers.forward, numbers.down
+    m, f, d = numbers[MIRROR], numbers[FORWARD:], numbers[DOWN:]
     nx, ny = wrist[0] - shoulder[0], wrist[1] - shoulder[1]
     nz = m * (wrist[2] - shoulder[2])
     length = math.sqrt(nx * nx + ny * ny + nz * nz)

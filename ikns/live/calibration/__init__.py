@@ -9,6 +9,7 @@ from ikns.live.calibration.folder import RecordingsFolder
 from ikns.live.calibration.guidance import CalibrationStatus
 from ikns.live.calibration.judge import Judge
 from ikns.live.calibration.procedure import (
+    accepted_movement,
     accepted_recordings,
     check_labels,
     restore,
@@ -34,6 +35,7 @@ __all__ = [
     "RecordingsFolder",
     "TargetPoints",
     "Verdict",
+    "accepted_movement",
     "accepted_recordings",
     "check_labels",
     "direction_in_words",

@@ -96,6 +96,14 @@ def accepted_recordings(
     return accepted[static[0].name], [accepted[step.name] for step in points]
 
 
+def accepted_movement(
+    folder: RecordingsFolder, steps: Sequence[ProtocolStep]
+) -> list[Path]:
+    """Return the accepted free exploration: ordinary movement, for natural posture."""
+    accepted = folder.accepted
+    return [accepted[s.name] for s in steps if s.kind == "free" and s.name in accepted]
+
+
 def run_protocol(
     source: Source,
     protocol: LiveProtocol,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.body.intent_signal import IntentNumbers, intent_signal
+from ikns._kernels.body import intent_signal as kernel
 from ikns.arrays import Array
 from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
@@ -39,23 +39,23 @@ class IntentSignal:
         (side,) = chain_sides(readout.chain)
         self._paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))
         natural = learned.natural_
-        self._numbers = IntentNumbers(
-            coefficients=natural.coefficients_,
-            people=natural.people_,
-            leverage=natural.leverage_,
-            offset=natural.offset_,
-            taught_leverage=natural.taught_leverage_,
-            guard=bool(natural.guard),
-            lower=learned.ends_[0],
-            upper=learned.ends_[1],
-            mirror=-1.0 if side == "left" else 1.0,
-            middle=MIDDLE,
-            unit=UNIT,
-            forward=FORWARD,
-            down=DOWN,
-        )
+        numbers = np.empty(kernel.SIZE)
+        for start, values in (
+            (kernel.OWN, natural.coefficients_ - natural.people_),
+            (kernel.PEOPLE, natural.people_),
+            (kernel.OFFSET, [natural.offset_, natural.taught_leverage_]),
+            (kernel.GUARD, [float(natural.guard)]),
+            (kernel.LOWER, learned.ends_),
+            (kernel.MIRROR, [-1.0 if side == "left" else 1.0]),
+            (kernel.MIDDLE, [*MIDDLE, UNIT]),
+            (kernel.FORWARD, [*FORWARD, *DOWN]),
+        ):
+            numbers[start : start + len(values)] = values
+        self._numbers, self._leverage = numbers, np.array(natural.leverage_, order="C")
         self._work = np.empty((1, 2, 3, 3)), np.empty((1, 2, 3)), np.empty(10)
 
     def __call__(self, angles: Array) -> tuple[float, bool]:
         """Return c at joint angles (J,), and whether movement was taught there."""
-        return intent_signal(self._paths, self._numbers, angles[None], *self._work)
+        return kernel.intent_signal(
+            self._paths, self._numbers, self._leverage, angles[None], *self._work
+        )

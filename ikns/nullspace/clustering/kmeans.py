@@ -6,6 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.distance import cdist
 from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.cluster import kmeans_plusplus
 from sklearn.utils.validation import check_is_fitted, validate_data
@@ -133,7 +134,8 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
                 merged = self._merged(x, other[1], known)
                 size = inertia(x, *other[:2])
                 rows.append((len(merged), size, name, merged, other))
-            best = min(rows, key=lambda row: row[:2])
+            # Who was told what is one place need not guess by inertia.
+            best = min(rows, key=lambda row: (row[0], row[2] != "groups", row[1]))
             if best[0] < len(self.merged_) + idle:
                 self.start_, self.merged_, found = best[2:]
         centers, _, self.n_iter_ = found
@@ -172,7 +174,12 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         """Name other starts, with their centroids and whether empty ones move."""
         starts = [("box, empty moved", on_box, True)]
         means = _means(x, groups)
-        if len(means) == self.n_clusters:
+        if len(means) and (groups >= 0).all():
+            # Clusters beyond the places wait on the box, where no hand was held.
+            away = cdist(on_box, means).min(axis=1)
+            spare = on_box[np.argsort(-away)[: self.n_clusters - len(means)]]
+            starts.append(("groups", np.vstack([means, spare]), False))
+        elif len(means) == self.n_clusters:
             starts.append(("groups", means, True))
         for seed in range(_STARTS):
             drawn, _ = kmeans_plusplus(x, self.n_clusters, random_state=seed)

@@ -25,6 +25,8 @@ from ikns.nullspace.natural_posture import NaturalPosture
 #: A place whose ends differ from the mean by more than this share of the range was half
 #: explored, and is asked for again.
 _HALF_EXPLORED = 0.1
+#: Most places that are named.
+_NAMED = 3
 #: A place with less than this share of an equal part of the samples is left out.
 _SHARE = 0.1
 
@@ -273,17 +275,22 @@ class IntentMap(EstimatorBase):
 
     def warn_of_scatter(self) -> None:
         """Name the places whose ends are far from the mean, with a MapWarning."""
+        wide = [k for k in np.argsort(-self.scatter_).tolist() if self._half(k)]
         named = [
-            f"{format_point(self.centers_, k)} ({self.scatter_[k]:.2f} of the range)"
-            for k in np.flatnonzero(self.scatter_ > _HALF_EXPLORED).tolist()
+            f"{format_point(self.centers_, k)} by {self.scatter_[k]:.2f}"
+            for k in wide[:_NAMED]
         ]
         if named:
             warnings.warn(
-                f"the elbow did not go as far as elsewhere, or farther, with the wrist "
-                f"at {'; '.join(named)}: repeat these places.",
+                f"at {len(wide)} of {len(self.centers_)} places the elbow's ends are "
+                f"more than {_HALF_EXPLORED:g} of the range from their mean, most "
+                f"with the wrist at {'; '.join(named)}: repeat these.",
                 MapWarning,
                 stacklevel=2,
             )
+
+    def _half(self, k: int) -> bool:
+        return bool(self.scatter_[k] > _HALF_EXPLORED)
 
     def __sklearn_tags__(self) -> Any:
         """Tell scikit-learn that `y` holds one number."""
