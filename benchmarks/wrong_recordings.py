@@ -146,6 +146,8 @@ def _turned(
             return float("nan")
     off = np.abs(MarkerIK(skeleton).track(recording).angles - person.angles)[rows]
     seen = np.isfinite(off).any(axis=0)
+    if not seen.any():  # the motion says so itself
+        return 0.0
     return float(np.degrees(np.nanmedian(off[:, seen], axis=0).max()))
 
 
