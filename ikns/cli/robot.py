@@ -35,7 +35,8 @@ def robot(
     start: Annotated[
         str | None,
         typer.Option(
-            "--from", help="Link where the chain starts, such as a torso [the root]."
+            "--from",
+            help="Link where the chain starts, such as a torso; default: the root.",
         ),
     ] = None,
     task: Annotated[
