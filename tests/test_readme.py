@@ -13,6 +13,10 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
+#: Commands with commands of their own.
+GROUPS = ("markers", "study")
+
+
 def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
 
@@ -58,6 +62,7 @@ def test_every_command_line_shown_is_one_that_the_program_knows(
         "control",
         "convert",
         "ik",
+        "markers",
         "pick",
         "replay",
         "report",
@@ -73,7 +78,7 @@ def test_every_command_line_shown_is_one_that_the_program_knows(
     }
     for program, command, *rest in shown:
         assert program == "ikns"
-        place = [command, rest.pop(0)] if command == "study" else [command]
+        place = [command, rest.pop(0)] if command in GROUPS else [command]
         assert main([*place, "--help"]) == 0
         text = capsys.readouterr().out
         for option in re.findall(r"--\S+", " ".join(rest)):
