@@ -204,8 +204,9 @@ def length_estimate(
     usual = max(length, float(np.sqrt(np.median(squared))))
     upper, lower = (1 + level) / 2, (1 - level) / 2
     return LengthEstimate(
-        corrected=_longest(length, along, squared, 0.5),
-        low=_longest(length, along, squared, upper),
+        # Noise makes a length longer, not shorter, but for the luck of few replicates.
+        corrected=min(_longest(length, along, squared, 0.5), length),
+        low=min(_longest(length, along, squared, upper), length),
         high=_longest(usual, along, squared, lower),
     )
 
