@@ -108,7 +108,10 @@ def _judged(
     worn = skeleton.marker_set
     # Without a static trial the person's own distances are not known.
     known = None if static is None else skeleton
-    findings = judge_exploration(recording, worn, skeleton, skeleton=known, chain=chain)
+    with naming(recording.source):
+        findings = judge_exploration(
+            recording, worn, skeleton, skeleton=known, chain=chain
+        )
     if static is not None:
         findings += other_subject(static, recording, worn)
     if faults := refused(findings):
@@ -149,7 +152,8 @@ def _left_out(
     own = ("thorax", *chain_sides(chain))
     counts = np.array([marker.link.startswith(own) for marker in worn.markers])
     for recording in recordings:
-        markers = worn.pick(recording.labels, recording.markers)
+        with naming(recording.source):
+            markers = worn.pick(recording.labels, recording.markers)
         counts |= np.isfinite(markers).all(axis=2).any(axis=0)
     named = [label for label, count in zip(worn.labels, counts, strict=True) if count]
     return scaling.sentences(static.source, only=named)
