@@ -142,10 +142,10 @@ def counts(found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def real(folder: Path, *, quick: bool) -> list[dict]:
     """Worst distance of the chain's markers in real recordings, a row a trial, mm."""
     rows = []
-    for name in ("ADL001", "ADL005"):
+    for name in sorted(p.name for p in folder.iterdir() if p.is_dir()):
         static = read(folder / name / f"{name}_static.csv")
         skeleton, _ = scale(
-            Skeleton.load(), static, marker_set="ue_adl", min_duration=0.3
+            Skeleton.load(), static, marker_set="ue_adl", min_duration=0.15
         )
         for task in "F" if quick else "FADC":
             for side, letter in (("right", "R"), ("left", "L")):
