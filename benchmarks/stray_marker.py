@@ -22,6 +22,7 @@ from ikns.calibration import calibrate, sight_needs
 from ikns.calibration.subject import Subject
 from ikns.live.control import ControlFrame, FrameSolver
 from ikns.live.control.settings import ControlSettings
+from ikns.motion.marker_ik.turns import turned_markers
 from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
 
@@ -142,17 +143,22 @@ def counts(found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def real(folder: Path, *, quick: bool) -> list[dict]:
     """Worst distance of the chain's markers in real recordings, a row a trial, mm."""
     rows = []
-    for name in ("ADL001", "ADL005"):
+    for name in sorted(p.name for p in folder.iterdir() if p.is_dir()):
         static = read(folder / name / f"{name}_static.csv")
         skeleton, _ = scale(
-            Skeleton.load(), static, marker_set="ue_adl", min_duration=0.3
+            Skeleton.load(), static, marker_set="ue_adl", min_duration=0.15
         )
         for task in "F" if quick else "FADC":
             for side, letter in (("right", "R"), ("left", "L")):
                 recording = read(folder / name / f"{name}{task}{letter}1.csv")
                 motion = MarkerIK(skeleton).track(recording)
                 seen = skeleton.marker_set.pick(recording.labels, recording.markers)
-                model = np.stack([skeleton.markers_in_world(q) for q in motion.q])
+                model = np.stack(
+                    [
+                        turned_markers(skeleton, q, frame)
+                        for q, frame in zip(motion.q, seen, strict=True)
+                    ]
+                )
                 needs = sight_needs(skeleton, f"{side}_arm").values()
                 of_chain = np.concatenate([columns for columns, _ in needs])
                 away = np.linalg.norm(model - seen, axis=2)[:, of_chain]
