@@ -144,9 +144,11 @@ def _turned(
         ).skeleton
         if skeleton is None:
             return float("nan")
-    off = np.abs(MarkerIK(skeleton).track(recording).angles - person.angles)[rows]
+    # As solved, before tracking itself leaves out frames that do not fit.
+    q = MarkerIK(skeleton).track(recording).q[:, -person.angles.shape[1] :]
+    off = np.abs(q - person.angles)[rows]
     seen = np.isfinite(off).any(axis=0)
-    if not seen.any():  # the motion says so itself
+    if not seen.any():  # the clean recording does not show these frames either
         return 0.0
     return float(np.degrees(np.nanmedian(off[:, seen], axis=0).max()))
 
