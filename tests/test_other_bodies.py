@@ -108,7 +108,7 @@ def test_lengths_and_axes_of_another_body_are_found(seed):
     lean = other_body.turn(np.array([1.0, 0, 0]), np.array(-arm.carrying))
     true = np.arccos(arm.axes[3] @ bent @ lean @ arm.axes[4])
     generic = np.radians(90 + 13)
-    # Spreads of the two tilts are below 1 deg; so three of them, and axes that are up
+    # Spreads of the two tilts are below 1 deg, so three of them, and axes that are up
     # to 2 mm from meeting.
     assert abs(np.arccos(elbow @ fore) - true) < np.radians(3)
     assert abs(generic - true) > np.radians(3)  # so there was something to find

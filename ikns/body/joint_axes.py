@@ -1,7 +1,9 @@
 """How the axes of a person's elbow, forearm and wrist lie: tilts of the URDF's joints.
 
 A joint tilts by a rotation vector in its own frame, before it moves. About the joint's
-own axis that would only shift the zero of its angle, so two components are free.
+own axis that only shifts the zero of its angle, and about the axis of the joint before
+the zero of that one, which is a convention. What is left is the angle between the two:
+one component a joint.
 """
 
 from __future__ import annotations
@@ -16,22 +18,20 @@ from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.errors import InvalidInput
 
-#: Joints that tilt, with the components (0 is X) that are free and their spread between
-#: people, deg. Carrying angle, X of pronation: 5.9 deg (Paraskevas et al. 2004, see
-#: urdf/README.md). The others are our estimates: published axes of elbow and wrist
-#: scatter by 3 to 6 deg between people.
+#: Joints that tilt, with the free component (0 is X) and its spread between people,
+#: deg. Carrying angle, X of pronation: 5.9 deg (Paraskevas et al. 2004, see
+#: urdf/README.md). The others are our estimates.
 _SPREADS = {
-    "elbow_flexion": {0: 4.0, 1: 4.0},
-    "forearm_pronation": {0: 5.9, 2: 4.0},
-    "wrist_flexion": {1: 5.0, 2: 5.0},
-    "wrist_deviation": {0: 5.0, 1: 5.0},
+    "elbow_flexion": (0, 4.0),  # against the long axis of the upper arm
+    "forearm_pronation": (0, 5.9),
+    "wrist_flexion": (2, 5.0),  # against the axis of pronation
+    "wrist_deviation": (1, 5.0),
 }
 #: All free tilts: joint, component, and spread in rad.
 TILTS: tuple[tuple[str, int, float], ...] = tuple(
     (f"{side}_{joint}", component, float(np.radians(sd)))
     for side in SIDES
-    for joint, spreads in _SPREADS.items()
-    for component, sd in spreads.items()
+    for joint, (component, sd) in _SPREADS.items()
 )
 
 
