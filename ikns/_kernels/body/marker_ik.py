@@ -79,7 +79,7 @@ def solve_frame(
         residual, iterations, converged = descend(problem, n_seen, pull, s)
         # Half turns about all axes of a shoulder leave the markers where they are, so
         # only its limits tell such poses apart.
-        cost = residual**2 * n_seen + far_cost(problem, s.q)
+        cost = residual**2 * n_seen + _beyond(problem, s.q, -1)
         if cost < best_cost:
             best_cost, best_residual = cost, residual
             best_iterations, best_converged = iterations, converged
@@ -97,12 +97,13 @@ def solve_frame(
 @compiled
 def far_cost(problem: MarkerProblem, q: Array) -> float:
     """Return the cost of joints beyond their limits, m^2; 0 unless they are far."""
-    return _far(problem, q, -1)
+    cost = _beyond(problem, q, -1)
+    return cost if cost > (problem.limit * FAR) ** 2 else 0.0
 
 
 @compiled
-def _far(problem: MarkerProblem, q: Array, branch: int) -> float:
-    """Return the same for one limb, or for all with -1."""
+def _beyond(problem: MarkerProblem, q: Array, branch: int) -> float:
+    """Return the cost of limits for one limb, or for all with -1, however small."""
     square = 0.0
     for i in range(len(problem.angle)):
         at = problem.angle[i]
@@ -110,7 +111,7 @@ def _far(problem: MarkerProblem, q: Array, branch: int) -> float:
             over = max(q[at] - problem.upper[i], 0.0)
             over += min(q[at] - problem.lower[i], 0.0)
             square += over**2
-    return problem.limit**2 * square if square > FAR**2 else 0.0
+    return problem.limit**2 * square
 
 
 @compiled
@@ -119,7 +120,7 @@ def _sum_by_limb(
 ) -> None:
     """Write each limb's squared errors and cost of limits after the first entry."""
     for b in range(1, len(residuals)):
-        residuals[b] = _far(problem, q, b - 1)
+        residuals[b] = _beyond(problem, q, b - 1)
     for m in range(len(s.weight)):
         branch = problem.marker_branch[m]
         if s.weight[m] > 0 and branch >= 0:
