@@ -108,10 +108,11 @@ def test_lengths_and_axes_of_another_body_are_found(seed):
     lean = other_body.turn(np.array([1.0, 0, 0]), np.array(-arm.carrying))
     true = np.arccos(arm.axes[3] @ bent @ lean @ arm.axes[4])
     generic = np.radians(90 + 13)
-    # Spreads of the two tilts are below 1 deg, so three of them, and axes that are up
-    # to 2 mm from meeting.
-    assert abs(np.arccos(elbow @ fore) - true) < np.radians(3)
-    assert abs(generic - true) > np.radians(3)  # so there was something to find
+    # These axes miss one another by 2 mm (sd) at either end, which the model does not:
+    # 2.8 mm on the 45 mm by which the forearm's markers stand off their axis.
+    off = abs(np.arccos(elbow @ fore) - true)
+    assert off < np.arctan(2.8 / 45) * 1.2
+    assert off < abs(generic - true)  # nearer than without a fit
 
 
 @pytest.mark.parametrize("seed", [1, 2])
