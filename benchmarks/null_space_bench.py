@@ -112,7 +112,10 @@ def main() -> None:
             f"| {row['above_0.2']:.1%} | {row['auc_20']:.3f} | {row['auc_10']:.3f} "
             f"| {row['turned']:.2f} |"
         )
-    print("\n" + "\n".join(verdicts(table)))
+    if options.quick:
+        print("\nOther people are one person here: goals are for all of them.")
+    else:
+        print("\n" + "\n".join(verdicts(table)))
 
 
 if __name__ == "__main__":
