@@ -1,6 +1,8 @@
 """TRC, CSV, MOT and STO written and read; one format into another."""
 
 import importlib.util
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -115,7 +117,17 @@ def markers_by_the_book(path):
     return labels, table[:, 1], table[:, 2:].reshape(len(rows), len(labels), 3)
 
 
+def in_a_process(function, path):
+    """OpenSim does not load beside the CasADi that other tests have loaded."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(function, path).result()
+
+
 def markers_by_opensim(path):
+    return in_a_process(markers_in_opensim, path)
+
+
+def markers_in_opensim(path):
     import opensim
 
     found = opensim.TimeSeriesTableVec3(str(path))
@@ -164,6 +176,10 @@ def by_the_book(path):
 
 
 def by_opensim(path):
+    return in_a_process(in_opensim, path)
+
+
+def in_opensim(path):
     """Read it by OpenSim itself; both ways that it has find the same."""
     import opensim
 

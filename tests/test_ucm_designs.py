@@ -148,6 +148,7 @@ def test_a_real_reach_lasts_as_long_as_its_authors_say(name: str, data: Path) ->
     cut = movement(motion.time, motion.hand_speed("right_arm"))
     with (folder / f"{name}FR1angles.csv").open() as file:
         frames = sum(1 for _ in file) - 1
-    # They cut at 3 % of the peak speed of a finger, we at 0.05 m/s of the knuckles,
-    # which is 5 to 10 %: a few frames at either end of 100 Hz.
-    assert abs(np.ptp(motion.time[cut]) - frames / 100) < 0.2
+    # They cut at 3 % of a finger's peak speed, we at 0.05 m/s of the knuckles, 13 %.
+    # A minimum-jerk reach passes these at 4.5 and 10 % of its duration, on either side,
+    # so it lasts 11 % less; a real one begins and ends more slowly, hence twice that.
+    assert abs(np.ptp(motion.time[cut]) - frames / 100) < 0.22 * frames / 100

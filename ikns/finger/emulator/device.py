@@ -214,6 +214,11 @@ class Servo:
             "hardware_error_status": self.memory.alert,
             "registered_instruction": self._registered is not None,
         }
+        # A goal that is not reached counts as motion from the first moment on.
+        left = self.memory["goal_position"] - self.motor.profile
+        watched = self.memory["bus_watchdog"] if "bus_watchdog" in self.model else 0
+        if self.torque and watched >= 0 and abs(left) >= 1:
+            values["moving"] = 1
         for name, value in values.items():
             if name in self.model:
                 self.memory[name] = int(value)

@@ -163,8 +163,12 @@ def _segments(skeleton: Skeleton) -> dict[str, _Segment]:
         own = columns[link]
         joints, before = _way(skeleton, link, segments)
         turns = int(_turns(skeleton, link))
-        need = max(1, min(_ENOUGH if link == "thorax" else 1 + turns, len(own)))
         free = len(set(joints) - held)
+        enough = _ENOUGH if link == "thorax" else 1 + turns
+        if link != "thorax" and segments[before].turns:
+            # Its own joints and the one that the segment before leaves open.
+            enough = max(enough, -(-free // 2))
+        need = max(1, min(enough, len(own)))
         segments[link] = _Segment(own, need, before, joints, free, turns)
     return segments
 
