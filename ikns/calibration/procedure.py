@@ -157,7 +157,7 @@ def calibrate(
         min_samples=max(enough, len(chain_joints(chain)) + 1),
     )
     other = other_hand_moves(motions, chain, times=_OTHER_SIDE)
-    side = f"{_say_side(other, chain)}" if other else ""
+    side = _say_side(other, chain)
     if not any(gate.any() for gate in gates):
         found = no_still_sample(motions, chain, max_hand_speed, min_duration=min_rest)
         raise NotEnoughData(f"{names}: {found} {side}".rstrip())
@@ -172,7 +172,6 @@ def calibrate(
             natural=measured.natural,
             max_hand_speed=max_hand_speed,
         )
-    arms = two_arms_fault(chain, n_dof, learned.n_components_)
     report = {
         "chain": chain,
         "marker_set": skeleton.marker_set.name,
@@ -197,12 +196,12 @@ def calibrate(
         "warnings": [
             *measured.warnings,
             *_rejections(explorations, motions, chain),
-            *(f"{names}: {fault}" for fault in (side, arms and f"{arms}.") if fault),
+            *(f"{names}: {fault}" for fault in _faults(learned, chain, side)),
             *caught,
         ],
     }
-    step = len(hands) // _SHOWN + 1
-    shown = np.column_stack([hands, learned.labels_ + 1.0])[::step]
+    shown = np.column_stack([hands, learned.labels_ + 1.0])
+    shown = shown[:: len(hands) // _SHOWN + 1]
     return Subject(skeleton, learned, chain, report, motions, shown, readouts)
 
 
@@ -236,6 +235,12 @@ def _fit(
     return x, [str(warning.message) for warning in caught]
 
 
+def _faults(learned: NullSpaceMap, chain: str, side: str) -> list[str]:
+    """Say what speaks against the chain or its freedoms."""
+    arms = two_arms_fault(chain, learned.n_dof, learned.n_components_)
+    return [fault for fault in (side, arms and f"{arms}.") if fault]
+
+
 def _rejections(
     recordings: Sequence[Recording], motions: Sequence[Motion], chain: str
 ) -> list[str]:
@@ -248,4 +253,7 @@ def _rejections(
 
 
 def _say_side(other: str, chain: str) -> str:
+    """Say that the other hand moved, if it did."""
+    if not other:
+        return ""
     return f"{other[0].upper()}{other[1:]}: {chain} seems to be the wrong side."

@@ -27,7 +27,7 @@ from ikns.cli.reading import Read, reads_markers
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
-    from ikns.analysis.compare import NullSpaceComparison
+    from ikns.analysis.compare import Crosstalk, NullSpaceComparison
 
 _UNITS = {"max_hand_speed": "m_s", "min_duration": "s"}
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
@@ -79,7 +79,6 @@ def compare(
     the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
     line along Z leads the hand; how far the null space bends; and crosstalk.
     """
-    from ikns.analysis.compare import motion_crosstalk
     from ikns.calibration.simulated import is_simulated
     from ikns.motion.marker_ik.rejection import rejection_sentence
 
@@ -111,13 +110,7 @@ def compare(
     across = None
     with naming(str(reaches or recording)):
         try:
-            across = motion_crosstalk(
-                calibrated.null_space_map,
-                reaching,
-                chain=own,
-                max_hand_speed=gate["max_hand_speed"],
-                **options,
-            )
+            across = _crosstalk(calibrated, reaching, **options)
         except NotEnoughData as error:
             if reaches is not None:
                 raise
@@ -164,6 +157,19 @@ def compare(
         *([] if figure is None else [f"Wrote {figure}"]),
         *notes(warned),
         as_json=as_json,
+    )
+
+
+def _crosstalk(subject: ikns.Subject, motion: ikns.Motion, **options: Any) -> Crosstalk:
+    """Return the change of c on natural reaches."""
+    from ikns.analysis.compare import motion_crosstalk
+
+    return motion_crosstalk(
+        subject.null_space_map,
+        motion,
+        chain=subject.chain,
+        max_hand_speed=subject.gate["max_hand_speed"],
+        **options,
     )
 
 
