@@ -211,7 +211,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     folder = options.data / "ue_adl"
-    count = 6 if options.quick else options.pairs
+    count = 1 if options.quick else options.pairs
     rng = np.random.default_rng(options.seed)
     people = []
     if options.set != "ue_adl":
