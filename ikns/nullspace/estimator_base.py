@@ -20,6 +20,10 @@ class EstimatorBase:
 
     #: Columns of what it was fitted to.
     n_features_in_: int
+    #: An attribute that it has once it is fitted.
+    _fitted = "interpolator_"
+    #: Whether `y` holds vectors; else a number a sample.
+    _vectors = True
 
     @classmethod
     def _parameter_names(cls) -> list[str]:
@@ -56,15 +60,19 @@ class EstimatorBase:
         return f"{type(self).__name__}({', '.join(given)})"
 
     def __sklearn_tags__(self) -> Any:
-        """Tell scikit-learn that `y` holds vectors and is needed."""
+        """Tell scikit-learn that `y` is needed, and what it holds."""
         from sklearn.utils import InputTags, Tags, TargetTags
 
-        target = TargetTags(required=True, multi_output=True, single_output=False)
+        target = TargetTags(
+            required=True,
+            multi_output=self._vectors,
+            single_output=not self._vectors,
+        )
         return Tags(estimator_type=None, target_tags=target, input_tags=InputTags())
 
     def _check_fitted(self) -> None:
         """Raise scikit-learn's error unless it is fitted."""
-        if not hasattr(self, "interpolator_"):
+        if not hasattr(self, self._fitted):
             from sklearn.exceptions import NotFittedError
 
             raise NotFittedError(f"call fit of this {type(self).__name__} first.")

@@ -148,6 +148,8 @@ class NaturalPosture(EstimatorBase):
     (True, 0.2)
     """
 
+    _fitted, _vectors = "coefficients_", False
+
     def __init__(self, *, penalty: float = 0.03, guard: bool = True) -> None:
         self.penalty = penalty
         self.guard = guard
@@ -284,19 +286,6 @@ class NaturalPosture(EstimatorBase):
 
     def _leverage(self, phi: Array) -> Array:
         return np.einsum("...i,ij,...j->...", phi, self.leverage_, phi)
-
-    def __sklearn_tags__(self) -> Any:
-        """Tell scikit-learn that it is a regressor of one number."""
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = False
-        tags.target_tags.single_output = True
-        return tags
-
-    def _check_fitted(self) -> None:
-        if not hasattr(self, "coefficients_"):
-            from sklearn.exceptions import NotFittedError
-
-            raise NotFittedError("call fit of this NaturalPosture first.")
 
 
 def leverage_of(phi: Array, penalty: float) -> tuple[Array, float]:

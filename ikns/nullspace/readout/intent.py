@@ -78,6 +78,8 @@ class IntentMap(EstimatorBase):
     0.75
     """
 
+    _fitted, _vectors = "ends_", False
+
     def __init__(
         self,
         n_points: int = 10,
@@ -291,19 +293,6 @@ class IntentMap(EstimatorBase):
 
     def _half(self, k: int) -> bool:
         return bool(self.scatter_[k] > _HALF_EXPLORED)
-
-    def __sklearn_tags__(self) -> Any:
-        """Tell scikit-learn that `y` holds one number."""
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = False
-        tags.target_tags.single_output = True
-        return tags
-
-    def _check_fitted(self) -> None:
-        if not hasattr(self, "ends_"):
-            from sklearn.exceptions import NotFittedError
-
-            raise NotFittedError("call fit of this IntentMap first.")
 
 
 def wrapped(angle: Array) -> Array:
