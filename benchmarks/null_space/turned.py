@@ -8,24 +8,16 @@ no joint limits: a swivel of 20 deg is 20 deg, whatever the model's joints say.
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 
 Array = np.ndarray
-_ARM = (
-    "shoulder_abduction",
-    "shoulder_flexion",
-    "shoulder_rotation",
-    "elbow_flexion",
-    "forearm_pronation",
-    "wrist_flexion",
-    "wrist_deviation",
-)
 #: Carrying angle of the right arm between elbow and forearm, rad (urdf/README).
 _CARRYING = -0.226893
 
 
 def _columns(skeleton: Skeleton, side: str) -> list[int]:
-    return [skeleton.joint_names.index(f"{side}_{joint}") for joint in _ARM]
+    return [skeleton.joint_names.index(joint) for joint in chain_joints(f"{side}_arm")]
 
 
 def held_hand(
