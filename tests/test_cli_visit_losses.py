@@ -121,10 +121,11 @@ def test_rows_that_a_visit_loses_are_on_the_panel_and_in_the_exit_code(
     for sentence in losses:
         assert "rows are missing (cannot be written: no space left" in sentence
         assert sentence.rstrip(".") in err
-    lost = [int(each.split(": ")[1].split()[0]) for each in losses if "model" in each]
-    handed = [
-        int(each.split(" of ")[1].split()[0]) for each in losses if "model" in each
-    ]
+    # A frame has a row in two files, and the disk may be full between the two.
+    kept = []
+    for name in ("markers", "model"):
+        (told,) = [each for each in losses if name in each]
+        lost = int(told.split(": ")[1].split()[0])
+        kept.append(int(told.split(" of ")[1].split()[0]) - lost)
     session = folder / read_visit(folder).about["session"]
-    recorded = read_run(session)
-    assert handed[0] - lost[0] == len(recorded.frame)
+    assert len(read_run(session).frame) == min(kept)
