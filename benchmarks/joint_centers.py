@@ -5,7 +5,7 @@ the arm. Where the joints are is told by motion alone: the point that keeps its 
 the clusters of both neighboring segments (symmetrical center of rotation estimation,
 Ehrig et al. 2006, J Biomech 39:2798), without any skeleton or inverse kinematics.
 
-- center: its place in the static trial, seen from the midpoint of the two landmarks, mm:
+- center: its place in the static trial, seen from the middle of the two landmarks, mm:
   along the proximal segment; toward the lateral or radial landmark; to the front of the
   elbow or the palm. Mean of the two segments' estimates;
 - gap: root mean square distance between the places to which the two clusters carry the
@@ -134,7 +134,9 @@ def main() -> None:
     for row in rows:
         shown = " | ".join(f"{x:.0f}" for x in row["center_mm"])
         before, after = row["gap_mm"]
-        print(f"| {row['arm']} | {row['joint']} | {shown} | {before:.1f} | {after:.1f} |")
+        print(
+            f"| {row['arm']} | {row['joint']} | {shown} | {before:.1f} | {after:.1f} |"
+        )
     print()
     for name in JOINTS:
         own = np.array([row["center_mm"] for row in rows if row["joint"] == name])

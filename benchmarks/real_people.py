@@ -21,7 +21,7 @@ import pinocchio
 
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.scaling import scale
-from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.marker_ik import MarkerIK, turned_markers
 from ikns.recording.files import read
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -43,7 +43,9 @@ def best_shift(mine: np.ndarray, theirs: np.ndarray) -> tuple[float, int]:
 def by_segment(skeleton: Skeleton, motion, recording) -> dict[str, float]:
     """Median marker distance per link, mm."""
     seen = skeleton.marker_set.pick(recording.labels, recording.markers)
-    model = np.stack([skeleton.markers_in_world(q) for q in motion.q])
+    model = np.stack(
+        [turned_markers(skeleton, *row) for row in zip(motion.q, seen, strict=True)]
+    )
     distance = 1000 * np.linalg.norm(model - seen, axis=2)
     links = np.array([marker.link for marker in skeleton.marker_set.markers])
     return {

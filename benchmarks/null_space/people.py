@@ -99,7 +99,9 @@ def arm_trial(skeleton: Skeleton, motion: Motion, chain: str, name: str) -> ArmT
     )
 
 
-def real_arms(folder: Path, *, people: int | None = None) -> list[Arm]:
+def real_arms(
+    folder: Path, *, people: int | None = None, marker_set: str = "ue_adl"
+) -> list[Arm]:
     """Both arms of the people in a folder of UE_ADL, of the first ones alone if asked.
 
     Recordings that cannot be read or tracked are left out.
@@ -110,7 +112,7 @@ def real_arms(folder: Path, *, people: int | None = None) -> list[Arm]:
         static = read(folder / name / f"{name}_static.csv")
         # One static trial lasts 0.21 s.
         skeleton, _ = scale(
-            Skeleton.load(), static, marker_set="ue_adl", min_duration=0.2
+            Skeleton.load(), static, marker_set=marker_set, min_duration=0.2
         )
         for side in SIDES:
             chain, trials = f"{side}_arm", []
