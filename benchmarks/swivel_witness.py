@@ -9,8 +9,8 @@ frames whose elbow is bent by 25 deg or more:
 - gain: slope of the tracked swivel over the witness's, and their correlation, median
   over arms. `hinge` is what intent reads, `plane` is that of the model's own joint
   centers, `skin` the line through the epicondyles, carried by the upper arm's cluster;
-- change: what a reach leaves of each after the natural posture (fitted to all of an
-  arm's own frames), mean, in units of 70 deg.
+- change: what a reach leaves of each after the natural posture (fitted to all frames
+  of an arm), mean, in units of 70 deg.
 
 Skin over the upper arm follows its turns in part. Whatever follows it shows less of what
 people do, and of what they wish: a smaller change is not a better one.
