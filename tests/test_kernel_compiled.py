@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from ikns._kernels import compiled as module
+from ikns.live.warm_up import warm_up
 
 KERNELS = Path(module.__file__).parent
 
@@ -107,3 +108,15 @@ def test_importing_the_package_does_not_load_numba():
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert said.stdout.strip() == "False"
+
+
+def test_kept_code_runs_without_the_compiler_which_still_works_afterwards():
+    warm_up()  # all is on disk now
+    script = (
+        "import sys, numba, numpy as np\n"
+        "from ikns.live.warm_up import warm_up\n"
+        "warm_up()\n"
+        "assert 'numba.np.arraymath' not in sys.modules\n"
+        "assert numba.njit(lambda x: (x @ x).sum())(np.ones((2, 2))) == 8\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)

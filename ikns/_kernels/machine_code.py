@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 SUFFIX = ".nbc"
@@ -54,7 +55,9 @@ class KernelCache:
 
         A damaged file is removed, which is said on stderr.
         """
-        target_context.refresh()
+        # All that machine code needs of numba. Compiling loads the rest by itself, which
+        # takes longer than most commands.
+        rtsys.initialize(target_context)
         path = self._path(signature, target_context.codegen())
         try:
             content = path.read_bytes()

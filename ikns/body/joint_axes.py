@@ -12,7 +12,6 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ikns.arrays import Array
 from ikns.body.chains import SIDES
@@ -46,6 +45,8 @@ def tilt_urdf(urdf: str, tilts: Mapping[str, Array]) -> str:
     >>> 'rpy="-0.126893 0 0"' in tilted
     True
     """
+    from scipy.spatial.transform import Rotation
+
     robot = ET.fromstring(
         urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
     )

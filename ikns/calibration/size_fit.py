@@ -19,7 +19,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from ikns.arrays import Array, Indices, Mask
 from ikns.body.model_file import SEGMENTS
@@ -70,6 +69,8 @@ def fit_sizes(generic: Skeleton, target: Array) -> SizeFit:
     The generic body has the markers at their nominal places; the target is their mean
     positions in the world (M, 3), m; NaN where never seen.
     """
+    from scipy.linalg import cho_factor, cho_solve  # takes a while to load
+
     worn = generic.marker_set
     seen = seen_markers(target)
     weight = np.linalg.cholesky(np.linalg.inv(size_covariance())).T

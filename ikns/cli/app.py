@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import signal
 import sys
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -109,7 +110,7 @@ def _run(given: list[str]) -> int:
     try:
         _refuse_empty(given)
         # Not standalone: typer then raises errors instead of printing several lines.
-        code = typer.main.get_command(app).main(
+        code = _commands().main(
             args=_repeat("--exploration", given),
             prog_name="ikns",
             standalone_mode=False,
@@ -139,6 +140,12 @@ def _run(given: list[str]) -> int:
     with contextlib.suppress(OSError):
         sys.stderr.write(f"ikns: {' '.join(message.split())}\n")
     return 2
+
+
+@functools.cache
+def _commands() -> Any:
+    """Build the parsers of all commands, once for all calls."""
+    return typer.main.get_command(app)
 
 
 def _refuse_empty(argv: Sequence[str]) -> None:

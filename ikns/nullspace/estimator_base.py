@@ -1,14 +1,17 @@
 """What scikit-learn asks of an estimator, without importing scikit-learn.
 
-A map that is read from a file and evaluated needs nothing of scikit-learn, whose import
-takes longer than most commands; only fitting does.
+The import of scikit-learn takes longer than most commands. Neither a map that is read
+from a file needs it, nor one that is fitted to arrays in which it would find no fault.
 """
 
 from __future__ import annotations
 
 import inspect
-from typing import Any, Self
+from typing import Any, Self, TypeGuard
 
+import numpy as np
+
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 
 
@@ -70,9 +73,41 @@ class EstimatorBase:
         )
         return Tags(estimator_type=None, target_tags=target, input_tags=InputTags())
 
+    def _validated(self, X: Any, *y: Any, **options: Any) -> Any:
+        """Return samples, and targets if any are given, as scikit-learn checks them.
+
+        Arguments are those of `sklearn.utils.validation.validate_data`, which is asked
+        only where it could change an array or refuse it.
+        """
+        reset = options.get("reset", True)
+        plain = _is_plain(X) and X.ndim == 2 and not hasattr(self, "feature_names_in_")
+        if plain and not reset:
+            plain = X.shape[1] == self.n_features_in_
+        if plain and y:
+            most = 2 if options.get("multi_output") else 1
+            plain = _is_plain(y[0]) and y[0].ndim <= most and len(y[0]) == len(X)
+        if not plain:
+            from sklearn.utils.validation import validate_data
+
+            return validate_data(self, X, *y, **options)
+        if reset:
+            self.n_features_in_ = X.shape[1]
+        return (X, *y) if y else X
+
     def _check_fitted(self) -> None:
         """Raise scikit-learn's error unless it is fitted."""
         if not hasattr(self, self._fitted):
             from sklearn.exceptions import NotFittedError
 
             raise NotFittedError(f"call fit of this {type(self).__name__} first.")
+
+
+def _is_plain(x: Any) -> TypeGuard[Array]:
+    """Whether it is an array of finite 64-bit numbers with nothing missing."""
+    return (
+        type(x) is np.ndarray
+        and x.dtype == np.float64
+        and x.ndim > 0
+        and x.size > 0
+        and bool(np.isfinite(x).all())
+    )

@@ -227,10 +227,7 @@ class NaturalPosture(EstimatorBase):
         InvalidInput, ValueError
             When the penalty is not above 0, or samples are not finite or do not match.
         """
-        # Only here: what is read from a file does without.
-        from sklearn.utils.validation import validate_data
-
-        w, s = validate_data(self, X, y, y_numeric=True, dtype=np.float64)
+        w, s = self._validated(X, y, y_numeric=True, dtype=np.float64)
         if not 0 < self.penalty < np.inf:
             raise InvalidInput(f"expected a penalty above 0, found {self.penalty}.")
         s = np.asarray(s, dtype=np.float64)
@@ -263,10 +260,8 @@ class NaturalPosture(EstimatorBase):
 
     def predict(self, X: ArrayLike) -> Array:
         """Return :meth:`swivel` at wrist centers (N, 3), all of them finite, (N,)."""
-        from sklearn.utils.validation import validate_data
-
         self._check_fitted()
-        return self.swivel(validate_data(self, X, dtype=np.float64, reset=False))
+        return self.swivel(self._validated(X, dtype=np.float64, reset=False))
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Share of the variance of held-out swivels (N,) that is explained.

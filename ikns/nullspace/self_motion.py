@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints, chain_sides
@@ -176,6 +175,8 @@ def _corrected(
 
 def _pose_error(hands: tuple[Array, Array], target: tuple[Array, Array]) -> Array:
     """Error to the target, (6 sides,): m, then a rotation vector in rad, by side."""
+    from scipy.spatial.transform import Rotation
+
     turn = target[1] @ np.swapaxes(hands[1], -1, -2)
     rotation = Rotation.from_matrix(turn).as_rotvec()
     return np.concatenate([target[0] - hands[0], rotation], axis=1).ravel()

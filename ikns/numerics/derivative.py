@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import correlate1d
 
 from ikns.arrays import Array, Mask
 
@@ -70,7 +69,12 @@ def _parabola_slopes(values: Array, window: int, step: float) -> Array:
     at = (np.arange(window) - np.arange(window)[:, None]) / half
     weights, _ = _weights(at, np.ones((window, window), dtype=bool))
     weights /= half * step
-    found: Array = correlate1d(values, weights[half], axis=0, mode="constant")
+    # By pairs: those of the middle are antisymmetric, but for rounding.
+    found = np.zeros(values.shape)
+    middle = found[half:-half]
+    for k in range(half):
+        far = values[window - 1 - k : len(values) - k]
+        middle += weights[half, -1 - k] * (far - values[k : k + len(middle)])
     found[:half] = np.tensordot(weights[:half], values[:window], axes=1)
     found[-half:] = np.tensordot(weights[-half:], values[-window:], axes=1)
     return found

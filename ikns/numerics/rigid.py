@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ikns.arrays import Array
 
@@ -32,10 +31,16 @@ def pose_steps(poses: Array) -> Array:
     Poses (T, 7) are position (m) and unit quaternion x, y, z, w; steps (T - 1, 6) are
     linear (m) and angular (rad).
     """
-    turns = Rotation.from_quat(poses[:, 3:])
-    back = turns[:-1].inv()
-    w = (back * turns[1:]).as_rotvec()
-    p = back.apply(np.diff(poses[:, :3], axis=0))
+    turns = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    v, s = -turns[:-1, :3], turns[:-1, 3:]  # of the turn back
+    v1, s1 = turns[1:, :3], turns[1:, 3:]
+    w = _rotation_vector(
+        s * v1 + s1 * v + np.cross(v, v1),
+        s * s1 - np.sum(v * v1, axis=1, keepdims=True),
+    )
+    moved = np.diff(poses[:, :3], axis=0)
+    twice = 2 * np.cross(v, moved)
+    p = moved + s * twice + np.cross(v, twice)
     half = np.linalg.norm(w, axis=1, keepdims=True) / 2
     # Below 1e-4 rad the next term of the series, a^2 / 720, is lost in rounding.
     small = half < 5e-5
@@ -43,3 +48,18 @@ def pose_steps(poses: Array) -> Array:
     factor = np.where(small, 1 / 12, (1 - safe / np.tan(safe)) / (4 * safe**2))
     across = np.cross(w, p)
     return np.hstack([p - across / 2 + factor * np.cross(w, across), w])
+
+
+def _rotation_vector(vector: Array, scalar: Array) -> Array:
+    """Rotation vectors (N, 3), rad, of unit quaternions: vector (N, 3), scalar (N, 1).
+
+    The shorter way around. SciPy's rotations do the same, and take longer to import
+    than all else that turns markers into angles.
+    """
+    sine = np.linalg.norm(vector, axis=1, keepdims=True)
+    half = np.arctan2(sine, np.abs(scalar))
+    # Below 1e-4 rad the next term of half / sin(half), half^4 7 / 360, is rounding.
+    small = half < 1e-4
+    ratio = np.where(small, 1 + half**2 / 6, half / np.where(small, 1.0, sine))
+    turns: Array = 2 * np.copysign(ratio, scalar) * vector
+    return turns

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ikns.arrays import Array, Indices
 from ikns.body.skeleton import Skeleton
@@ -43,6 +42,8 @@ def turned_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
     >>> bool(np.allclose(turned_markers(body, q, markers), markers))
     True
     """
+    from scipy.spatial.transform import Rotation
+
     placed = skeleton.markers_in_world(q)
     worn, (joints, cluster) = skeleton.marker_set.markers, turning_clusters(skeleton)
     thorax = Rotation.from_quat(q[3:7]).as_matrix()

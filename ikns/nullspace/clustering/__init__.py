@@ -22,7 +22,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load what needs scikit-learn on first use."""
+    """Load what is fitted on first use."""
     if name != "BoundingBoxKMeans":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}.")
     from ikns.nullspace.clustering.kmeans import BoundingBoxKMeans

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull
-from scipy.spatial.distance import cdist
 
 from ikns.arrays import Array
 from ikns.errors import InvalidInput
+from ikns.numerics.distance import distances
 
 # A side shorter than this times the longest is flat: far above rounding (1e-16) and
 # below the 0.1 mm that cameras resolve in a workspace of a meter.
@@ -156,7 +155,7 @@ def _spread(places: Array, half: Array, n: int) -> Array:
     if r > 1:
         grid = grid[np.abs(grid).max(axis=1) == 1.0]
     grid = grid * half
-    gap = cdist(grid, places).min(axis=1)
+    gap = distances(grid, places).min(axis=1)
     chosen = list(places)
     while len(chosen) < n:
         farthest = grid[gap.argmax()]
@@ -171,6 +170,8 @@ def _smallest_axes(x: Array, coordinate_axes: Array) -> Array:
     `x` is in principal axes, whose signs are arbitrary; starting frames that differ by
     such signs are all tried, so a moved cloud gets the moved box.
     """
+    from scipy.spatial import ConvexHull
+
     hull = ConvexHull(x)
     x = x[hull.vertices]
     if x.shape[1] == 2:
@@ -211,6 +212,8 @@ def _volume(x: Array, axes: Array) -> float:
 
 def _turned(x: Array, axes: Array, i: int, j: int) -> Array:
     """Axes with `i` and `j` rotated to the smallest rectangle around the points."""
+    from scipy.spatial import ConvexHull
+
     seen = x @ axes[[i, j]].T
     outline = seen[ConvexHull(seen).vertices]
     edges = np.roll(outline, -1, axis=0) - outline

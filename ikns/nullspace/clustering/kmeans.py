@@ -6,10 +6,6 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.distance import cdist
-from sklearn.base import BaseEstimator, ClusterMixin
-from sklearn.cluster import kmeans_plusplus
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput, NotEnoughData
@@ -19,6 +15,8 @@ from ikns.nullspace.clustering.bounding_box import (
 )
 from ikns.nullspace.clustering.lloyd import inertia, lloyd, two_places
 from ikns.nullspace.clustering.nearest import nearest_center
+from ikns.nullspace.estimator_base import EstimatorBase
+from ikns.numerics.distance import distances
 
 # A held place has at least this share of an equal part of the samples; fewer are on
 # their way. Virtual people are steady in half of the samples of a place at the least.
@@ -27,7 +25,7 @@ _SHARE = 0.2
 _STARTS = 10
 
 
-class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
+class BoundingBoxKMeans(EstimatorBase):
     """K-means that starts on the surface of the data's minimum bounding box.
 
     Centroids start at :func:`box_surface_points`; each sample goes to the nearest; each
@@ -83,6 +81,8 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
     [4.0, 0.0]
     """
 
+    _fitted = "cluster_centers_"
+
     def __init__(
         self,
         n_clusters: int = 10,
@@ -118,7 +118,7 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         NotEnoughData
             When there are fewer samples than clusters.
         """
-        x = validate_data(self, X, dtype=np.float64)
+        x = self._validated(X, dtype=np.float64)
         self._check(x)
         known = _checked_groups(groups, len(x), self.n_clusters)
         self.box_ = minimum_bounding_box(x)
@@ -145,6 +145,21 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
             self.labels_[self.labels_ >= 0], minlength=self.n_clusters
         )
         return self
+
+    def fit_predict(
+        self, X: ArrayLike, y: Any = None, *, groups: ArrayLike | None = None
+    ) -> Indices:
+        """Find the clusters, see :meth:`fit`, and return `labels_`, (n_samples,)."""
+        return self.fit(X, groups=groups).labels_
+
+    def __sklearn_tags__(self) -> Any:
+        """Tell scikit-learn that this is a clusterer, and needs no `y`."""
+        from sklearn.utils import TargetTags
+
+        tags = super().__sklearn_tags__()
+        tags.estimator_type = "clusterer"
+        tags.target_tags = TargetTags(required=False)
+        return tags
 
     def _check(self, x: Array) -> None:
         """Raise what is wrong with the parameters or the number of samples."""
@@ -176,11 +191,13 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
         means = _means(x, groups)
         if len(means) and (groups >= 0).all():
             # Clusters beyond the places wait on the box, where no hand was held.
-            away = cdist(on_box, means).min(axis=1)
+            away = distances(on_box, means).min(axis=1)
             spare = on_box[np.argsort(-away)[: self.n_clusters - len(means)]]
             starts.append(("groups", np.vstack([means, spare]), False))
         elif len(means) == self.n_clusters:
             starts.append(("groups", means, True))
+        from sklearn.cluster import kmeans_plusplus  # takes a second to load
+
         for seed in range(_STARTS):
             drawn, _ = kmeans_plusplus(x, self.n_clusters, random_state=seed)
             starts.append(("k-means++", drawn, True))
@@ -206,8 +223,8 @@ class BoundingBoxKMeans(ClusterMixin, BaseEstimator):
 
     def predict(self, X: ArrayLike) -> Indices:
         """Cluster of each position, -1 beyond the radius, (n_samples,)."""
-        check_is_fitted(self)
-        x = validate_data(self, X, dtype=np.float64, reset=False)
+        self._check_fitted()
+        x = self._validated(X, dtype=np.float64, reset=False)
         labels, _ = nearest_center(x, self.cluster_centers_, radius=self.radius_)
         return labels
 

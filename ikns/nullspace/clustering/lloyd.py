@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from ikns.arrays import Array, Indices
 from ikns.nullspace.clustering.nearest import nearest_center
+from ikns.numerics.distance import distances
 
 #: Two halves of one held place are at most 3.5 deviations apart along their line (a
 #: uniform segment, cut in the middle: L / 2 over L / sqrt(48); less for a normal one).
@@ -50,7 +50,7 @@ def lloyd(
         previous, (labels, _) = labels, nearest_center(x, centers, radius=np.inf)
         if (labels == previous).all():
             empty = np.setdiff1d(np.arange(len(centers)), labels)
-            farthest = cdist(x, centers).min(axis=1)
+            farthest = distances(x, centers).min(axis=1)
             if not (move_empty and empty.size and farthest.max() > 0):
                 break
             centers[empty[0]] = x[farthest.argmax()]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.distance import cdist
 
 from ikns.arrays import Indices
+from ikns.numerics.distance import distances
 
 # An outlier is this many robust standard deviations farther from its centroid than the
 # median sample. The distances of an isotropic normal distribution of
@@ -49,7 +49,7 @@ def nearest_center(
     radius : float
         The radius that was used, m.
     """
-    distance = cdist(points, centers)
+    distance = distances(points, centers)
     labels = distance.argmin(axis=1)
     nearest = distance.min(axis=1)
     if radius is None:

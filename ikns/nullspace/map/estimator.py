@@ -188,12 +188,9 @@ class NullSpaceMap(EstimatorBase):
         NotEnoughData
             With fewer samples than points, too few usable points, or points in a plane.
         """
-        # Only here: a map that is read from a file does without.
-        from sklearn.utils.validation import validate_data
-
         from ikns.nullspace.clustering import BoundingBoxKMeans
 
-        x, q = validate_data(self, X, y, multi_output=True, y_numeric=True)
+        x, q = self._validated(X, y, multi_output=True, y_numeric=True)
         x, q = np.asarray(x, float), np.asarray(q, float).reshape(len(x), -1)
         settings = checked_settings(self, q.shape)
         centered = self.domain == "position"
@@ -307,10 +304,8 @@ class NullSpaceMap(EstimatorBase):
 
         Each sample counts to its nearest point, about the mean posture learned there.
         """
-        from sklearn.utils.validation import validate_data
-
         self._check_fitted()
-        x = validate_data(self, X, dtype=np.float64, reset=False)
+        x = self._validated(X, dtype=np.float64, reset=False)
         q = np.reshape(np.asarray(y, dtype=np.float64), (len(x), -1))
         return explained_share(
             x,

@@ -7,7 +7,7 @@ have none, and the nearest point's values hold.
 from __future__ import annotations
 
 import itertools
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,9 @@ from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
-from ikns.nullspace.map.smooth import SmoothField
+
+if TYPE_CHECKING:
+    from ikns.nullspace.map.smooth import SmoothField
 
 Interpolation = Literal["natural", "laplace", "nearest", "smooth"]
 
@@ -41,6 +43,8 @@ def make_interpolator(
             f"expected interpolation as one of {known}, found '{interpolation}'."
         )
     if interpolation == "smooth":
+        from ikns.nullspace.map.smooth import SmoothField
+
         return SmoothField(points, edges=NearestPoint(points).edges)
     if interpolation == "nearest" or not _in_space(points):
         return NearestPoint(points)

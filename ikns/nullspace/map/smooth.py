@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.distance import cdist
 
 from ikns.arrays import Array, Indices, Mask
+from ikns.numerics.distance import distances
 
 #: Smoothing, in units of the kernel between points at their mean distance: about a
 #: third of a point's own value remains, the rest is its neighbors'.
@@ -39,7 +39,7 @@ class SmoothField:
         spread = self.points - self._middle
         self._metric = np.linalg.pinv(spread.T @ spread, hermitian=True)
         self._most = float(self._leverage(self.points).max())
-        apart = cdist(self.points, self.points)
+        apart = distances(self.points, self.points)
         self._scale = float(apart.sum() / max(p * (p - 1), 1)) or 1.0
         self._smoother: Array | None = None
         affine = np.column_stack([np.ones(p), spread / self._scale])
@@ -61,7 +61,7 @@ class SmoothField:
             at = flat[known]
             terms = np.column_stack(
                 [
-                    -cdist(at, self.points) / self._scale,
+                    -distances(at, self.points) / self._scale,
                     np.ones(len(at)),
                     (at - self._middle) / self._scale,
                 ]

@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ikns.arrays import Array
 from ikns.body.chains import chain_sides
@@ -79,6 +78,8 @@ def readout_samples(
 
 def rotation_vector(upper_arm_in_thorax: Array, reference: Array) -> Array:
     """Vectors y of rotations ``R = reference exp(y)``, (..., 3) rad; NaN for NaN."""
+    from scipy.spatial.transform import Rotation
+
     flat = upper_arm_in_thorax.reshape(-1, 3, 3)
     y = np.full((len(flat), 3), np.nan)
     known = np.isfinite(flat).all(axis=(1, 2))
@@ -92,6 +93,8 @@ def mean_orientation(skeleton: Skeleton, angles: Array, chain: str) -> Array:
 
     Rotation vectors about it are shortest, and farthest from their end at pi.
     """
+    from scipy.spatial.transform import Rotation
+
     means = []
     for side in chain_sides(chain):
         turned = skeleton.link_in_thorax(angles, f"{side}_upper_arm")[1]
@@ -106,6 +109,8 @@ def elbow_height_gradient(reference: Array) -> Array:
     At the reference orientations (S, 3, 3), per length of the upper arm; both elbows
     are summed. c increases with it.
     """
+    from scipy.spatial.transform import Rotation
+
     rows = []
     for start in reference:
         for step in np.eye(3) * _STEP:

@@ -129,14 +129,11 @@ class IntentMap(EstimatorBase):
         NotEnoughData
             When no place has enough samples, or the elbow moves nowhere.
         """
-        # Only here: a map that is read from a file does without.
-        from sklearn.utils.validation import validate_data
-
         from ikns.nullspace.clustering import BoundingBoxKMeans
 
         one = np.ndim(y) == 2 and np.shape(y)[1] == 1
-        w, s = validate_data(
-            self, X, np.ravel(y) if one else y, y_numeric=True, dtype=np.float64
+        w, s = self._validated(
+            X, np.ravel(y) if one else y, y_numeric=True, dtype=np.float64
         )
         least = self._least(len(w))
         found = BoundingBoxKMeans(
@@ -228,10 +225,8 @@ class IntentMap(EstimatorBase):
 
         On held-out samples as for :meth:`fit`: 1 where c does not follow the hand.
         """
-        from sklearn.utils.validation import validate_data
-
         self._check_fitted()
-        w = validate_data(self, X, dtype=np.float64, reset=False)
+        w = self._validated(X, dtype=np.float64, reset=False)
         c = self.control_signal(np.reshape(y, (len(w), 1)), w)
         terms = np.column_stack([np.ones(len(w)), w - w.mean(axis=0)])
         rest = c - terms @ np.linalg.lstsq(terms, c, rcond=None)[0]
