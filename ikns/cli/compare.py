@@ -80,12 +80,11 @@ def compare(
     line along Z leads the hand; how far the null space bends; and crosstalk.
     """
     from ikns.calibration.simulated import is_simulated
-    from ikns.motion.marker_ik.rejection import rejection_sentence
 
     refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
     own = calibrated.chain
-    tracked = _tracked(read, calibrated, [p for p in (recording, reaches) if p])
+    tracked, judged = _tracked(read, calibrated, [p for p in (recording, reaches) if p])
     motion, reaching = tracked[0], tracked[-1]
     gate = calibrated.gate
     first: Literal["pose", "position"] = "position" if task == "position" else "pose"
@@ -102,11 +101,7 @@ def compare(
         coordinates=coordinates,
         options=options | gate,
     )
-    warned += left_out + [
-        f"{path}: {sentence}."
-        for path, each in zip((recording, reaches), tracked, strict=False)
-        if (sentence := rejection_sentence(each, own))
-    ]
+    warned += left_out + judged
     across = None
     with naming(str(reaches or recording)):
         try:
@@ -173,18 +168,25 @@ def _crosstalk(subject: ikns.Subject, motion: ikns.Motion, **options: Any) -> Cr
     )
 
 
-def _tracked(read: Read, subject: ikns.Subject, paths: list[Path]) -> list[ikns.Motion]:
-    """Track recordings, and say what they lack."""
-    from ikns.motion.unseen import warn_unseen
+def _tracked(
+    read: Read, subject: ikns.Subject, paths: list[Path]
+) -> tuple[list[ikns.Motion], list[str]]:
+    """Judge and track recordings, and say what they lack."""
+    from ikns.calibration.judged_motion import judged_motion
 
-    solver, found = ikns.MarkerIK(subject.skeleton), []
+    motions, warned = [], []
     with progress() as report:
         for path in paths:
-            frames = read(path)
-            warn_unseen(subject.skeleton, frames, subject.chain)
-            step = partial(report, path.name)
-            found.append(solver.track(frames, chain=subject.chain, progress=step))
-    return found
+            motion, lacks = judged_motion(
+                subject.skeleton,
+                read(path),
+                chain=subject.chain,
+                measured=subject.measured,
+                progress=partial(report, path.name),
+            )
+            motions.append(motion)
+            warned += lacks
+    return motions, warned
 
 
 def _combinations(
