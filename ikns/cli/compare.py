@@ -20,7 +20,7 @@ from ikns.cli.comparison_tables import (
     point_table,
     pooled_table,
 )
-from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
+from ikns.cli.options import AsJson, Force, From, RecordingFile, SubjectFolder, To
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.reading import Read, reads_markers
@@ -70,6 +70,8 @@ def compare(
     seed: Annotated[
         int, typer.Option(help="Of the resamples.", min=0, max=2**32 - 1)
     ] = 0,
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -77,14 +79,18 @@ def compare(
 
     Angles between them, with what chance would give; the share of joint variance inside
     the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
-    line along Z leads the hand; how far the null space bends; and crosstalk.
+    line along Z leads the hand; how far the null space bends; and crosstalk. --from and
+    --to take a part of the recording, not of --reaches.
     """
     from ikns.calibration.simulated import is_simulated
 
     refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
     own = calibrated.chain
-    tracked, judged = _tracked(read, calibrated, [p for p in (recording, reaches) if p])
+    given = [(recording, read(recording, start=from_, end=to))]
+    if reaches is not None:
+        given.append((reaches, read(reaches)))
+    tracked, judged = _tracked(calibrated, given)
     motion, reaching = tracked[0], tracked[-1]
     gate = calibrated.gate
     first: Literal["pose", "position"] = "position" if task == "position" else "pose"
@@ -169,17 +175,17 @@ def _crosstalk(subject: ikns.Subject, motion: ikns.Motion, **options: Any) -> Cr
 
 
 def _tracked(
-    read: Read, subject: ikns.Subject, paths: list[Path]
+    subject: ikns.Subject, given: list[tuple[Path, ikns.Recording]]
 ) -> tuple[list[ikns.Motion], list[str]]:
     """Judge and track recordings, and say what they lack."""
     from ikns.calibration.judged_motion import judged_motion
 
     motions, warned = [], []
     with progress() as report:
-        for path in paths:
+        for path, frames in given:
             motion, lacks = judged_motion(
                 subject.skeleton,
-                read(path),
+                frames,
                 chain=subject.chain,
                 measured=subject.measured,
                 progress=partial(report, path.name),

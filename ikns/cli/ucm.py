@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force, SubjectFolder
+from ikns.cli.options import AsJson, Force, From, SubjectFolder, To
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.reading import Read, reads_markers
@@ -59,13 +59,16 @@ def ucm(
     figure: Annotated[
         Path | None, typer.Option(help="Picture to write: .png, .svg or .pdf.")
     ] = None,
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Split joint variance by the null space of the task (uncontrolled manifold).
 
     Several recordings: variance over repetitions at each normalized time. One: variance
-    over the still samples at each PCA point.
+    over the still samples at each PCA point. --from and --to take a part of every
+    recording.
     """
     from ikns.calibration.judged_motion import judged_motion
     from ikns.calibration.simulated import is_simulated
@@ -85,7 +88,7 @@ def ucm(
         for path in recordings:
             motion, lacks = judged_motion(
                 calibrated.skeleton,
-                read(path),
+                read(path, start=from_, end=to),
                 chain=calibrated.chain,
                 measured=calibrated.measured,
                 progress=partial(report, path.name),
