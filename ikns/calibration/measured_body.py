@@ -13,12 +13,10 @@ from ikns.body.chains import chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.exploration_fit import BodyReport, fit_explorations
-from ikns.calibration.judge.exploration import judge_exploration
-from ikns.calibration.judge.finding import refused
-from ikns.calibration.judge.subjects import other_subject
+from ikns.calibration.judged_motion import require_usable
 from ikns.calibration.scaled_body import scaled_body
 from ikns.calibration.scaling import ScalingReport, scale
-from ikns.errors import InvalidInput, MarkerMismatch, naming
+from ikns.errors import InvalidInput, naming
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.recording.recording import Recording
@@ -61,12 +59,18 @@ def measured_body(
                 body, static, marker_set=marker_set, min_duration=min_static
             )
         missing = _left_out(static, scaling, marker_set, explorations, chain)
+    recordings = (*explorations, *natural)
     warned = [
         sentence
-        for recording in explorations
-        for sentence in _judged(static, recording, skeleton, chain)
+        for recording in recordings
+        for sentence in require_usable(
+            skeleton,
+            recording,
+            chain=chain,
+            static=static,
+            measured=static is not None,
+        )
     ]
-    recordings = (*explorations, *natural)
     tracked = _tracked(skeleton, recordings, chain, progress)
     fitted = None
     if static is not None:
@@ -99,24 +103,6 @@ def _assumed(scaling: ScalingReport) -> str:
         f"stature, and people differ from that by {1000 * min(arm):.0f} to "
         f"{1000 * max(arm):.0f} mm (standard deviation of an arm's segments)."
     )
-
-
-def _judged(
-    static: Recording | None, recording: Recording, skeleton: Skeleton, chain: str
-) -> list[str]:
-    """Return warnings of a recording, or refuse it."""
-    worn = skeleton.marker_set
-    # Without a static trial the person's own distances are not known.
-    known = None if static is None else skeleton
-    with naming(recording.source):
-        findings = judge_exploration(
-            recording, worn, skeleton, skeleton=known, chain=chain
-        )
-    if static is not None:
-        findings += other_subject(static, recording, worn)
-    if faults := refused(findings):
-        raise MarkerMismatch(faults[0].sentence)
-    return [finding.sentence for finding in findings if finding.severity == "warn"]
 
 
 def _tracked(

@@ -82,6 +82,12 @@ class Subject:
     samples: Array | None = field(default=None, repr=False)
     readouts: dict[str, Readout] = field(default_factory=dict, repr=False)
 
+    @property
+    def measured(self) -> bool:
+        """Whether the body comes from a static trial, not from stature alone."""
+        static = self.report.get("static")
+        return not isinstance(static, dict) or static.get("source", "") is not None
+
     def readout(self, method: Method = "paper") -> Readout:
         """Return a method's map and what it reads.
 

@@ -14,7 +14,7 @@ import typer
 
 import ikns
 from ikns.cli.live_calibration import LiveOptions, record_live
-from ikns.cli.options import AsJson, Force, MarkerSetName
+from ikns.cli.options import AsJson, Force, From, MarkerSetName, To
 from ikns.cli.output import held_sentences, notes, progress, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput
@@ -28,6 +28,8 @@ _FILES_ONLY = (
     "rename",
     "labels",
     "cutoff",
+    "from_",
+    "to",
 )
 #: Options of a live calibration only.
 _LIVE_ONLY = (
@@ -141,13 +143,16 @@ def calibrate(
             max=3600.0,
         ),
     ] = 0.0,
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Scale the body, learn the null-space map and write a subject folder.
 
     From recordings (--static, --exploration) or live: 5 s standing still, a minute of
-    free exploration, then the hand held at ten points while the elbow moves.
+    free exploration, then the hand held at ten points while the elbow moves. --from and
+    --to take a part of every exploration.
     """
     from ikns.calibration.subject import FILES
     from ikns.motion.unseen import warn_unseen
@@ -198,7 +203,7 @@ def calibrate(
         )
         natural = [*(natural or []), *movement]
     assert exploration is not None
-    explorations = [read(path) for path in exploration]
+    explorations = [read(path, start=from_, end=to) for path in exploration]
     with progress() as report:
         subject = ikns.calibrate(
             None if static is None else read(static),
@@ -238,7 +243,11 @@ def _check_input(context: typer.Context, *, live: bool) -> None:
         if (origin := context.get_parameter_source(name)) and origin.name != "DEFAULT"
     }
     if live:
-        files = [f"--{name.replace('_', '-')}" for name in _FILES_ONLY if name in given]
+        files = [
+            f"--{name.rstrip('_').replace('_', '-')}"
+            for name in _FILES_ONLY
+            if name in given
+        ]
         if files:
             raise InvalidInput(
                 f"{' and '.join(files)} {'goes' if len(files) == 1 else 'go'} with "

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import ikns
-from ikns.cli.options import MARKER_FILES, AsJson, OptionalMarkerSet
+from ikns.cli.options import MARKER_FILES, AsJson, From, OptionalMarkerSet, To
 from ikns.cli.output import show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput, MarkerMismatch
@@ -30,12 +30,15 @@ def check(
         typer.Option(help="Folder that `ikns calibrate` wrote, to compare with."),
     ] = None,
     marker_set: OptionalMarkerSet = None,
+    from_: From = None,
+    to: To = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what is wrong in recordings: labels, units, ghosts, another person's.
 
     A recording in which the person stands still is judged as a static trial. Exits
-    with 2 when one must not be used.
+    with 2 when one must not be used. --from and --to take a part of every recording,
+    not of --static.
     """
     from ikns.calibration.judge.finding import refused
 
@@ -46,7 +49,7 @@ def check(
             "--marker-set goes with --static; a subject has markers of its own."
         )
     found = ikns.check_recordings(
-        [read(path) for path in recordings],
+        [read(path, start=from_, end=to) for path in recordings],
         static=None if static is None else read(static),
         skeleton=None if subject is None else ikns.Subject.load(subject).skeleton,
         marker_set=marker_set or "oxford24",

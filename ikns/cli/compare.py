@@ -20,7 +20,7 @@ from ikns.cli.comparison_tables import (
     point_table,
     pooled_table,
 )
-from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
+from ikns.cli.options import AsJson, Force, From, RecordingFile, SubjectFolder, To
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.reading import Read, reads_markers
@@ -70,6 +70,8 @@ def compare(
     seed: Annotated[
         int, typer.Option(help="Of the resamples.", min=0, max=2**32 - 1)
     ] = 0,
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -77,15 +79,18 @@ def compare(
 
     Angles between them, with what chance would give; the share of joint variance inside
     the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
-    line along Z leads the hand; how far the null space bends; and crosstalk.
+    line along Z leads the hand; how far the null space bends; and crosstalk. --from and
+    --to take a part of the recording, not of --reaches.
     """
     from ikns.calibration.simulated import is_simulated
-    from ikns.motion.marker_ik.rejection import rejection_sentence
 
     refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
     own = calibrated.chain
-    tracked = _tracked(read, calibrated, [p for p in (recording, reaches) if p])
+    given = [(recording, read(recording, start=from_, end=to))]
+    if reaches is not None:
+        given.append((reaches, read(reaches)))
+    tracked, judged = _tracked(calibrated, given)
     motion, reaching = tracked[0], tracked[-1]
     gate = calibrated.gate
     first: Literal["pose", "position"] = "position" if task == "position" else "pose"
@@ -102,11 +107,7 @@ def compare(
         coordinates=coordinates,
         options=options | gate,
     )
-    warned += left_out + [
-        f"{path}: {sentence}."
-        for path, each in zip((recording, reaches), tracked, strict=False)
-        if (sentence := rejection_sentence(each, own))
-    ]
+    warned += left_out + judged
     across = None
     with naming(str(reaches or recording)):
         try:
@@ -173,18 +174,25 @@ def _crosstalk(subject: ikns.Subject, motion: ikns.Motion, **options: Any) -> Cr
     )
 
 
-def _tracked(read: Read, subject: ikns.Subject, paths: list[Path]) -> list[ikns.Motion]:
-    """Track recordings, and say what they lack."""
-    from ikns.motion.unseen import warn_unseen
+def _tracked(
+    subject: ikns.Subject, given: list[tuple[Path, ikns.Recording]]
+) -> tuple[list[ikns.Motion], list[str]]:
+    """Judge and track recordings, and say what they lack."""
+    from ikns.calibration.judged_motion import judged_motion
 
-    solver, found = ikns.MarkerIK(subject.skeleton), []
+    motions, warned = [], []
     with progress() as report:
-        for path in paths:
-            frames = read(path)
-            warn_unseen(subject.skeleton, frames, subject.chain)
-            step = partial(report, path.name)
-            found.append(solver.track(frames, chain=subject.chain, progress=step))
-    return found
+        for path, frames in given:
+            motion, lacks = judged_motion(
+                subject.skeleton,
+                frames,
+                chain=subject.chain,
+                measured=subject.measured,
+                progress=partial(report, path.name),
+            )
+            motions.append(motion)
+            warned += lacks
+    return motions, warned
 
 
 def _combinations(

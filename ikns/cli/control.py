@@ -49,26 +49,29 @@ def control(
     """Write the control signal of a recording: c from 0 to 1, frame by frame.
 
     This is the map's own signal; `ikns run --source replay:FILE` also smooths it. As
-    there, frames whose markers cannot be right have none.
+    there, frames whose markers cannot be right have none. A recording that must not be
+    used is refused, as by `ikns check`.
     """
+    from ikns.calibration.judged_motion import judged_motion
     from ikns.live.control.recorded import control_table
-    from ikns.motion.marker_ik.rejection import say_rejections
-    from ikns.motion.unseen import warn_unseen
 
     refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
     frames = read(recording, start=from_, end=to)
-    warn_unseen(calibrated.skeleton, frames, calibrated.chain)
     with progress() as report:
-        motion = ikns.MarkerIK(calibrated.skeleton).track(
-            frames, chain=calibrated.chain, progress=partial(report, recording.name)
+        motion, warned = judged_motion(
+            calibrated.skeleton,
+            frames,
+            chain=calibrated.chain,
+            measured=calibrated.measured,
+            progress=partial(report, recording.name),
         )
     found = control_table(calibrated, motion, mode=mode, method=method)
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
-    left_out = say_rejections(result["rejections"], result["frames"])
     show(
-        {"recording": recording, "csv": out, "method": method} | result,
+        {"recording": recording, "csv": out, "method": method, "warnings": warned}
+        | result,
         table(
             str(recording),
             {"quantity": "s", "value": "g"},
@@ -85,7 +88,7 @@ def control(
                 ],
             ],
         ),
-        *notes([f"{recording}: {left_out}."] if left_out else []),
+        *notes(warned),
         f"Wrote {out}",
         as_json=as_json,
     )

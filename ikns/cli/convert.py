@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ikns.cli.options import MARKER_FILES, AsJson, Force, From, SubjectPrefix, To
+from ikns.cli.options import (
+    MARKER_FILES,
+    AsJson,
+    Force,
+    From,
+    LabelFile,
+    Rename,
+    SubjectPrefix,
+    To,
+)
 from ikns.cli.output import show
+from ikns.cli.reading import label_names, say_unused
 from ikns.output.file import refuse_overwriting
 
 
@@ -27,6 +38,8 @@ def convert(
         ),
     ],
     subject_prefix: SubjectPrefix = None,
+    rename: Rename = None,
+    labels: LabelFile = None,
     from_: From = None,
     to: To = None,
     stream: Annotated[
@@ -37,11 +50,12 @@ def convert(
 ) -> None:
     """Write a recording, or joint angles, in another format; or a part of it.
 
-    Labels and times stay as they are; --subject-prefix takes the prefix off.
+    Times stay as they are, and labels but for --rename and --labels;
+    --subject-prefix takes the prefix off.
     """
     from ikns.recording.files.convert import convert_file
 
-    refuse_overwriting(target, force=force, inputs=[source])
+    refuse_overwriting(target, force=force, inputs=[source, labels])
     found = convert_file(
         source,
         target,
@@ -49,8 +63,11 @@ def convert(
         start=from_,
         end=to,
         stream=stream,
+        names=label_names(rename, labels),
         force=force,
     )
+    if unused := say_unused(rename or [], found.given):
+        sys.stderr.write(f"ikns: {unused}\n")
     lost = (
         f", without {found.left_out} frames in which a coordinate is missing"
         if found.left_out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -50,12 +51,11 @@ def ik(
     joint are empty in frames in which a segment next to it is out of sight, cells of
     the thorax in frames that do not show it, and those of an arm in frames whose
     markers cannot be right; .mot and .sto, which have no empty cells, are without such
-    frames.
+    frames. A recording that must not be used is refused, as by `ikns check`.
     """
+    from ikns.calibration.judged_motion import judged_motion
     from ikns.motion.export import check_motion_file, write_motion
-    from ikns.motion.marker_ik.rejection import say_rejections
     from ikns.motion.table import motion_table
-    from ikns.motion.unseen import warn_unseen
 
     outputs = out or [Path("motion.csv")]
     for path in outputs:
@@ -73,9 +73,11 @@ def ik(
             "--marker-set goes with --static; a subject has markers of its own."
         )
     left_out: list[str] = []
+    still, measured = None, True
     if static is None:
         assert subject is not None
-        skeleton = ikns.Subject.load(subject).skeleton
+        person = ikns.Subject.load(subject)
+        skeleton, measured = person.skeleton, person.measured
     else:
         still = read(static)
         with naming(still.source):
@@ -87,18 +89,19 @@ def ik(
             )
         left_out = scaling.sentences(still.source)
     frames = read(recording, start=from_, end=to)
-    warn_unseen(skeleton, frames)
     with progress() as report, naming(frames.source):
-        motion = ikns.MarkerIK(skeleton).track(
-            frames, progress=lambda done, total: report("joint angles", done, total)
+        motion, warned = judged_motion(
+            skeleton,
+            frames,
+            static=still,
+            measured=measured,
+            progress=partial(report, "joint angles"),
         )
     told = [write_motion(path, motion, skeleton, force=force) for path in outputs]
-    said = [*left_out, *(sentence for sentence in told if sentence)]
+    said = [*left_out, *(sentence for sentence in told if sentence), *warned]
     csv = next((path for path in outputs if path.suffix.lower() == ".csv"), None)
     found = motion_table(motion)
     summary = found.summary
-    if rejected := say_rejections(summary["rejections"], summary["frames"]):
-        said.append(f"{recording}: {rejected}.")
     show(
         {"recording": recording, "csv": csv, "files": outputs, "notes": said} | summary,
         f"{recording}: {summary['frames_converged']} of {summary['frames']} frames "

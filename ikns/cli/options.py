@@ -34,6 +34,17 @@ From = Annotated[
 To = Annotated[
     str | None, typer.Option("--to", help="Stop there: seconds, or an event likewise.")
 ]
+Rename = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="OLD=NEW",
+        help="Another label for a marker of the recordings; again for more.",
+    ),
+]
+LabelFile = Annotated[
+    Path | None,
+    typer.Option(help="Text file with a line OLD=NEW for each such marker."),
+]
 MarkerSetName = Annotated[
     str,
     typer.Option(

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ikns.cli.options import AsJson
+from ikns.cli.options import AsJson, LabelFile, Rename
+from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
 from ikns.cli.visit_identity import find_visit, resolve_design, split_names
@@ -88,6 +89,8 @@ def pick(
     ] = None,
     subject: ForIkns = None,
     source: SourceAddress = None,
+    rename: Rename = None,
+    labels: LabelFile = None,
     finger: Annotated[
         str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
     ] = "sim:",
@@ -156,6 +159,7 @@ def pick(
             view=view,
             realtime=realtime,
             method=method,
+            names=label_names(rename, labels),
         ),
         PageOptions(host, port, browser, _RATE),
         conditions=design["conditions"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 import ikns
+from ikns.cli.options import LabelFile, Rename, SubjectPrefix
 from ikns.errors import InvalidInput
 from ikns.output.inputs import refuse_input, refuse_input_folder
 
@@ -22,32 +23,9 @@ Read = Callable[..., Any]
 #: Options of these commands that name something to write.
 _OUTPUTS = ("out", "png", "figure")
 _OPTIONS = {
-    "subject_prefix": (
-        Annotated[
-            str | None,
-            typer.Option(
-                help="Of several people in a file: Ann, for labels like Ann:RSHO."
-            ),
-        ],
-        None,
-    ),
-    "rename": (
-        Annotated[
-            list[str] | None,
-            typer.Option(
-                metavar="OLD=NEW",
-                help="Another label for a marker of the recordings; again for more.",
-            ),
-        ],
-        None,
-    ),
-    "labels": (
-        Annotated[
-            Path | None,
-            typer.Option(help="Text file with a line OLD=NEW for each such marker."),
-        ],
-        None,
-    ),
+    "subject_prefix": (SubjectPrefix, None),
+    "rename": (Rename, None),
+    "labels": (LabelFile, None),
     "cutoff": (
         Annotated[
             float | None,
@@ -90,8 +68,8 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
                 f"expected a --cutoff above 0 Hz, found {given['cutoff']:g}."
             )
         _keep(given["labels"], values)
-        names = _names(given["rename"] or [], given["labels"])
-        said = set(given["rename"] or [])
+        names = label_names(given["rename"], given["labels"])
+        said = given["rename"] or []
         seen: list[str] = []
 
         def read(path: Path, **part: Any) -> ikns.Recording:
@@ -111,10 +89,10 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(read=read, **values)
         except ikns.IknsError as error:
-            if seen and (sentence := _unused(said, seen)):
+            if seen and (sentence := say_unused(said, seen)):
                 raise type(error)(f"{str(error).rstrip('.')}; {sentence}") from None
             raise
-        if seen and (sentence := _unused(said, seen)):
+        if seen and (sentence := say_unused(said, seen)):
             sys.stderr.write(f"ikns: {sentence}\n")
 
     # Typer reads the options from here, and nobody from the command below.
@@ -133,16 +111,17 @@ def _keep(labels: Path | None, values: dict[str, Any]) -> None:
             refuse(output, [labels])
 
 
-def _names(rename: list[str], labels: Path | None) -> dict[str, str]:
+def label_names(rename: list[str] | None, labels: Path | None) -> dict[str, str]:
+    """Return the new label of each old one of --rename and --labels."""
     if not rename and labels is None:
         return {}
     from ikns.recording.labels import name_pairs, read_name_pairs
 
     names = {} if labels is None else read_name_pairs(labels)
-    return names | name_pairs(rename, where="--rename")
+    return names | name_pairs(rename or [], where="--rename")
 
 
-def _unused(said: set[str], seen: list[str]) -> str:
+def say_unused(said: Iterable[str], seen: Sequence[str]) -> str:
     """Say which labels given on the command line no recording had."""
     if not said:
         return ""

@@ -16,8 +16,9 @@ import typer
 
 import ikns
 from ikns.cli.live_session import live_session, say, software
-from ikns.cli.options import AsJson, SubjectFolder
+from ikns.cli.options import AsJson, LabelFile, Rename, SubjectFolder
 from ikns.cli.output import show, table
+from ikns.cli.reading import label_names
 from ikns.cli.stop_notice import STOPPED, stop_line, watch_stops
 from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
@@ -34,6 +35,8 @@ def run(
     source: Annotated[
         str, typer.Option(help="replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST.")
     ],
+    rename: Rename = None,
+    labels: LabelFile = None,
     finger: Annotated[
         str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
     ] = "sim:",
@@ -106,9 +109,12 @@ def run(
     settings = ControlSettings(hold_speed=hold_speed, method=method)
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
+    names = label_names(rename, labels)
     device = open_finger(finger, safety=Safety(safe_state=safe_state))
     with ExitStack() as stack:
-        stream = stack.enter_context(open_source(source, subject=calibrated))
+        stream = stack.enter_context(
+            open_source(source, subject=calibrated, names=names)
+        )
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
         losses: list[str] = []
@@ -118,6 +124,7 @@ def run(
                 **software(),
                 "source": source,
                 "source_labels": list(stream.labels),
+                "renamed": names,
                 "finger": None if dry_run else finger,
                 "safe_state": safe_state,
                 "settings": dataclasses.asdict(settings),

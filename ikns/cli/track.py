@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from ikns.cli.options import AsJson
+from ikns.cli.options import AsJson, LabelFile, Rename
+from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
 from ikns.cli.visit_identity import find_visit, resolve_design, split_names
@@ -100,6 +101,8 @@ def track(
     ] = None,
     subject: ForIkns = None,
     source: SourceAddress = None,
+    rename: Rename = None,
+    labels: LabelFile = None,
     finger: Annotated[
         str | None, typer.Option(help="For ikns: sim: or dynamixel:/dev/ttyUSB0.")
     ] = None,
@@ -188,6 +191,7 @@ def track(
             view=view,
             realtime=realtime,
             method=method,
+            names=label_names(rename, labels),
         ),
         PageOptions(host, port, browser, rate, stick),
         conditions=design["conditions"],

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force, SubjectFolder
+from ikns.cli.options import AsJson, Force, From, SubjectFolder, To
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.reading import Read, reads_markers
@@ -59,17 +59,19 @@ def ucm(
     figure: Annotated[
         Path | None, typer.Option(help="Picture to write: .png, .svg or .pdf.")
     ] = None,
+    from_: From = None,
+    to: To = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Split joint variance by the null space of the task (uncontrolled manifold).
 
     Several recordings: variance over repetitions at each normalized time. One: variance
-    over the still samples at each PCA point.
+    over the still samples at each PCA point. --from and --to take a part of every
+    recording.
     """
+    from ikns.calibration.judged_motion import judged_motion
     from ikns.calibration.simulated import is_simulated
-    from ikns.motion.marker_ik.rejection import rejection_sentence
-    from ikns.motion.unseen import warn_unseen
 
     refuse_picture(figure, force=force, inputs=[*recordings, subject])
     if len({path.resolve() for path in recordings}) < len(recordings):
@@ -80,19 +82,19 @@ def ucm(
     if math.isnan(most_different):
         raise InvalidInput("expected a number for --most-different, found nan.")
     calibrated = ikns.Subject.load(subject)
-    solver = ikns.MarkerIK(calibrated.skeleton)
+    motions: list[ikns.Motion] = []
+    warned: list[str] = []
     with progress() as report:
-        motions = []
         for path in recordings:
-            frames = read(path)
-            warn_unseen(calibrated.skeleton, frames, calibrated.chain)
-            step = partial(report, path.name)
-            motions.append(solver.track(frames, chain=calibrated.chain, progress=step))
-    rejected = [
-        f"{path}: {sentence}."
-        for path, motion in zip(recordings, motions, strict=True)
-        if (sentence := rejection_sentence(motion, calibrated.chain))
-    ]
+            motion, lacks = judged_motion(
+                calibrated.skeleton,
+                read(path, start=from_, end=to),
+                chain=calibrated.chain,
+                measured=calibrated.measured,
+                progress=partial(report, path.name),
+            )
+            motions.append(motion)
+            warned += lacks
     names = [str(path) for path in recordings]
     options: dict[str, Any] = {
         "task": task,
@@ -126,10 +128,10 @@ def ucm(
             "figure": figure,
         }
         | found.result
-        | {"warnings": [*rejected, *found.result["warnings"]]},
+        | {"warnings": [*warned, *found.result["warnings"]]},
         "Simulated subject" if simulated else "Recorded subject",
         *found.shown,
-        *notes([*rejected, *found.result["warnings"]]),
+        *notes([*warned, *found.result["warnings"]]),
         *([] if figure is None else [f"Wrote {figure}"]),
         as_json=as_json,
     )

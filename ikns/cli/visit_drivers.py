@@ -49,6 +49,8 @@ class ArmOptions:
         Whether the control loop has real-time priority.
     method : {"paper", "intent"}
         What reads c off the posture.
+    names : dict
+        Other labels for markers of the source, new by old.
     """
 
     subject: Path | None
@@ -61,6 +63,7 @@ class ArmOptions:
     view: bool
     realtime: bool
     method: Literal["paper", "intent"]
+    names: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -124,7 +127,7 @@ def open_arm_source(
     from ikns.live.stream import open_source
 
     assert arm.source is not None
-    return open_source(arm.source, subject=subject)
+    return open_source(arm.source, subject=subject, names=arm.names)
 
 
 def arm_driver(
@@ -155,6 +158,7 @@ def arm_driver(
                 **software(),
                 "source": arm.source,
                 "source_labels": list(source.labels),
+                "renamed": arm.names,
                 "finger": arm.finger,
                 "safe_state": arm.safe_state,
                 "settings": dataclasses.asdict(settings),

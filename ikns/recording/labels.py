@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from ikns.errors import FileError, InvalidInput
@@ -32,9 +32,23 @@ def renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
     >>> renamed(swapped, {"RWRA": "RWRB", "RWRB": "RWRA"}).labels
     ('RWRA', 'RWRB')
     """
+    labels = new_labels(recording.labels, names, source=recording.source)
+    return Recording(
+        recording.time,
+        recording.markers,
+        labels,
+        recording.source,
+        recording.notes,
+    )
+
+
+def new_labels(
+    given: Sequence[str], names: Mapping[str, str], *, source: str
+) -> list[str]:
+    """Return labels after a renaming, as for :func:`renamed`."""
     new = {old.strip().casefold(): name.strip() for old, name in names.items()}
     labels = []
-    for label in recording.labels:
+    for label in given:
         subject, colon, own = label.rpartition(":")
         whole, bare = label.strip().casefold(), own.strip().casefold()
         if whole in new and colon:
@@ -42,13 +56,13 @@ def renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
         else:
             labels.append(f"{subject}{colon}{new[bare]}" if bare in new else label)
     taken: dict[str, str] = {}
-    for label, was in zip(labels, recording.labels, strict=True):
+    for label, was in zip(labels, given, strict=True):
         if (other := taken.setdefault(label.casefold(), was)) != was:
             raise InvalidInput(
-                f"{recording.source}: expected one marker to become {label}, found "
+                f"{source}: expected one marker to become {label}, found "
                 f"{other} and {was}; give the other one another name too."
             )
-    return Recording(recording.time, recording.markers, labels, recording.source)
+    return labels
 
 
 def unused_names(labels: Iterable[str], names: Mapping[str, str]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from urllib.parse import parse_qsl
 
 from ikns.body.marker_set import MarkerSet
@@ -13,6 +13,7 @@ from ikns.live.stream import qualisys, vicon
 from ikns.live.stream.frame import Feed
 from ikns.live.stream.lsl_feed import LslFeed
 from ikns.live.stream.lsl_search import Wanted
+from ikns.live.stream.renamed import RenamedFeed
 from ikns.live.stream.replay import Replay
 from ikns.live.stream.size_check import check_size, first_frames
 from ikns.live.stream.source import Source
@@ -24,6 +25,7 @@ _KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST"
 _GLANCES = 1000
 
 Options = dict[str, str]
+Names = Mapping[str, str] | None
 
 
 def open_source(
@@ -31,6 +33,7 @@ def open_source(
     *,
     needs: MarkerSet | None = None,
     subject: Subject | None = None,
+    names: Names = None,
     read_timeout: float = 10.0,
     late_after: float | None = None,
 ) -> Source:
@@ -53,6 +56,9 @@ def open_source(
         Who is tracked: as `needs` with its marker set, and the distances within
         segments must not be ten times those at calibration, or a tenth of them. The
         frames of a live source that are looked at for this are not read again.
+    names : mapping, optional
+        Other labels for markers of the source, new by old, as for
+        :func:`ikns.recording.labels.renamed`.
     read_timeout : float
         Iterating raises an error after this time without a frame, s.
     late_after : float, optional
@@ -109,20 +115,23 @@ def open_source(
             raise
         raise type(error)(f"{address}: {error}") from None
     try:
-        chosen = _one_subject(feed, options)
+        chosen = _chosen(feed, options, names)
         worn = subject.skeleton.marker_set if subject else needs
         if worn is not None:
             _check_labels(chosen, worn.without_static())
         if subject is not None:
-            _check_size(feed, options, subject)
+            _check_size(feed, options, names, subject)
         return Source(chosen, read_timeout=read_timeout, late_after=late_after)
     except BaseException:
         feed.close()
         raise
 
 
-def _one_subject(feed: Feed, options: Options) -> Feed:
-    return SubjectFeed(feed, options["subject"]) if "subject" in options else feed
+def _chosen(feed: Feed, options: Options, names: Names) -> Feed:
+    """Return one subject of a feed, renamed."""
+    if "subject" in options:
+        feed = SubjectFeed(feed, options["subject"])
+    return RenamedFeed(feed, names) if names else feed
 
 
 def _check_labels(source: Feed, needs: MarkerSet) -> None:
@@ -140,12 +149,12 @@ def _check_labels(source: Feed, needs: MarkerSet) -> None:
         )
 
 
-def _check_size(feed: Feed, options: Options, subject: Subject) -> None:
+def _check_size(feed: Feed, options: Options, names: Names, subject: Subject) -> None:
     if isinstance(feed, Replay):  # looked at without starting its clock
-        again = _one_subject(Replay(feed.recording, speed=0), options)
+        again = _chosen(Replay(feed.recording, speed=0), options, names)
         markers, labels = first_frames(again, _GLANCES), again.labels
     else:
-        chosen = _one_subject(feed, options)
+        chosen = _chosen(feed, options, names)
         markers, labels = first_frames(chosen), chosen.labels
     unit = feed.meters_per_unit if isinstance(feed, LslFeed) else math.nan
     check_size(feed.name, labels, markers, subject, meters_per_unit=unit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from ikns.recording.files.storage import (
     write_storage,
 )
 from ikns.recording.files.table import text_lines
+from ikns.recording.labels import renamed
 
 
 class Converted(NamedTuple):
@@ -29,6 +31,7 @@ class Converted(NamedTuple):
     names: tuple[str, ...]
     duration: float  # s
     left_out: int  # frames that the new file cannot hold
+    given: tuple[str, ...] = ()  # labels of markers before they were renamed
 
 
 def convert_file(
@@ -39,6 +42,7 @@ def convert_file(
     start: str | None = None,
     end: str | None = None,
     stream: str | None = None,
+    names: Mapping[str, str] | None = None,
     force: bool = False,
 ) -> Converted:
     """Read a file and write it in the format of another ending.
@@ -53,6 +57,9 @@ def convert_file(
         joint angles.
     subject_prefix, start, end, stream
         As for :func:`ikns.recording.files.read`; angles have no subject and no events.
+    names : mapping, optional
+        Other labels for markers, new by old, as for
+        :func:`ikns.recording.labels.renamed`.
     force : bool
         Whether to replace a file that exists.
 
@@ -64,10 +71,10 @@ def convert_file(
         When the target cannot hold it.
     """
     if holds_angles(source):
-        if subject_prefix is not None or stream is not None:
+        if subject_prefix is not None or stream is not None or names:
             raise InvalidInput(
                 f"{source}: expected a file of markers to choose a subject or a stream "
-                f"from, found joint angles."
+                f"from, or to rename, found joint angles."
             )
         table = _between(source, _read_angles(source), start, end)
         return _write_angles(target, table, force=force)
@@ -79,10 +86,18 @@ def convert_file(
     recording = read(
         source, subject_prefix=subject_prefix, start=start, end=end, stream=stream
     )
+    given = recording.labels
+    if names:
+        recording = renamed(recording, names)
     write(target, recording, force=force)
     time = recording.time
     return Converted(
-        "markers", len(time), recording.labels, float(time[-1] - time[0]), 0
+        "markers",
+        len(time),
+        recording.labels,
+        float(time[-1] - time[0]),
+        0,
+        given,
     )
 
 

@@ -1,0 +1,100 @@
+"""A recording of a known person: judged, then tracked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.exploration import judge_exploration
+from ikns.calibration.judge.finding import refused
+from ikns.calibration.judge.subjects import other_subject
+from ikns.errors import MarkerMismatch, naming
+from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.marker_ik.rejection import rejection_sentence
+from ikns.motion.motion import Motion
+from ikns.motion.unseen import warn_unseen
+from ikns.recording.recording import Recording
+
+
+def judged_motion(
+    skeleton: Skeleton,
+    recording: Recording,
+    *,
+    chain: str | None = None,
+    static: Recording | None = None,
+    measured: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[Motion, list[str]]:
+    """Judge a recording, track it, and say what it lacks.
+
+    :meth:`MarkerIK.track` alone tracks a recording whatever is wrong with it.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The person's.
+    recording : Recording
+    chain : str, optional
+        What the recording is meant to show, see :data:`ikns.body.chains.CHAINS`.
+    static : Recording, optional
+        The static trial, whose subject must be the recording's.
+    measured : bool
+        Whether the skeleton comes from a static trial; assumed distances between
+        markers are not compared.
+    progress : callable, optional
+        Called with (frames done, frames in total).
+
+    Returns
+    -------
+    motion : Motion
+    warnings : list of str
+        What the judge warns of, and which frames are left out.
+
+    Raises
+    ------
+    MarkerMismatch
+        When the recording must not be used, or never shows a segment of the chain.
+    NotEnoughData
+        When `chain` is asked for and there are fewer than two frames.
+
+    Warns
+    -----
+    RecordingWarning
+        Of markers that no frame shows.
+    """
+    shown = "both_arms" if chain is None else chain
+    warned = require_usable(
+        skeleton, recording, chain=shown, static=static, measured=measured
+    )
+    warn_unseen(skeleton, recording, chain)
+    motion = MarkerIK(skeleton).track(recording, chain=chain, progress=progress)
+    if left_out := rejection_sentence(motion, shown):
+        warned.append(f"{recording.source}: {left_out}.")
+    return motion, warned
+
+
+def require_usable(
+    skeleton: Skeleton,
+    recording: Recording,
+    *,
+    chain: str = "both_arms",
+    static: Recording | None = None,
+    measured: bool = True,
+) -> list[str]:
+    """Return the judge's warnings of a recording of a known person, or refuse it.
+
+    Arguments and errors as for :func:`judged_motion`.
+    """
+    with naming(recording.source):
+        findings = judge_exploration(
+            recording,
+            skeleton.marker_set,
+            skeleton,
+            skeleton=skeleton if measured else None,
+            chain=chain,
+        )
+    if static is not None:
+        findings += other_subject(static, recording, skeleton.marker_set)
+    if faults := refused(findings):
+        raise MarkerMismatch(faults[0].sentence)
+    return [finding.sentence for finding in findings if finding.severity == "warn"]

@@ -1,0 +1,132 @@
+"""Commands that read a recording of a known person refuse one that must not be used."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small_person
+from command_line import check_refused
+
+from ikns.calibration.judged_motion import judged_motion
+from ikns.cli import main
+from ikns.errors import MarkerMismatch
+from ikns.recording.recording import Recording
+
+COMMANDS = {
+    "ik": ["--out", "new.csv"],
+    "control": ["--out", "new.csv"],
+    "compare": [],
+    "ucm": [],
+    "check": [],
+}
+Change = Callable[[Recording], Recording]
+
+
+def placed(recording: Recording, markers: np.ndarray) -> Recording:
+    return Recording(recording.time, markers, recording.labels, recording.source)
+
+
+def swap(recording: Recording, a: str, b: str) -> Recording:
+    labels = [{a: b, b: a}.get(label, label) for label in recording.labels]
+    return Recording(recording.time, recording.markers, labels, recording.source)
+
+
+def scaled(recording: Recording, factor: float | list[float]) -> Recording:
+    return placed(recording, recording.markers * factor)
+
+
+def not_seen_as_a_number(recording: Recording) -> Recording:
+    return placed(recording, np.nan_to_num(recording.markers, nan=-9.999))
+
+
+#: What a sentence about each must say.
+WRONG: dict[str, tuple[Change, str]] = {
+    "exchanged": (partial(swap, a="RWRA", b="RWRB"), "exchange RWRA and RWRB"),
+    "unit": (partial(scaled, factor=10.0), "correct the unit"),
+    "not seen": (not_seen_as_a_number, "empty cells"),
+}
+
+
+@pytest.fixture(scope="module")
+def wrong(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A file of each kind."""
+    folder = tmp_path_factory.mktemp("wrong")
+    points = small_person.protocol().points.recording
+    return {
+        kind: small_person.write(folder, kind.replace(" ", "_"), change(points))
+        for kind, (change, _) in WRONG.items()
+    }
+
+
+@pytest.mark.parametrize("kind", WRONG)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_what_must_not_be_used_is_refused_with_what_is_wrong(
+    command: str,
+    kind: str,
+    files: Path,
+    wrong: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    argv = [command, str(wrong[kind]), "--subject", str(files / "person")]
+    argv += COMMANDS[command]
+    if command == "check":  # which prints its table too
+        assert main(argv) == 2
+        sentence = capfd.readouterr().err
+    else:
+        sentence = check_refused(argv, tmp_path, capfd, names=wrong[kind])
+    assert WRONG[kind][1] in sentence
+
+
+def test_natural_movement_reaches_and_recordings_beside_a_static_trial_are_judged_too(
+    files: Path,
+    wrong: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    static, points = str(files / "static.c3d"), str(files / "points.c3d")
+    bad = wrong["exchanged"]
+    for argv in (
+        ["compare", points, "--subject", str(files / "person"), "--reaches", str(bad)],
+        ["ik", str(bad), "--static", static, "--out", "new.csv"],
+        [
+            *("calibrate", "--static", static, "--exploration", points),
+            *("--natural", str(bad), "--out", "new"),
+        ],
+    ):
+        check_refused(argv, tmp_path, capfd, names=bad)
+
+
+def test_what_spoils_a_moment_is_said_and_the_rest_is_used() -> None:
+    person = small_person.subject()
+    points = small_person.protocol().points.recording
+    markers = np.array(points.markers)
+    rows, column = slice(300, 310), points.labels.index("RFIN")
+    markers[rows, column] += 0.3
+    motion, warned = judged_motion(
+        person.skeleton, placed(points, markers), chain=person.chain
+    )
+    clean, nothing = judged_motion(person.skeleton, points, chain=person.chain)
+    assert nothing == []
+    assert any("RFIN" in sentence and "301-310" in sentence for sentence in warned)
+    assert any("10 of" in sentence and "left out" in sentence for sentence in warned)
+    lost = np.isnan(motion.angles) & np.isfinite(clean.angles)
+    assert lost.any(axis=1)[rows].all()
+    assert not lost[:300].any()
+
+
+def test_a_single_frame_is_judged() -> None:
+    person = small_person.subject().skeleton
+    points = small_person.protocol().points.recording
+    seen = np.isfinite(points.markers).all(axis=(1, 2))
+    one = small_person.cut(points, int(np.argmax(seen)), int(np.argmax(seen)) + 1)
+    motion, warned = judged_motion(person, one)
+    assert (len(motion.time), warned) == (1, [])
+    with pytest.raises(MarkerMismatch, match="exchange RWRA and RWRB"):
+        judged_motion(person, swap(one, "RWRA", "RWRB"))
