@@ -159,13 +159,14 @@ class Walk(NamedTuple):
     start : (P,) array
         Swivel where the walk began, rad.
     ways : list of P splines
-        From the turn since then to the posture (7,), rad.
+        From the turn since then to the posture (7,), rad; None where the walk came to
+        a posture from which the hand cannot be held.
     position, hand : (P, 3) and (P, 3, 3) arrays
         Of the hands.
     """
 
     start: Array
-    ways: list[CubicSpline]
+    ways: list[CubicSpline | None]
     position: Array
     hand: Array
 
@@ -196,11 +197,19 @@ def walk(arm: Arm, start: Array, *, farthest: float) -> Walk:
             rows.append(q)
         half.append(rows)
     table = np.array([*half[0][::-1], start, *half[1]])
-    turned = np.array([wrapped(pose(arm, row).swivel - first.swivel) for row in table])
-    ways = [CubicSpline(turned[:, k], table[:, k]) for k in range(len(start))]
+    places = [pose(arm, row) for row in table]
+    turned = np.array([wrapped(at.swivel - first.swivel) for at in places])
+    off = np.array([np.abs(at.knuckle - first.knuckle).max(axis=1) for at in places])
+    held = (off.max(axis=0) < 1e-3) & (np.diff(turned, axis=0) > 0).all(axis=0)
+    held &= (turned[0] < -farthest) & (turned[-1] > farthest)
+    ways = [
+        CubicSpline(turned[:, k], table[:, k]) if held[k] else None
+        for k in range(len(start))
+    ]
     return Walk(first.swivel, ways, first.knuckle, first.hand)
 
 
 __all__ = [
-    "EASY", "Arm", "Pose", "Walk", "oriented", "other_body", "pose", "posed", "steadied", "walk", "wrapped",
+    "EASY", "Arm", "Pose", "Walk", "oriented", "other_body", "pose", "posed",
+    "steadied", "walk", "wrapped",
 ]  # fmt: skip

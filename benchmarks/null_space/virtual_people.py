@@ -19,6 +19,7 @@ from scipy.stats import multivariate_normal
 
 from null_space.virtual_arm import (
     Arm,
+    Walk,
     oriented,
     other_body,
     pose,
@@ -38,6 +39,8 @@ MIDDLE, HALF, OFF = np.array([0.56, -0.40, 0.18]), 0.13, 0.03
 DRIFT, TILT, SLOW = 3e-3, np.radians(1.2), (0.05, 0.35)
 #: Farthest place of the wrist from the shoulder, in lengths of the arm.
 _BENT = 0.95
+#: Draws of a hand until it can be held.
+_TRIES = 30
 #: Usual pronation, wrist flexion and deviation, and how far they go, rad.
 USUAL = np.radians([45, -5, 0])
 FOREARM = np.radians([[-40, -60, -25], [100, 60, 25]])
@@ -208,7 +211,7 @@ def box(rng: np.random.Generator) -> Array:
 def naturally(
     person: Virtual, at: Rests, *, rough: bool = True, rounds: int = 6
 ) -> Array:
-    """Postures (P, 7) at rests: the natural swivel there, found with the hand's axis."""
+    """Postures (P, 7) at rests, with the natural swivel of place and hand."""
     q, swivel = None, np.full(len(at.off), 0.8)
     for _ in range(rounds):
         q = posed(person.arm, at.wrist, swivel, at.distal, q)
@@ -223,7 +226,9 @@ def smooth(n: int) -> Array:
     return t**3 * (10 - 15 * t + 6 * t * t)
 
 
-def reaching(person: Virtual, at: Rests, order: Array, rest: float) -> tuple[Array, Array]:
+def reaching(
+    person: Virtual, at: Rests, order: Array, rest: float
+) -> tuple[Array, Array]:
     """Postures (T, 7) that visit rests in an order, and which one is held (T,), or -1.
 
     Each rest lasts `rest` s. On the way the elbow is where it naturally is.
@@ -258,6 +263,36 @@ def slow(n: int, width: int, rng: np.random.Generator) -> Array:
     return np.sqrt(2 / 5) * np.sin(2 * np.pi * hertz * t + phase).sum(axis=2)
 
 
+def held(person: Virtual, at: Rests) -> Walk:
+    """Walk the self-motion at rests, as far as this person explores.
+
+    What is meant counts from the smooth field: the rest is scatter of movement.
+    """
+    calm = Rests(at.wrist, at.distal, np.zeros(len(at.off)))
+    start = naturally(person, calm, rough=False)
+    farthest = 1.15 * np.abs([person.low, person.high]).max()
+    return walk(person.arm, start, farthest=farthest)
+
+
+def holdable(person: Virtual, offsets: Array, rng: np.random.Generator) -> Rests:
+    """Rests as :func:`rests`, with the hand drawn again where it cannot be held."""
+    at = rests(person, offsets, rng)
+    for _ in range(_TRIES):
+        bad = [k for k, way in enumerate(held(person, at).ways) if way is None]
+        if not bad:
+            return at
+        again = rests(
+            person, offsets[bad] + rng.normal(scale=0.01, size=(len(bad), 3)), rng
+        )
+        for whole, part in zip(
+            (at.wrist, at.distal, at.off),
+            (again.wrist, again.distal, again.off),
+            strict=True,
+        ):
+            whole[bad] = part
+    raise RuntimeError(f"person {person.seed} cannot hold a hand at {offsets[bad]} m")
+
+
 def exploring(
     person: Virtual, at: Rests, meant: list[Array], rng: np.random.Generator
 ) -> tuple[Array, Array, Array]:
@@ -266,10 +301,7 @@ def exploring(
     `meant` has c at each place, frame by frame; it starts and ends at rest. Returns
     postures (T, 7), place (T,), -1 between, and c as meant (T,), NaN between.
     """
-    # What is meant counts from the smooth field: the rest is scatter of movement.
-    calm = Rests(at.wrist, at.distal, np.zeros(len(at.off)))
-    arm, start = person.arm, naturally(person, calm, rough=False)
-    found = walk(arm, start, farthest=1.3 * np.abs([person.low, person.high]).max())
+    arm, found = person.arm, held(person, at)
     parts, place, c = [], [], []
     for k, wish in enumerate(meant):
         n = len(wish)
@@ -277,7 +309,9 @@ def exploring(
         shake = slow(n, 6, rng)
         spin = TILT * shake[:, 3:]
         R = np.array([_turned(v, np.linalg.norm(v)) for v in spin])
-        q = steadied(arm, q, found.position[k] + DRIFT * shake[:, :3], R @ found.hand[k])
+        q = steadied(
+            arm, q, found.position[k] + DRIFT * shake[:, :3], R @ found.hand[k]
+        )
         if k:
             gap = smooth(round(RATE * 1.0))[:, None]
             parts.append(parts[-1][-1] + gap * (q[0] - parts[-1][-1]))
@@ -311,7 +345,7 @@ def sweeps(person: Virtual, seconds: float, rng: np.random.Generator) -> Array:
 
 
 def turning(person: Virtual, at: Rests, kind: str) -> tuple[Array, Array]:
-    """Turn the hand at each rest, elbow and wrist still: postures (T, 7), place (T,)."""
+    """Turn the hand at each rest, the elbow still: postures (T, 7), place (T,)."""
     column, most = TURNS[kind]
     start = naturally(person, at)
     wave = most * np.sin(2 * np.pi * np.arange(round(2 * RATE)) / (2 * RATE))

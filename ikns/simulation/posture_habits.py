@@ -173,7 +173,9 @@ def draw_reaches(seed: int | np.random.Generator, n: int) -> tuple[Array, Array]
     rng, people = np.random.default_rng(seed), habit_people()
     found = np.empty((0, 12))
     while len(found) < n:
-        kinds = rng.choice(len(people.share), size=n, p=people.share / people.share.sum())
+        kinds = rng.choice(
+            len(people.share), size=n, p=people.share / people.share.sum()
+        )
         rows = np.array(
             [
                 rng.multivariate_normal(people.pose_mean[k], people.pose_covariance[k])
@@ -218,9 +220,7 @@ def draw_hands(seed: int | np.random.Generator, wrists: ArrayLike) -> Array:
         k = rng.choice(len(row), p=row)
         gain = cov[k, 3:, :3] @ inverse[k]
         spread = cov[k, 3:, 3:] - gain @ cov[k, :3, 3:]
-        turns.append(
-            rng.multivariate_normal(mean[k, 3:] + gain @ off[i, k], spread)
-        )
+        turns.append(rng.multivariate_normal(mean[k, 3:] + gain @ off[i, k], spread))
     return _turned(np.reshape(turns, (-1, 3)))
 
 
