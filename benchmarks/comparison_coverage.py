@@ -53,12 +53,12 @@ from ikns.calibration import calibrate
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
-from ikns.simulation.arm import ArmKinematics
+from ikns.simulation.arm import GIRDLE_FOLLOW, ArmKinematics
 from ikns.simulation.movement import MovementPlan, explore, join, reach, reach_samples
 from ikns.simulation.places import (
     BOX_HIGH,
     BOX_LOW,
-    GIRDLE_FOLLOW,
+    VERTEX_SD,
     Place,
     box_points,
     explored_places,
@@ -90,7 +90,8 @@ def habits(
     of_person.uniform(-np.pi, np.pi)
     of_person.normal(0.0, STATIC_SD, len(arm.skeleton.joint_names))
     sitting = both_arms(arm.skeleton, RESTING)
-    positions = box_points([arm], sitting, n=POINTS, rng=of_person)
+    near = of_person.normal(0.0, VERTEX_SD, (POINTS, 3))
+    positions = box_points([arm], sitting, n=POINTS, near=near)
     np.testing.assert_array_equal(positions[0], positions_in_record)  # in step with it
     places = explored_places(
         arm,

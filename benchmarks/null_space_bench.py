@@ -14,19 +14,32 @@ ordinary movement of their own.
 
 Nobody swivelled on purpose there: paper and proximal explore the self-motion in closed
 form at ten places that the hand visited in one's own movement.
+
+Virtual people of another making (:mod:`null_space.virtual_people`) mean a known c:
+markers are recorded, the package calibrates, and c is compared with what was meant.
+
+Entrants other than the shipped ones are named as ``--method module:Class``; what they
+are told, and what they answer, is in :mod:`null_space.entrants`.
 """
 
 import argparse
 import json
 import platform
-import time
 from pathlib import Path
 
 import numpy as np
 from natural_posture_people import moving, own_fit
+from null_space.entered import entered
+from null_space.entrants import PACKAGE, SHIPPED, entrant
 from null_space.methods import METHODS
 from null_space.people import Arm, real_arms
 from null_space.scores import of_people, summary
+from null_space.virtual_table import (
+    figure,
+    print_virtual,
+    virtual_people,
+    virtual_verdicts,
+)
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 #: What was asked of intent: at most this change, and at least these AUCs.
@@ -41,6 +54,7 @@ GOALS = {
     ("people alone", "same"): {"change": 0.10},
 }
 #: Of those that learn nothing of one's own, the split means nothing.
+REAL_ONLY = tuple(name for name in METHODS if name not in PACKAGE)
 UNLEARNED = ("swivel about down", "hinge swivel", "people alone")
 
 
@@ -74,29 +88,62 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=BESIDE)
     parser.add_argument("--quick", action="store_true", help="two people, no maps")
-    parser.add_argument("--method", action="append", choices=[*METHODS])
+    parser.add_argument(
+        "--method", action="append", metavar="NAME", help="shipped, or module:Class"
+    )
+    parser.add_argument("--virtual", type=int, default=20, help="virtual people")
+    parser.add_argument("--no-real", action="store_true", help="virtual people alone")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--figure", type=Path, help="picture to write")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
-    start = time.perf_counter()
+    for name in options.method or []:
+        if name not in METHODS:
+            entrant(name)
+    virtual = virtual_people(
+        2 if options.quick else options.virtual,
+        [m for m in options.method or [*PACKAGE, *SHIPPED] if m not in REAL_ONLY],
+        jobs=options.jobs,
+    )
+    table = {} if options.no_real else real_people(options)
+    if options.json:
+        rows = {f"{m}, {k}": row for (m, k), row in table.items()}
+        print(json.dumps(rows | {"virtual, simulated": virtual}, indent=1))
+    else:
+        if table:
+            print_real(table, quick=options.quick)
+        print_virtual(virtual)
+        if not options.quick:
+            print("\n" + "\n".join(virtual_verdicts(virtual)))
+    if options.figure:
+        figure(table, virtual, options.figure)
+
+
+def real_people(options: argparse.Namespace) -> dict[tuple[str, str], dict]:
+    """Scores of all methods on the people of UE_ADL."""
     arms = real_arms(options.data / "ue_adl", people=2 if options.quick else None)
     people = left_out(arms)
+    # The hinge swivel alone is in both lists under its own name.
     chosen = options.method or [
         name
-        for name in METHODS
-        if not (options.quick and name in ("paper", "proximal"))
+        for name in [*METHODS, *(n for n in SHIPPED if n != "swivel")]
+        if not (
+            options.quick and name not in ("hinge swivel", "people alone", "intent")
+        )
     ]
-    table = {
-        (name, kind): summary(of_people(arms, people, METHODS[name], kind))
+    return {
+        (name, kind): summary(of_people(arms, people, entered(name), kind))
         for name in chosen
         for kind in (("same",) if name in UNLEARNED else ("same", "unseen"))
     }
-    if options.json:
-        print(json.dumps({f"{m}, {k}": row for (m, k), row in table.items()}, indent=1))
-        return
+
+
+def print_real(table: dict[tuple[str, str], dict], *, quick: bool) -> None:
+    """Print the table of real people."""
     print(
-        f"{len(people)} real people, both arms; wishes are simulated. numpy "
-        f"{np.__version__}, Python {platform.python_version()}, seeds from 0; "
-        f"{time.perf_counter() - start:.0f} s.\n"
+        f"{len(next(iter(table.values()))['people'])} real people, both arms; wishes "
+        f"are simulated. numpy {np.__version__}, Python {platform.python_version()}, "
+        "seeds from 0.\n"
     )
     print(
         "| method | own movement | reaches | change | > 0.2 | AUC 20 deg | AUC 10 deg "
@@ -112,7 +159,7 @@ def main() -> None:
             f"| {row['above_0.2']:.1%} | {row['auc_20']:.3f} | {row['auc_10']:.3f} "
             f"| {row['turned']:.2f} |"
         )
-    if options.quick:
+    if quick:
         print("\nOther people are one person here: goals are for all of them.")
     else:
         print("\n" + "\n".join(verdicts(table)))

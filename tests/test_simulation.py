@@ -34,6 +34,7 @@ from ikns.simulation.movement import explore, reach
 from ikns.simulation.places import (
     BOX_HIGH,
     BOX_LOW,
+    VERTEX_SD,
     Place,
     box_points,
     explored_places,
@@ -76,7 +77,9 @@ def hand(run: Protocol) -> tuple[np.ndarray, np.ndarray]:
 def box(arm: ArmKinematics, *, n: int) -> list[Place]:
     """Return points of the protocol for one arm."""
     rng = np.random.default_rng(1)
-    (positions,) = box_points([arm], np.zeros(18), n=n, rng=rng)
+    (positions,) = box_points(
+        [arm], np.zeros(18), n=n, near=rng.normal(0.0, VERTEX_SD, (n, 3))
+    )
     return explored_places(
         arm,
         np.zeros(18),

@@ -21,7 +21,7 @@ from ikns.simulation import (
     simulate_protocol,
     virtual_subject,
 )
-from ikns.simulation.arm import ArmKinematics, girdle, self_motion
+from ikns.simulation.arm import GIRDLE_FOLLOW, ArmKinematics, girdle, self_motion
 from ikns.simulation.movement import (
     MovementPlan,
     execute_plan,
@@ -29,7 +29,7 @@ from ikns.simulation.movement import (
     reach,
     reach_samples,
 )
-from ikns.simulation.places import GIRDLE_FOLLOW, Place, comfortable_posture
+from ikns.simulation.places import Place, comfortable_posture
 from ikns.simulation.trial import Trial, place_in_room, record_trial
 from ikns.simulation.wander import minimum_jerk
 

@@ -29,6 +29,10 @@ _LONGEST_STEP = 0.3
 #: Step along the self-motion, rad of joint-space length. A cubic spline through the
 #: steps is then accurate to about stride^4 / 384 = 1e-8 rad.
 _STRIDE = 0.04
+#: Clavicle angle with the upper arm forward, rad. Sternoclavicular elevation of 6 to
+#: 10 deg and a protraction of the same order go with raising the arm to the front
+#: (recalled from Ludewig et al. 2009, J Bone Joint Surg Am 91:378; rounded).
+GIRDLE_FOLLOW = np.radians(8.0)
 #: Distance of the self-motion from all joint limits, rad: people do not hold a hand
 #: still with a joint at its limit.
 _MARGIN = np.radians(5.0)

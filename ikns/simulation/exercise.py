@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.simulation.arm import ArmKinematics
+from ikns.simulation.habitual_places import habitual_somewhere, reach_by_joints
 from ikns.simulation.movement import (
     SWIVEL_HZ,
     MovementPlan,
@@ -17,6 +18,7 @@ from ikns.simulation.movement import (
     reach_samples,
 )
 from ikns.simulation.places import Place, random_place
+from ikns.simulation.posture_habits import PostureHabits
 
 
 def explore_freely(
@@ -26,20 +28,41 @@ def explore_freely(
     seconds: float,
     rate: float,
     girdle_rest: NDArray[np.float64],
+    habits: PostureHabits | None,
     rng: np.random.Generator,
 ) -> list[MovementPlan]:
-    """Plan free exploration of each arm: reaches from one random place to the next."""
+    """Plan free exploration of each arm: reaches from one random place to the next.
+
+    Without `habits` the hand is turned little, and the elbow is anywhere.
+    """
 
     def somewhere() -> list[Place]:
+        if habits is None:
+            return [
+                random_place(arm, angles, rng=rng, girdle_rest=girdle_rest)
+                for arm in arms
+            ]
         return [
-            random_place(arm, angles, rng=rng, girdle_rest=girdle_rest) for arm in arms
+            habitual_somewhere(
+                arm, angles, habits=habits, girdle_rest=girdle_rest, rng=rng
+            )
+            for arm in arms
+        ]
+
+    def reaching(starts: list[Place], ends: list[Place]) -> list[MovementPlan]:
+        if habits is None:
+            return _reach_together(starts, ends, rate)
+        m = _samples(starts, ends, rate)
+        return [
+            reach_by_joints(arm, angles, start, end, n=m)
+            for arm, start, end in zip(arms, starts, ends, strict=True)
         ]
 
     n = max(2, round(seconds * rate))
     stops, reaches, done = somewhere(), [], 0
     while done < n:
         before, stops = stops, somewhere()
-        reaches.append(_reach_together(before, stops, rate))
+        reaches.append(reaching(before, stops))
         done += len(reaches[-1][0].point)
     return [join(plans).first(n) for plans in zip(*reaches, strict=True)]
 
@@ -83,6 +106,10 @@ def explore_points(
 def _reach_together(
     starts: Sequence[Place], ends: Sequence[Place], rate: float
 ) -> list[MovementPlan]:
-    pairs = list(zip(starts, ends, strict=True))
-    n = max(reach_samples(start, end, rate=rate) for start, end in pairs)
-    return [reach(start, end, n=n) for start, end in pairs]
+    n = _samples(starts, ends, rate)
+    return [reach(*pair, n=n) for pair in zip(starts, ends, strict=True)]
+
+
+def _samples(starts: Sequence[Place], ends: Sequence[Place], rate: float) -> int:
+    pairs = zip(starts, ends, strict=True)
+    return max(reach_samples(start, end, rate=rate) for start, end in pairs)

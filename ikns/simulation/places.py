@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ikns.errors import InvalidInput
-from ikns.simulation.arm import ArmKinematics, SelfMotion, girdle, self_motion
+from ikns.simulation.arm import (
+    GIRDLE_FOLLOW,
+    ArmKinematics,
+    SelfMotion,
+    girdle,
+    self_motion,
+)
 
 Array = NDArray[np.float64]
 
@@ -25,8 +31,9 @@ Array = NDArray[np.float64]
 #: by 55 deg or more at every point.
 BOX_LOW = np.array([0.42, -0.42, -0.27])
 BOX_HIGH = np.array([0.70, 0.10, 0.27])
-#: The hand is placed "near" the vertices of a box: error per axis, m (assumption).
-_VERTEX_SD = 0.012
+#: The hand is placed "near" the vertices of a box by people without habits: error per
+#: axis, m (assumption; real people are 4 to 6 cm off).
+VERTEX_SD = 0.012
 #: Size of an object held between two hands, and sideways range of its middle, m.
 _OBJECT, _SIDEWAYS = 0.30, 0.20
 #: Range of the swivel that people explore, rad: from the elbow below the shoulder-wrist
@@ -39,10 +46,6 @@ _LEAST_RANGE = np.radians(40.0)
 #: Turns of the forearm that are tried for a larger range, and the gain that is worth
 #: another turn, rad.
 _FOREARM_TURNS, _WORTH_TURNING = np.radians([0.0, 25.0, -25.0]), np.radians(3.0)
-#: Clavicle angle with the upper arm forward, rad. Sternoclavicular elevation of 6 to
-#: 10 deg and a protraction of the same order go with raising the arm to the front
-#: (recalled from Ludewig et al. 2009, J Bone Joint Surg Am 91:378; rounded).
-GIRDLE_FOLLOW = np.radians(8.0)
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ def random_place(
     arm: ArmKinematics, angles: Array, *, rng: np.random.Generator, girdle_rest: Array
 ) -> Place:
     """Return a random place in the box, in a random comfortable posture."""
-    position = _from_box(arm, angles, rng.uniform(BOX_LOW, BOX_HIGH))
+    position = from_box(arm, angles, rng.uniform(BOX_LOW, BOX_HIGH))
     posture = comfortable_posture(
         arm,
         angles,
@@ -120,17 +123,17 @@ def random_place(
         wrist=rng.normal(0.0, np.radians([20, 8, 5])),
         girdle_rest=girdle_rest,
     )
-    return _place(arm, angles, posture)
+    return place_of(arm, angles, posture)
 
 
 def box_points(
-    arms: Sequence[ArmKinematics], angles: Array, *, n: int, rng: np.random.Generator
+    arms: Sequence[ArmKinematics], angles: Array, *, n: int, near: Array | float = 0.0
 ) -> list[Array]:
     """Return the positions of each hand at the points of the protocol, (n, 3) m.
 
-    They are near the vertices of the box, the upper ones first, then near the centers
-    of its upper and lower face; fewer than 10 are the first ones. Two hands hold an
-    object between them, whose middle is near the points.
+    They are the vertices of the box, the upper ones first, then the centers of its
+    upper and lower face; fewer than 10 are the first ones. Two hands hold an object
+    between them, whose middle is at the points. All are `near` (n, 3) m off.
     """
     corners = itertools.product((1, 0), ((1, 0), (1, 1), (0, 1), (0, 0)))
     shares = [(x, y, z) for y, (x, z) in corners] + [(0.5, 1, 0.5), (0.5, 0, 0.5)]
@@ -138,10 +141,9 @@ def box_points(
         raise InvalidInput(f"expected n_points from 1 to {len(shares)}, found {n}.")
     share = np.array(shares[:n], dtype=np.float64)
     goals = BOX_LOW + share * (BOX_HIGH - BOX_LOW)
-    near = rng.normal(0.0, _VERTEX_SD, (n, 3))
     if len(arms) == 1:
-        return [_from_box(arms[0], angles, goals) + near]
-    ahead = [_from_box(arm, angles, goals * [1, 1, 0]) for arm in arms]
+        return [from_box(arms[0], angles, goals) + near]
+    ahead = [from_box(arm, angles, goals * [1, 1, 0]) for arm in arms]
     middle = np.mean(ahead, axis=0) + near
     middle[:, 2] += (share[:, 2] - 0.5) * _SIDEWAYS
     half = np.array([0.0, 0.0, _OBJECT / 2])
@@ -230,7 +232,7 @@ def widest_place(
             highest=highest,
             girdle_follow=girdle_follow,
         )
-        here = _place(arm, angles, posture, motion)
+        here = place_of(arm, angles, posture, motion)
         if best is None or here.swivel_range > best.swivel_range + _WORTH_TURNING:
             best = here
     if best is None or best.swivel_range < _LEAST_RANGE:
@@ -241,14 +243,15 @@ def widest_place(
     return best
 
 
-def _place(
+def place_of(
     arm: ArmKinematics, angles: Array, posture: Array, motion: SelfMotion | None = None
 ) -> Place:
+    """Return the place of an arm's posture (9,), rad."""
     body = arm.put(angles, posture)
     return Place(posture, *arm.hand(body), arm.swivel(body), motion)
 
 
-def _from_box(arm: ArmKinematics, angles: Array, share: Array) -> Array:
+def from_box(arm: ArmKinematics, angles: Array, share: Array) -> Array:
     """Convert positions from arm lengths off the shoulder to the thorax frame, m."""
     lengths = arm.skeleton.segment_lengths
     reach = sum(lengths[f"{arm.side}_{s}"] for s in ("upper_arm", "forearm", "hand"))

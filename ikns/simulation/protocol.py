@@ -8,16 +8,17 @@ reaches in between. Everything is simulated, and labeled so.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ikns.body.chains import SIDES
-from ikns.simulation.arm import ArmKinematics
+from ikns.simulation.arm import GIRDLE_FOLLOW, ArmKinematics
 from ikns.simulation.artifacts import SoftTissue
 from ikns.simulation.exercise import explore_freely, explore_points
 from ikns.simulation.movement import Unsteadiness
-from ikns.simulation.places import GIRDLE_FOLLOW
+from ikns.simulation.posture_habits import PostureHabits, draw_posture_habits
 from ikns.simulation.protocol_body import draw_protocol_body
 from ikns.simulation.subject import VirtualSubject
 from ikns.simulation.trial import Trial, record_trial
@@ -42,6 +43,8 @@ class Protocol:
         All settings of the simulation.
     skin : SoftTissue, optional
         Soft tissue of this person, if it moves.
+    habits : PostureHabits, optional
+        Natural posture of this person; None for one posture everywhere.
     """
 
     subject: VirtualSubject
@@ -52,6 +55,7 @@ class Protocol:
     places: Array
     settings: dict[str, object]
     skin: SoftTissue | None = None
+    habits: PostureHabits | None = None
 
     @property
     def trials(self) -> tuple[Trial, ...]:
@@ -73,6 +77,7 @@ def simulate_protocol(
     occluded: float = 0.03,
     unsteadiness: Unsteadiness | None = None,
     girdle_rhythm: float = 0.0,
+    habits: PostureHabits | Literal["drawn"] | None = None,
     rate: float = 100.0,
     quick: bool = False,
 ) -> Protocol:
@@ -103,6 +108,10 @@ def simulate_protocol(
     girdle_rhythm : float
         How far the clavicle follows the upper arm while the hand is held: 0 keeps it
         still at each point, 1 moves it as much as between points.
+    habits : PostureHabits, "drawn" or None
+        How the elbow goes with the hand while the person means nothing; drawn from real
+        people. None is a person who holds nearly one posture everywhere,
+        and the hand within 2 cm of the points.
     rate : float
         Frames per second.
     quick : bool
@@ -135,19 +144,23 @@ def simulate_protocol(
         "occluded": occluded,
         "unsteadiness": asdict(unsteadiness),
         "girdle_rhythm": girdle_rhythm,
+        "habits": habits is not None,
         "rate": rate,
     }
     sides = SIDES if side == "both" else (side,)
     arms = [ArmKinematics(subject.skeleton, name) for name in sides]
     # A stream for each use, so that changing one thing leaves the others as they are.
-    of_person, of_static, of_free, of_points, of_skin, of_cameras = (
-        np.random.default_rng(seed).spawn(6)
+    of_person, of_static, of_free, of_points, of_skin, of_cameras, of_habits = (
+        np.random.default_rng(seed).spawn(7)
     )
+    if habits == "drawn":
+        habits = draw_posture_habits(of_habits)
     person = draw_protocol_body(
         subject,
         arms,
         n_points=n_points,
         girdle_follow=girdle_rhythm * GIRDLE_FOLLOW,
+        habits=habits,
         rng=of_person,
     )
     free = explore_freely(
@@ -156,6 +169,7 @@ def simulate_protocol(
         seconds=free_seconds,
         rate=rate,
         girdle_rest=person.girdle_rest,
+        habits=habits,
         rng=of_free,
     )
     points = explore_points(
@@ -198,5 +212,6 @@ def simulate_protocol(
         places=np.mean(person.positions, axis=0),
         settings=settings,
         skin=skin,
+        habits=habits,
         **trials,
     )

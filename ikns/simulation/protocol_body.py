@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.simulation.arm import ArmKinematics
+from ikns.simulation.habitual_places import habitual_places
 from ikns.simulation.movement import MovementPlan, Unsteadiness, execute_plan
-from ikns.simulation.places import Place, box_points, explored_places
+from ikns.simulation.places import VERTEX_SD, Place, box_points, explored_places
+from ikns.simulation.posture_habits import PostureHabits
 from ikns.simulation.subject import VirtualSubject
 from ikns.simulation.trial import SEATED_SWAY, place_in_room, still_joints
 
@@ -90,9 +92,10 @@ def draw_protocol_body(
     *,
     n_points: int,
     girdle_follow: float,
+    habits: PostureHabits | None,
     rng: np.random.Generator,
 ) -> ProtocolBody:
-    """Draw a person's postures and places."""
+    """Draw a person's postures and places; `habits` None: one posture everywhere."""
     girdle_rest = rng.normal(0.0, np.radians([3.0, 2.0]))
     heading = rng.uniform(-np.pi, np.pi)
     sitting = both_arms(subject.skeleton, RESTING)
@@ -100,18 +103,18 @@ def draw_protocol_body(
     standing += rng.normal(0.0, STATIC_SD, len(standing))
     for arm in arms:
         standing[arm.columns[:2]] = girdle_rest
-    positions = box_points(arms, sitting, n=n_points, rng=rng)
-    places = [
-        explored_places(
-            arm,
-            sitting,
-            position,
-            rng=rng,
-            girdle_rest=girdle_rest,
-            girdle_follow=girdle_follow,
+    settings = {"girdle_rest": girdle_rest, "girdle_follow": girdle_follow, "rng": rng}
+    if habits is not None:
+        positions, places = habitual_places(
+            arms, sitting, n=n_points, habits=habits, **settings
         )
-        for arm, position in zip(arms, positions, strict=True)
-    ]
+    else:
+        near = rng.normal(0.0, VERTEX_SD, (n_points, 3))
+        positions = box_points(arms, sitting, n=n_points, near=near)
+        places = [
+            explored_places(arm, sitting, position, **settings)
+            for arm, position in zip(arms, positions, strict=True)
+        ]
     return ProtocolBody(
         arms,
         subject.adult.stature_m,

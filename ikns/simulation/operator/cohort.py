@@ -12,10 +12,11 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
-from ikns.simulation.arm import ArmKinematics, girdle
+from ikns.simulation.arm import GIRDLE_FOLLOW, ArmKinematics, girdle
+from ikns.simulation.habitual_places import natural_swivel
 from ikns.simulation.operator.ability import CONDITIONS, Ability, sample_abilities
 from ikns.simulation.operator.arm_loop import ArmLoop
-from ikns.simulation.places import GIRDLE_FOLLOW, Place, widest_place
+from ikns.simulation.places import Place, widest_place
 from ikns.simulation.protocol import Protocol, simulate_protocol
 from ikns.simulation.subject import virtual_subject
 
@@ -168,14 +169,20 @@ def tracking_place(
     rest = np.array(
         [p[:2] - girdle(p, np.zeros(2), follow=GIRDLE_FOLLOW) for p in postures]
     ).mean(axis=0)
-    swivel = float(protocol.points.swivel[first].mean())
+    wrist = postures[:, 6:].mean(axis=0)
+    if protocol.habits is None:
+        swivel = float(protocol.points.swivel[first].mean())
+    else:
+        swivel = natural_swivel(
+            arm, angles, where, wrist=wrist, habits=protocol.habits, girdle_rest=rest
+        )
     half = float(np.mean([np.ptp(protocol.points.swivel[row]) for row in rows])) / 2
     place = widest_place(
         arm,
         angles,
         where,
         swivel=swivel,
-        wrist=postures[:, 6:].mean(axis=0),
+        wrist=wrist,
         girdle_rest=rest,
         lowest=swivel - half,
         highest=swivel + half,
