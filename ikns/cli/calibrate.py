@@ -277,6 +277,8 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
     least = report["settings"]["min_samples"]
     seen = [item for item in extrinsic["joints_deg"].items() if item[1] is not None]
     moved = sorted(seen, key=lambda item: -item[1])[:2]
+    places = report.get("methods", {}).get("places", [])
+    scatter = {place["point"]: place["scatter"] for place in places}
     return [
         table(
             "Segments, joint to joint"
@@ -309,6 +311,7 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
                 "up\nmm": ".0f",
                 "right\nmm": ".0f",
                 "still\nsamples": "d",
+                "ends off\n% of range": ".0f",
                 "verdict": "s",
             },
             [
@@ -316,6 +319,7 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
                     row["point"],
                     *(1000 * x for x in row["center_m"]),
                     row["samples"],
+                    100 * scatter.get(row["point"], math.nan),
                     _verdict(row, least, report["settings"]["n_dof"]),
                 ]
                 for row in report["points"]
