@@ -5,6 +5,7 @@
 """
 
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
+from ikns.calibration.method_summary import method_summary
 from ikns.calibration.procedure import calibrate
 from ikns.motion.marker_ik.visibility import (
     say_apart,
@@ -15,6 +16,7 @@ from ikns.motion.marker_ik.visibility import (
 __all__ = [
     "calibrate",
     "elbow_reference",
+    "method_summary",
     "say_apart",
     "segment_pairs",
     "sight_needs",

@@ -14,6 +14,7 @@ from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.measured_body import measured_body
+from ikns.calibration.method_summary import method_summary
 from ikns.calibration.places import recorded_places
 from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.report import (
@@ -202,7 +203,9 @@ def calibrate(
     }
     shown = np.column_stack([hands, learned.labels_ + 1.0])
     shown = shown[:: len(hands) // _SHOWN + 1]
-    return Subject(skeleton, learned, chain, report, motions, shown, readouts)
+    subject = Subject(skeleton, learned, chain, report, motions, shown, readouts)
+    methods["summary"] = method_summary(subject, natural=measured.natural, own=True)
+    return subject
 
 
 def _fit(

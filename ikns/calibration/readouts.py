@@ -23,7 +23,7 @@ from ikns.nullspace.readout.ends import swept_ends
 #: Least natural movement of one's own, s; with less, other people's is all there is.
 LEAST_NATURAL = 2.0
 #: Natural movement within less than this along every axis covers nothing, m.
-_LEAST_COVERED = 0.10
+LEAST_COVERED = 0.10
 
 
 def learn_readouts(
@@ -195,9 +195,43 @@ def _natural_samples(
     """
     if len(chain_sides(chain)) != 1:
         return None
-    parts: list[tuple[Array, Array]] = []
-    seconds = 0.0
-    for motion, away in [(motion, True) for motion, _ in explorations] + [
+    found = moving_samples(
+        skeleton,
+        learned,
+        [motion for motion, _ in explorations],
+        natural,
+        chain,
+        max_hand_speed=max_hand_speed,
+    )
+    if natural:
+        _check_covered(np.concatenate([w[row] for w, _, row in found[-len(natural) :]]))
+    motions = [*(motion for motion, _ in explorations), *natural]
+    seconds = sum(
+        float(row.sum() * np.median(np.diff(motion.time)))
+        for motion, (_, _, row) in zip(motions, found, strict=True)
+    )
+    if seconds < LEAST_NATURAL:
+        return None
+    wrist = np.concatenate([w[row] for w, _, row in found])
+    swivel = np.concatenate([s[row] for _, s, row in found])
+    return wrist, swivel
+
+
+def moving_samples(
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    explorations: Sequence[Motion],
+    natural: Sequence[Motion],
+    chain: str,
+    *,
+    max_hand_speed: float,
+) -> list[tuple[Array, Array, Mask]]:
+    """Wrist (T, 3), swivel (T,), and the frames of ordinary movement, of each motion.
+
+    In the explorations these are frames with a moving hand away from every held place.
+    """
+    found = []
+    for motion, away in [(motion, True) for motion in explorations] + [
         (motion, False) for motion in natural
     ]:
         wrist, swivel = readout_samples(skeleton, motion, chain, "intent")
@@ -206,19 +240,16 @@ def _natural_samples(
         if away:
             hand = motion.task_position(chain)[row]
             row[row] = nearest_center(hand, learned.centers_, radius=ONE_PLACE)[0] < 0
-        parts.append((wrist[row], swivel[row, 0]))
-        seconds += float(row.sum() * np.median(np.diff(motion.time)))
-    if natural:
-        own = np.concatenate([w for w, _ in parts[len(explorations) :]])
-        span = np.ptp(np.quantile(own, [0.01, 0.99], axis=0), axis=0) if len(own) else 0
-        if np.max(span) < _LEAST_COVERED:
-            raise NotEnoughData(
-                "expected natural movement over the work space, found a hand that "
-                f"moves within {1e3 * np.max(span):.0f} mm: reach and carry things, "
-                "20 s over all of it."
-            )
-    if seconds < LEAST_NATURAL:
-        return None
-    wrist = np.concatenate([w for w, _ in parts])
-    swivel = np.concatenate([s for _, s in parts])
-    return wrist, swivel
+        found.append((wrist, swivel[:, 0], row))
+    return found
+
+
+def _check_covered(wrist: Array) -> None:
+    """Refuse natural movement within one place."""
+    span = np.ptp(np.quantile(wrist, [0.01, 0.99], axis=0), axis=0) if len(wrist) else 0
+    if np.max(span) < LEAST_COVERED:
+        raise NotEnoughData(
+            "expected natural movement over the work space, found a hand that "
+            f"moves within {1e3 * np.max(span):.0f} mm: reach and carry things, "
+            "20 s over all of it."
+        )

@@ -332,14 +332,19 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
         + " and ".join(f"{name} {angle:.0f} deg" for name, angle in moved)
         + ".",
         *held_sentences(static["held"]),
-        methods_sentence(report),
-        *notes([*report["warnings"], *report["methods"]["warnings"]]),
+        *methods_parts(report),
+        *notes([*report["warnings"], *report.get("methods", {}).get("warnings", [])]),
     ]
 
 
-def methods_sentence(report: dict[str, Any]) -> str:
-    """Say which methods of `control --method` were learned."""
-    methods = report["methods"]
+def methods_parts(report: dict[str, Any]) -> list[Any]:
+    """Say which methods were learned, and what c of each does where nothing is meant.
+
+    A folder of before has nothing to say of them.
+    """
+    methods = report.get("methods")
+    if methods is None:
+        return ["Methods learned: paper. Calibrated before there were others."]
     lost = methods["without"]
     known = [name for name in ("paper", "proximal", "intent") if name not in lost]
     parts = [f"Methods learned: {', '.join(known)}."]
@@ -352,7 +357,39 @@ def methods_sentence(report: dict[str, Any]) -> str:
             else "Natural posture of other people, as there was too little ordinary "
             "movement; add some with --natural."
         )
-    return " ".join(parts)
+    found = methods.get("summary")
+    if found is None:
+        return [" ".join(parts)]
+    counts = found["reaches"]
+    parts.append(f"Recommended: --method {found['recommended']}; {found['why']}.")
+    return [
+        table(
+            "Change of c where nothing is meant (mean; 1 is the whole range)",
+            {
+                "method": "s",
+                f"{counts['between_places']} reaches\nbetween points": ".2f",
+                f"{counts['natural']} natural\nreaches": ".2f",
+                "% of reaches\nabove 0.2": ".0f",
+                f"hand turned\nby {found['turned_deg']:.0f} deg": ".2f",
+            },
+            [
+                [
+                    name,
+                    *(
+                        math.nan if value is None else scale * value
+                        for scale, value in (
+                            (1, row["between_places"]),
+                            (1, row["natural"]),
+                            (100, row["above_0.2"]),
+                            (1, row["turned_hand"]),
+                        )
+                    ),
+                ]
+                for name, row in found["methods"].items()
+            ],
+        ),
+        " ".join(parts),
+    ]
 
 
 def _verdict(row: dict[str, Any], least: int, n_dof: int) -> str:
