@@ -6,7 +6,7 @@ import small_person
 
 from ikns.calibration import calibrate, method_summary
 from ikns.calibration.subject import Subject
-from ikns.cli.calibrate import calibration_parts
+from ikns.cli.calibration_tables import calibration_parts
 from ikns.live.control.recorded import control_table
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion

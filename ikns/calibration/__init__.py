@@ -7,6 +7,7 @@
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.method_summary import method_summary
 from ikns.calibration.procedure import calibrate
+from ikns.calibration.rewear import rewear
 from ikns.motion.marker_ik.visibility import (
     say_apart,
     segment_pairs,
@@ -17,6 +18,7 @@ __all__ = [
     "calibrate",
     "elbow_reference",
     "method_summary",
+    "rewear",
     "say_apart",
     "segment_pairs",
     "sight_needs",

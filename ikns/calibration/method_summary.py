@@ -114,6 +114,8 @@ def _changes(
     folds: Folds | None,
 ) -> Array:
     """Size of the change of c over each reach, (R,), of the largest output."""
+    if not len(reaches):
+        return np.empty(0)
     x, y = readout.samples(subject.skeleton, motion)
     at = []
     for frames in np.transpose(reaches):

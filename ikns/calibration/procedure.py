@@ -15,7 +15,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.measured_body import measured_body
 from ikns.calibration.method_summary import method_summary
-from ikns.calibration.places import recorded_places
+from ikns.calibration.places import check_places, recorded_places
 from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.report import (
     body_report,
@@ -226,6 +226,7 @@ def _fit(
     learned.reference = elbow_reference(
         skeleton, posture.mean(axis=0), chain, n_dof=learned.n_dof
     )
+    check_places(x, n_points=learned.n_points)
     places = recorded_places(hands, n_points=learned.n_points)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)

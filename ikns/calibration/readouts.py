@@ -204,7 +204,7 @@ def _natural_samples(
         max_hand_speed=max_hand_speed,
     )
     if natural:
-        _check_covered(np.concatenate([w[row] for w, _, row in found[-len(natural) :]]))
+        check_covered(np.concatenate([w[row] for w, _, row in found[-len(natural) :]]))
     motions = [*(motion for motion, _ in explorations), *natural]
     seconds = sum(
         float(row.sum() * np.median(np.diff(motion.time)))
@@ -244,8 +244,14 @@ def moving_samples(
     return found
 
 
-def _check_covered(wrist: Array) -> None:
-    """Refuse natural movement within one place."""
+def check_covered(wrist: Array) -> None:
+    """Refuse natural movement within one place; wrist centers (N, 3) m.
+
+    Raises
+    ------
+    NotEnoughData
+        When the wrist moves by less than 0.1 m along every axis.
+    """
     span = np.ptp(np.quantile(wrist, [0.01, 0.99], axis=0), axis=0) if len(wrist) else 0
     if np.max(span) < LEAST_COVERED:
         raise NotEnoughData(

@@ -45,8 +45,8 @@ SEGMENT_SD = {
 }
 #: Left against right in one person; about 1 % (our estimate).
 SIDE_SD = 0.01
-#: A body that was measured before keeps its sizes and axes: they may change by this, 0.3
-#: mm of an upper arm, and rad.
+#: A body that was measured before keeps its sizes and axes: they may change by this
+#: share, 0.3 mm of an upper arm, and by as many rad.
 KNOWN_SD = 1e-3
 #: Static poses range from hanging arms to a T pose, rad.
 POSE_SD = 1.0
