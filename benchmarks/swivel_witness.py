@@ -12,7 +12,7 @@ frames whose elbow is bent by 25 deg or more:
 - change: what a reach leaves of each after the natural posture (fitted to all frames
   of an arm), mean, in units of 70 deg.
 
-Skin over the upper arm follows its turns in part. Whatever follows it shows less of what
+Skin over the upper arm follows its turns in part. What follows it shows less of what
 people do, and of what they wish: a smaller change is not a better one.
 """
 

@@ -83,9 +83,21 @@ def test_a_half_explored_place_is_asked_for_again():
     wrist, swivel, which = planted(2)
     keep = (which != 3) | (np.arange(len(which)) % 60 < 30)
     intent = IntentMap(8).fit(wrist[keep], swivel[keep])
-    with pytest.warns(MapWarning, match="at 1 of 8 places") as told:
+    with pytest.warns(MapWarning, match="1 of 8 places were half explored") as told:
+        intent.warn_of_scatter([f"point {k}" for k in range(1, 9)])
+    assert len(told) == 1
+    worst = 1 + int(np.argmin(intent.upper_ - intent.lower_))
+    assert f"point {worst} (0." in str(told[0].message)
+    assert "hold the hand there again" in str(told[0].message)
+
+
+def test_a_place_of_another_posture_is_no_half_explored_one():
+    wrist, swivel, which = planted(2)
+    intent = IntentMap(8).fit(wrist, swivel + 0.4 * (which == 3))
+    # 0.4 rad of a range of 1.2, of which the mean takes an eighth.
+    assert np.isclose(intent.scatter_.max(), 0.4 * 7 / 8 / 1.2, atol=1e-6)
+    with pytest.warns(MapWarning, match="1 of 8 .*another natural posture.*movement"):
         intent.warn_of_scatter()
-    assert str(told[0].message).endswith("repeat these.")
 
 
 def test_own_movement_replaces_other_people():

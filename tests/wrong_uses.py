@@ -183,7 +183,7 @@ WRONG = {
 FLAGS = {
     *("as_json", "auto", "browser", "clavicle", "dry_run", "everywhere", "force"),
     *("guess", "live", "loop", "open_page", "quick", "realtime", "resume", "simulated"),
-    *("smooth", "view"),
+    *("rewear", "short", "smooth", "view"),
 }
 #: Options that count only together with others.
 WITH = {
@@ -197,6 +197,7 @@ WITH = {
     "calibrate point_seconds": "--live --source replay:{free}",
     "calibrate countdown": "--live --source replay:{free}",
     "calibrate recordings": "--live --source replay:{free}",
+    "calibrate subject": "--rewear --natural {free}",
     "calibrate stature": "--mass 70 --sex male",
     "calibrate mass": "--stature 1.7 --sex male",
     "calibrate sex": "--stature 1.7 --mass 70",
@@ -264,6 +265,16 @@ TOGETHER = [
     "compare {points} --subject {person} --from 1e6",
     "check {free} --subject {person} --to -1",
     "calibrate --static {static} --exploration {points} --out new --from 1e6",
+    "calibrate --out new --static {static} --exploration {points} --short",
+    "calibrate --out new --static {static} --exploration {points} --subject {person}",
+    "calibrate --out new --rewear",
+    "calibrate --out new --rewear --subject {person} --static {static}",
+    "calibrate --out {person} --rewear --subject {person} --static {static} "
+    "--natural {free} --force",
+    "calibrate --out new --rewear --subject {person} --static {static} "
+    "--natural {static}",
+    "calibrate --out new --rewear --subject {person} --static {static} "
+    "--natural {free} --points 2",
     "check",
     "check {free} --subject {person} --marker-set oxford24",
     "check {free} --subject {person} --static {static}",

@@ -46,6 +46,7 @@ def fit_explorations(
     *,
     marker_set: str | Path | MarkerSet = "oxford24",
     min_duration: float = 1.0,
+    known: bool = False,
 ) -> tuple[Skeleton, BodyReport | None]:
     """Fit sizes, axes and marker places to the static trial and the explorations.
 
@@ -57,6 +58,8 @@ def fit_explorations(
         What it returned.
     explorations, motions : sequences of Recording and Motion
         Movements, and the same as tracked with that skeleton.
+    known : bool
+        Whether the generic body is the person's: only marker places are fitted.
 
     Returns
     -------
@@ -90,10 +93,11 @@ def fit_explorations(
     found = fit_motion(
         reference,
         target,
-        fit_sizes(reference, target),
+        fit_sizes(reference, target, known=known),
         q,
         np.concatenate(seen)[rows],
         camera_sd=camera_noise(seen),
+        known=known,
     )
     if not found.converged:
         return skeleton, None

@@ -43,8 +43,12 @@ def measured_body(
     chain: str,
     min_static: float,
     progress: Callable[[str, int, int], None] | None,
+    known: bool = False,
 ) -> MeasuredBody:
-    """Scale the body, judge and track the recordings; see :func:`ikns.calibrate`."""
+    """Scale the body, judge and track the recordings; see :func:`ikns.calibrate`.
+
+    `known` says that the generic body is the person's, whose markers alone are fitted.
+    """
     body = Skeleton.load() if generic is None else generic
     if static is None:
         if generic is None:
@@ -56,7 +60,11 @@ def measured_body(
     else:
         with naming(static.source):
             skeleton, scaling = scale(
-                body, static, marker_set=marker_set, min_duration=min_static
+                body,
+                static,
+                marker_set=marker_set,
+                min_duration=min_static,
+                known=known,
             )
         missing = _left_out(static, scaling, marker_set, explorations, chain)
     recordings = (*explorations, *natural)
@@ -82,6 +90,7 @@ def measured_body(
             tracked[: len(explorations)],
             marker_set=marker_set,
             min_duration=min_static,
+            known=known,
         )
     if fitted is not None:
         tracked = _tracked(skeleton, recordings, chain, progress)

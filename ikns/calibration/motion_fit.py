@@ -30,6 +30,7 @@ from ikns.body.joint_axes import TILTS
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.size_fit import (
+    KNOWN_SD,
     MARKER_SD,
     POSE_SD,
     SizeFit,
@@ -83,6 +84,7 @@ def fit_motion(
     markers: Array,
     *,
     camera_sd: float,
+    known: bool = False,
 ) -> MotionFit:
     """Fit the body to a static trial and F moving frames.
 
@@ -100,8 +102,10 @@ def fit_motion(
         Their markers in the world, m; NaN where not seen or not to be used.
     camera_sd : float
         Error of a marker that is new in every frame, m per axis.
+    known : bool
+        Whether the reference is the person's body, whose sizes and axes stay.
     """
-    problem = _Problem(reference, target, markers)
+    problem = _Problem(reference, target, markers, known=known)
     nominal = reference.resized(size_factors(start.log_sizes)).marker_positions
     offsets = start.positions - nominal
     shape = _Shape(start.log_sizes, offsets, np.zeros(len(TILTS)))
@@ -131,7 +135,9 @@ def fit_motion(
 class _Problem:
     """Residuals and normal equations; frame 0 is the static trial."""
 
-    def __init__(self, reference: Skeleton, target: Array, markers: Array) -> None:
+    def __init__(
+        self, reference: Skeleton, target: Array, markers: Array, *, known: bool
+    ) -> None:
         self.reference, self.worn = reference, reference.marker_set
         self.seen = np.concatenate([target[None], markers])
         self.shown = seen_markers(self.seen)
@@ -141,8 +147,9 @@ class _Problem:
         self.free: Indices = np.setdiff1d(np.arange(reference.nv), held)
         self.prior = np.zeros((len(SEGMENTS) + self.placement.size + len(TILTS),) * 2)
         s = len(SEGMENTS)
-        self.prior[:s, :s] = np.linalg.inv(size_covariance())
-        rest = np.r_[self.placement.ravel(), [sd for _, _, sd in TILTS]]
+        self.prior[:s, :s] = np.linalg.inv(size_covariance(known=known))
+        tilts = [KNOWN_SD if known else sd for _, _, sd in TILTS]
+        rest = np.r_[self.placement.ravel(), tilts]
         self.prior[range(s, len(rest) + s), range(s, len(rest) + s)] = rest**-2.0
 
     def body(self, shape: _Shape) -> tuple[Skeleton, Skeleton]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ikns.arrays import Array, Indices
+from ikns.errors import NotEnoughData
 
 #: A hand that moves farther than this is not at one place, m, as in the live
 #: calibration, which records each point by itself.
@@ -46,3 +47,21 @@ def recorded_places(hands_in_thorax: Sequence[Array], *, n_points: int) -> Indic
         labels.append(np.full(len(hand), place))
     known = np.concatenate(labels)
     return known if len(middles) <= n_points else np.full_like(known, -1)
+
+
+def check_places(hand_in_thorax: Array, *, n_points: int) -> None:
+    """Refuse still hands (N, 3) m that are all at one place, where more are asked for.
+
+    Raises
+    ------
+    NotEnoughData
+        When nine in ten are within 5 cm of their median and `n_points` is not 1.
+    """
+    middle = np.median(hand_in_thorax, axis=0)
+    far = float(np.quantile(np.linalg.norm(hand_in_thorax - middle, axis=1), 0.9))
+    if n_points > 1 and far < ONE_PLACE:
+        raise NotEnoughData(
+            f"expected {n_points} held places, found one: the still hand stays within "
+            f"{1e3 * far:.0f} mm; hold it at places at least {1e3 * ONE_PLACE:.0f} mm "
+            "apart, or ask for 1 with --points (n_points)."
+        )

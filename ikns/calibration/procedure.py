@@ -14,7 +14,8 @@ from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.measured_body import measured_body
-from ikns.calibration.places import recorded_places
+from ikns.calibration.method_summary import method_summary
+from ikns.calibration.places import check_places, recorded_places
 from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.report import (
     body_report,
@@ -202,7 +203,9 @@ def calibrate(
     }
     shown = np.column_stack([hands, learned.labels_ + 1.0])
     shown = shown[:: len(hands) // _SHOWN + 1]
-    return Subject(skeleton, learned, chain, report, motions, shown, readouts)
+    subject = Subject(skeleton, learned, chain, report, motions, shown, readouts)
+    methods["summary"] = method_summary(subject, natural=measured.natural, own=True)
+    return subject
 
 
 def _fit(
@@ -223,6 +226,7 @@ def _fit(
     learned.reference = elbow_reference(
         skeleton, posture.mean(axis=0), chain, n_dof=learned.n_dof
     )
+    check_places(x, n_points=learned.n_points)
     places = recorded_places(hands, n_points=learned.n_points)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)

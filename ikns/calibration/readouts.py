@@ -18,11 +18,12 @@ from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.nullspace.readout import IntentMap, Readout, readout_samples
 from ikns.nullspace.readout.coordinates import elbow_height_gradient, mean_orientation
+from ikns.nullspace.readout.ends import swept_ends
 
 #: Least natural movement of one's own, s; with less, other people's is all there is.
 LEAST_NATURAL = 2.0
 #: Natural movement within less than this along every axis covers nothing, m.
-_LEAST_COVERED = 0.10
+LEAST_COVERED = 0.10
 
 
 def learn_readouts(
@@ -55,7 +56,8 @@ def learn_readouts(
         Without the methods that cannot be learned here.
     report : dict
         ``without``: method and why it is missing; ``warnings``; and of intent
-        ``natural_posture``, ``ends_rad`` and ``scatter``.
+        ``natural_posture``, ``ends_rad`` and ``places``, whose ``scatter`` is how far
+        the farther end is from the mean of all, in units of the range.
 
     Raises
     ------
@@ -86,7 +88,16 @@ def learn_readouts(
     if "intent" in found and isinstance(intent := found["intent"].map, IntentMap):
         report["natural_posture"] = intent.natural_.coverage_
         report["ends_rad"] = list(intent.ends_)
-        report["scatter"] = intent.scatter_.tolist()
+        points = _points(intent, learned)
+        report["places"] = [
+            {
+                "point": point,
+                "lower_rad": float(intent.lower_[k]),
+                "upper_rad": float(intent.upper_[k]),
+                "scatter": float(intent.scatter_[k]),
+            }
+            for k, point in enumerate(points)
+        ]
     return found, report
 
 
@@ -102,7 +113,7 @@ def _proximal(
         readout_samples(skeleton, motion, chain, "proximal", reference=reference)
         for motion, _ in explorations
     ]
-    x, y = _still(rows, explorations)
+    x, y, time = _still(rows, explorations)
     made = NullSpaceMap(
         len(learned.centers_),
         variance=learned.variance,
@@ -111,6 +122,9 @@ def _proximal(
         reference=elbow_height_gradient(reference),
         min_samples=1,
     ).fit(x, y, groups=learned.labels_)
+    for k, z in enumerate(made.directions_[:, 0]):
+        row = made.labels_ == k
+        made.lower_[k], made.upper_[k], _ = swept_ends(y[row] @ z, time[row])
     return Readout("proximal", chain, made, reference)
 
 
@@ -124,22 +138,46 @@ def _intent(
     rows = [
         readout_samples(skeleton, motion, chain, "intent") for motion, _ in explorations
     ]
-    x, y = _still(rows, explorations)
+    x, y, time = _still(rows, explorations)
     natural = {} if moving is None else {"natural_X": moving[0], "natural_y": moving[1]}
     made = IntentMap(len(learned.centers_), min_samples=1)
-    made.fit(x, y, groups=learned.labels_, **natural)
-    made.warn_of_scatter()
+    made.fit(x, y, groups=learned.labels_, time=time, **natural)
+    made.warn_of_scatter([f"point {point}" for point in _points(made, learned)])
     return Readout("intent", chain, made)
+
+
+def _points(intent: IntentMap, learned: NullSpaceMap) -> list[int]:
+    """Return the number of the PCA point, from 1, of most samples of each place."""
+    return [
+        1
+        + int(
+            np.bincount(
+                learned.labels_[intent.labels_ == k] + 1,
+                minlength=len(learned.centers_) + 1,
+            )[1:].argmax()
+        )
+        for k in range(len(intent.centers_))
+    ]
 
 
 def _still(
     rows: Sequence[tuple[Array, Array]], explorations: Sequence[tuple[Motion, Mask]]
-) -> tuple[Array, Array]:
-    """Places and coordinates of the still samples of all explorations."""
+) -> tuple[Array, Array, Array]:
+    """Places, coordinates and times of the still samples of all explorations.
+
+    One recording follows the other, 1 s apart.
+    """
     gates = [gate for _, gate in explorations]
+    starts = np.cumsum([0.0, *(np.ptp(motion.time) + 1 for motion, _ in explorations)])
+    time = np.concatenate(
+        [
+            start + (motion.time - motion.time[0])[gate]
+            for start, (motion, gate) in zip(starts, explorations, strict=False)
+        ]
+    )
     x = np.concatenate([x[gate] for (x, _), gate in zip(rows, gates, strict=True)])
     y = np.concatenate([y[gate] for (_, y), gate in zip(rows, gates, strict=True)])
-    return x, y
+    return x, y, time
 
 
 def _natural_samples(
@@ -157,9 +195,43 @@ def _natural_samples(
     """
     if len(chain_sides(chain)) != 1:
         return None
-    parts: list[tuple[Array, Array]] = []
-    seconds = 0.0
-    for motion, away in [(motion, True) for motion, _ in explorations] + [
+    found = moving_samples(
+        skeleton,
+        learned,
+        [motion for motion, _ in explorations],
+        natural,
+        chain,
+        max_hand_speed=max_hand_speed,
+    )
+    if natural:
+        check_covered(np.concatenate([w[row] for w, _, row in found[-len(natural) :]]))
+    motions = [*(motion for motion, _ in explorations), *natural]
+    seconds = sum(
+        float(row.sum() * np.median(np.diff(motion.time)))
+        for motion, (_, _, row) in zip(motions, found, strict=True)
+    )
+    if seconds < LEAST_NATURAL:
+        return None
+    wrist = np.concatenate([w[row] for w, _, row in found])
+    swivel = np.concatenate([s[row] for _, s, row in found])
+    return wrist, swivel
+
+
+def moving_samples(
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    explorations: Sequence[Motion],
+    natural: Sequence[Motion],
+    chain: str,
+    *,
+    max_hand_speed: float,
+) -> list[tuple[Array, Array, Mask]]:
+    """Wrist (T, 3), swivel (T,), and the frames of ordinary movement, of each motion.
+
+    In the explorations these are frames with a moving hand away from every held place.
+    """
+    found = []
+    for motion, away in [(motion, True) for motion in explorations] + [
         (motion, False) for motion in natural
     ]:
         wrist, swivel = readout_samples(skeleton, motion, chain, "intent")
@@ -168,19 +240,22 @@ def _natural_samples(
         if away:
             hand = motion.task_position(chain)[row]
             row[row] = nearest_center(hand, learned.centers_, radius=ONE_PLACE)[0] < 0
-        parts.append((wrist[row], swivel[row, 0]))
-        seconds += float(row.sum() * np.median(np.diff(motion.time)))
-    if natural:
-        own = np.concatenate([w for w, _ in parts[len(explorations) :]])
-        span = np.ptp(np.quantile(own, [0.01, 0.99], axis=0), axis=0) if len(own) else 0
-        if np.max(span) < _LEAST_COVERED:
-            raise NotEnoughData(
-                "expected natural movement over the work space, found a hand that "
-                f"moves within {1e3 * np.max(span):.0f} mm: reach and carry things, "
-                "20 s over all of it."
-            )
-    if seconds < LEAST_NATURAL:
-        return None
-    wrist = np.concatenate([w for w, _ in parts])
-    swivel = np.concatenate([s for _, s in parts])
-    return wrist, swivel
+        found.append((wrist, swivel[:, 0], row))
+    return found
+
+
+def check_covered(wrist: Array) -> None:
+    """Refuse natural movement within one place; wrist centers (N, 3) m.
+
+    Raises
+    ------
+    NotEnoughData
+        When the wrist moves by less than 0.1 m along every axis.
+    """
+    span = np.ptp(np.quantile(wrist, [0.01, 0.99], axis=0), axis=0) if len(wrist) else 0
+    if np.max(span) < LEAST_COVERED:
+        raise NotEnoughData(
+            "expected natural movement over the work space, found a hand that "
+            f"moves within {1e3 * np.max(span):.0f} mm: reach and carry things, "
+            "20 s over all of it."
+        )

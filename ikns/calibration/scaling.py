@@ -87,6 +87,7 @@ def scale(
     *,
     marker_set: str | Path | MarkerSet = "oxford24",
     min_duration: float = 1.0,
+    known: bool = False,
 ) -> tuple[Skeleton, ScalingReport]:
     """Fit the generic skeleton to a person standing or sitting still.
 
@@ -100,6 +101,9 @@ def scale(
         The markers on the person.
     min_duration : float
         Shortest static trial to accept, s.
+    known : bool
+        Whether the generic body is the person's own, measured before: only the places
+        of the markers are fitted.
 
     Returns
     -------
@@ -127,7 +131,11 @@ def scale(
     True
     """
     found = judge_static(
-        generic, static, marker_set=marker_set, min_duration=min_duration
+        generic,
+        static,
+        marker_set=marker_set,
+        min_duration=min_duration,
+        known=known,
     )
     if faults := refused(found.findings):
         moved = faults[0].kind == "moved"
@@ -145,6 +153,7 @@ def judge_static(
     *,
     marker_set: str | Path | MarkerSet = "oxford24",
     min_duration: float = 1.0,
+    known: bool = False,
 ) -> StaticJudgment:
     """Judge a static trial, and fit a skeleton to it where that makes sense.
 
@@ -172,7 +181,7 @@ def judge_static(
     findings = traces + movement(where, worn.labels, measured[~spoiled])
     if refused(findings):
         return StaticJudgment(worst_first(findings), None, None)
-    fit = fit_sizes(reference, target)
+    fit = fit_sizes(reference, target, known=known)
     findings += judge_posture(where, reference, target, fit)
     skeleton, report = _fitted(reference, target, fit, duration)
     return StaticJudgment(worst_first(findings), skeleton, report)

@@ -44,6 +44,9 @@ SEGMENT_SD = {
 }
 #: Left against right in one person; about 1 % (our estimate).
 SIDE_SD = 0.01
+#: A body that was measured before keeps its sizes and axes: they may change by this
+#: share, 0.3 mm of an upper arm, and by as many rad.
+KNOWN_SD = 1e-3
 #: Static poses range from hanging arms to a T pose, rad.
 POSE_SD = 1.0
 #: The fit has converged when the predicted gain of a step is below this; a residual of
@@ -63,17 +66,18 @@ class SizeFit(NamedTuple):
     converged: bool  # whether the fit met its tolerance
 
 
-def fit_sizes(generic: Skeleton, target: Array) -> SizeFit:
+def fit_sizes(generic: Skeleton, target: Array, *, known: bool = False) -> SizeFit:
     """Gauss-Newton with step halving over sizes, marker places and pose.
 
     The generic body has the markers at their nominal places; the target is their mean
-    positions in the world (M, 3), m; NaN where never seen.
+    positions in the world (M, 3), m; NaN where never seen. `known` says that the body
+    is the person's, so that sizes stay.
     """
     from scipy.linalg import cho_factor, cho_solve  # takes a while to load
 
     worn = generic.marker_set
     seen = seen_markers(target)
-    weight = np.linalg.cholesky(np.linalg.inv(size_covariance())).T
+    weight = np.linalg.cholesky(np.linalg.inv(size_covariance(known=known))).T
     placement = np.array([m.placement_sd for m in worn.markers])
     fixed = generic.columns(worn.held)
     free = np.setdiff1d(np.arange(generic.nv), fixed)
@@ -169,8 +173,13 @@ def _assemble(
     return J
 
 
-def size_covariance() -> Array:
-    """Return the prior covariance of the segments' log factors, (S, S)."""
+def size_covariance(*, known: bool = False) -> Array:
+    """Return the prior covariance of the segments' log factors, (S, S).
+
+    Between people; or, of a person whose sizes are known, next to nothing.
+    """
+    if known:
+        return KNOWN_SD**2 * np.eye(len(SEGMENTS))
     kinds = [name.split("_", 1)[-1] if name != "thorax" else name for name in SEGMENTS]
     same = np.array([[a == b for b in kinds] for a in kinds])
     kind_sd = np.array([SEGMENT_SD[kind] for kind in kinds])

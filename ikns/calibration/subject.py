@@ -88,6 +88,11 @@ class Subject:
         static = self.report.get("static")
         return not isinstance(static, dict) or static.get("source", "") is not None
 
+    @property
+    def methods(self) -> list[str]:
+        """What can read c off this subject's postures: ``paper``, and what else."""
+        return ["paper", *(method for method in _OTHERS if method in self.readouts)]
+
     def readout(self, method: Method = "paper") -> Readout:
         """Return a method's map and what it reads.
 
@@ -103,7 +108,7 @@ class Subject:
                 f"expected a method of {', '.join(METHODS)}, found '{method}'."
             )
         if method not in self.readouts:
-            known = ["paper", *self.readouts]
+            known = self.methods
             lost = [other for other in _OTHERS if other not in self.readouts]
             raise InvalidInput(
                 f"the subject has the method{'s' * (len(known) > 1)} "

@@ -6,42 +6,20 @@ who follows prompts; the rest is the same.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
 import ikns
+from ikns.cli.calibration_options import check_options
+from ikns.cli.calibration_tables import calibration_parts, methods_parts, shift_sentence
 from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import AsJson, Force, From, MarkerSetName, To
-from ikns.cli.output import held_sentences, notes, progress, show, table
+from ikns.cli.output import notes, progress, show
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
-
-#: Options of files only.
-_FILES_ONLY = (
-    "static",
-    "exploration",
-    "subject_prefix",
-    "rename",
-    "labels",
-    "cutoff",
-    "from_",
-    "to",
-)
-#: Options of a live calibration only.
-_LIVE_ONLY = (
-    "source",
-    "recordings",
-    "static_seconds",
-    "free_seconds",
-    "point_seconds",
-    "countdown",
-    "resume",
-    "auto",
-)
 
 
 @reads_markers
@@ -59,6 +37,26 @@ def calibrate(
     natural: Annotated[
         list[Path] | None,
         typer.Option(help="Recordings of ordinary movement, for the method intent."),
+    ] = None,
+    short: Annotated[
+        bool,
+        typer.Option(
+            "--short",
+            help="Short protocol, for the method intent: 3 s static, 20 s of ordinary "
+            "movement (--natural), two held places.",
+        ),
+    ] = False,
+    rewear: Annotated[
+        bool,
+        typer.Option(
+            "--rewear",
+            help="Markers were put on again: keep what --subject learned, and fit it "
+            "to a new --static and --natural.",
+        ),
+    ] = False,
+    subject: Annotated[
+        Path | None,
+        typer.Option(help="For --rewear: folder that `ikns calibrate` wrote."),
     ] = None,
     live: Annotated[
         bool,
@@ -92,7 +90,10 @@ def calibrate(
     ] = None,
     mass: Annotated[float | None, typer.Option(help="Body mass, kg.")] = None,
     sex: Annotated[str | None, typer.Option(help="'female' or 'male'.")] = None,
-    points: Annotated[int, typer.Option(help="PCA points.", min=1, max=1000)] = 10,
+    points: Annotated[
+        int,
+        typer.Option(help="PCA points; 2 with --short.", min=1, max=1000),
+    ] = 10,
     static_seconds: Annotated[
         float, typer.Option(help="Live: standing still, s.", min=0.0, max=3600.0)
     ] = 5.0,
@@ -151,8 +152,9 @@ def calibrate(
     """Scale the body, learn the null-space map and write a subject folder.
 
     From recordings (--static, --exploration) or live: 5 s standing still, a minute of
-    free exploration, then the hand held at ten points while the elbow moves. --from and
-    --to take a part of every exploration.
+    free exploration, then the hand held at ten points while the elbow moves. --short
+    takes less, and --rewear a new wearing of the markers. --from and --to take a part
+    of every exploration.
     """
     from ikns.calibration.subject import FILES
     from ikns.motion.unseen import warn_unseen
@@ -167,9 +169,27 @@ def calibrate(
             f"expected --stature, --mass and --sex together or none of them, found "
             f"only {' and '.join(given)}."
         )
-    _check_input(context, live=live)
+    given_names = check_options(context, live=live, rewear=rewear, short=short)
     inputs = [static, *(exploration or []), *(natural or []), marker_set, recordings]
+    inputs += [subject]
     check_output_folder(out, FILES, force=force, inputs=inputs)
+    if rewear:
+        assert subject is not None
+        assert static is not None
+        _rewear(
+            read,
+            subject,
+            static,
+            natural or [],
+            out=out,
+            marker_set=marker_set if "marker_set" in given_names else None,
+            min_static=min_static,
+            force=force,
+            as_json=as_json,
+        )
+        return
+    if short and "points" not in given_names:
+        points = 2
     # Three times None is none of them.
     generic = (
         None
@@ -205,7 +225,7 @@ def calibrate(
     assert exploration is not None
     explorations = [read(path, start=from_, end=to) for path in exploration]
     with progress() as report:
-        subject = ikns.calibrate(
+        person = ikns.calibrate(
             None if static is None else read(static),
             explorations,
             natural=[read(path) for path in natural or []],
@@ -225,144 +245,49 @@ def calibrate(
             progress=report,
         )
     for frames in explorations:
-        warn_unseen(subject.skeleton, frames, chain)
-    subject.save(out, force=force)
+        warn_unseen(person.skeleton, frames, chain)
+    person.save(out, force=force)
     show(
-        {"subject": out} | subject.report | ({"takes": takes} if live else {}),
-        *calibration_parts(subject.report),
+        {"subject": out} | person.report | ({"takes": takes} if live else {}),
+        *calibration_parts(person.report),
         f"Wrote {out}",
         as_json=as_json,
     )
 
 
-def _check_input(context: typer.Context, *, live: bool) -> None:
-    """Check that either files or a live source are given, not both."""
-    given = {
-        name
-        for name in context.params
-        if (origin := context.get_parameter_source(name)) and origin.name != "DEFAULT"
-    }
-    if live:
-        files = [
-            f"--{name.rstrip('_').replace('_', '-')}"
-            for name in _FILES_ONLY
-            if name in given
-        ]
-        if files:
-            raise InvalidInput(
-                f"{' and '.join(files)} {'goes' if len(files) == 1 else 'go'} with "
-                "recordings from files, and --live records them; give one or the other."
-            )
-        if "source" not in given:
-            raise InvalidInput("--live needs the --source of the markers.")
-        return
-    alone = [f"--{n.replace('_', '-')}" for n in _LIVE_ONLY if n in given]
-    if alone:
-        raise InvalidInput(f"{' and '.join(alone)} needs --live.")
-    missing = [] if "exploration" in given else ["--exploration"]
-    if not given & {"static", "stature"}:
-        missing.insert(0, "--static (or --stature, --mass and --sex)")
-    if missing:
-        raise InvalidInput(
-            f"expected {' and '.join(missing)}, or --live with a --source."
+def _rewear(
+    read: Read,
+    folder: Path,
+    static: Path,
+    natural: list[Path],
+    *,
+    out: Path,
+    marker_set: str | None,
+    min_static: float,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Fit a subject to new places of its markers, and write another folder."""
+    from ikns.calibration.rewear import rewear
+    from ikns.calibration.subject import FILES
+
+    check_output_folder(out, FILES, force=force, inputs=[folder])
+    known = ikns.Subject.load(folder)
+    with progress() as report:
+        person = rewear(
+            known,
+            read(static),
+            [read(path) for path in natural],
+            marker_set=marker_set,
+            min_static=min_static,
+            progress=report,
         )
-
-
-def _axes(body: dict[str, Any]) -> list[str]:
-    """Say how the axes lie that the explorations show, against the generic body's."""
-    told = [
-        f"{name[:-2].replace('_', ' ')} {math.degrees(body['tilts_rad'][name]):+.1f} "
-        f"about {name[-1].upper()} (sd {math.degrees(body['tilt_sd_rad'][name]):.1f})"
-        for name in body.get("tilts_shown", [])
-    ]
-    return [f"Axes against the generic body's, deg: {', '.join(told)}."] if told else []
-
-
-def calibration_parts(report: dict[str, Any]) -> list[Any]:
-    """Return tables and sentences on the quality of a calibration."""
-    static, extrinsic = report["static"], report["extrinsic"]
-    # Folders from before explorations were used have no body of both.
-    body = report.get("body") or static
-    least = report["settings"]["min_samples"]
-    seen = [item for item in extrinsic["joints_deg"].items() if item[1] is not None]
-    moved = sorted(seen, key=lambda item: -item[1])[:2]
-    return [
-        table(
-            "Segments, joint to joint"
-            + ", assumed from stature" * (static["source"] is None),
-            {"segment": "s", "length mm": ".1f", "sd mm": ".1f"},
-            [
-                [name, 1000 * length, 1000 * body["length_sd_m"][name]]
-                for name, length in body["lengths_m"].items()
-            ],
-        ),
-        *_axes(body),
-        table(
-            "Explorations",
-            {"recording": "s", "s": ".1f", "still s": ".1f", "residual mm": ".1f"},
-            [
-                [
-                    Path(row["source"]).name,
-                    row["duration_s"],
-                    row["still_s"],
-                    1000 * (row["residual_median_m"] or math.nan),
-                ]
-                for row in report["explorations"]
-            ],
-        ),
-        table(
-            f"PCA points of {report['chain']} in the thorax frame",
-            {
-                "point": "d",
-                "forward\nmm": ".0f",
-                "up\nmm": ".0f",
-                "right\nmm": ".0f",
-                "still\nsamples": "d",
-                "verdict": "s",
-            },
-            [
-                [
-                    row["point"],
-                    *(1000 * x for x in row["center_m"]),
-                    row["samples"],
-                    _verdict(row, least, report["settings"]["n_dof"]),
-                ]
-                for row in report["points"]
-            ],
-        ),
-        "Outside the chain, while the hand was still: thorax "
-        f"{1000 * extrinsic['thorax_translation_m']:.0f} mm and "
-        f"{extrinsic['thorax_rotation_deg']:.0f} deg"
-        + "; most of all joints " * bool(moved)
-        + " and ".join(f"{name} {angle:.0f} deg" for name, angle in moved)
-        + ".",
-        *held_sentences(static["held"]),
-        methods_sentence(report),
-        *notes([*report["warnings"], *report["methods"]["warnings"]]),
-    ]
-
-
-def methods_sentence(report: dict[str, Any]) -> str:
-    """Say which methods of `control --method` were learned."""
-    methods = report["methods"]
-    lost = methods["without"]
-    known = [name for name in ("paper", "proximal", "intent") if name not in lost]
-    parts = [f"Methods learned: {', '.join(known)}."]
-    parts += [f"Not {name}: {reason.rstrip('.')}." for name, reason in lost.items()]
-    if "intent" not in lost:
-        taught = methods["natural_posture"]
-        parts.append(
-            f"Natural posture of {taught['frames']} frames of this person's movement."
-            if taught["frames"]
-            else "Natural posture of other people, as there was too little ordinary "
-            "movement; add some with --natural."
-        )
-    return " ".join(parts)
-
-
-def _verdict(row: dict[str, Any], least: int, n_dof: int) -> str:
-    if row["point"] is None:
-        return f"left out: fewer than {least}"
-    if row["components"] > n_dof:
-        return f"used, but took {row['components']} components"
-    return "used"
+    person.save(out, force=force)
+    show(
+        {"subject": out, "from": folder} | person.report,
+        shift_sentence(person.report["rewear"], known.methods),
+        *methods_parts(person.report),
+        *notes(person.report["warnings"]),
+        f"Wrote {out}",
+        as_json=as_json,
+    )

@@ -20,7 +20,15 @@ from ikns.cli.comparison_tables import (
     point_table,
     pooled_table,
 )
-from ikns.cli.options import AsJson, Force, From, RecordingFile, SubjectFolder, To
+from ikns.cli.options import (
+    AnyMethod,
+    AsJson,
+    Force,
+    From,
+    RecordingFile,
+    SubjectFolder,
+    To,
+)
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.reading import Read, reads_markers
@@ -28,8 +36,15 @@ from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
     from ikns.analysis.compare import Crosstalk, NullSpaceComparison
+    from ikns.nullspace.readout import Readout
 
 _UNITS = {"max_hand_speed": "m_s", "min_duration": "s"}
+#: Why another method has no comparison of directions.
+_PAPER_ONLY = (
+    "directions, leak and bend are those of the paper's Z over all joint angles of the "
+    "chain, next to the Jacobian over the same; {method} reads no such direction, and "
+    "only crosstalk is that of its c."
+)
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
 
@@ -58,6 +73,7 @@ def compare(
     reaches: Annotated[
         Path | None, typer.Option(help="Recording of natural reaches, for crosstalk.")
     ] = None,
+    method: AnyMethod = "paper",
     figure: Annotated[
         Path | None, typer.Option(help="Picture to write, .png, .svg or .pdf.")
     ] = None,
@@ -79,14 +95,17 @@ def compare(
 
     Angles between them, with what chance would give; the share of joint variance inside
     the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
-    line along Z leads the hand; how far the null space bends; and crosstalk. --from and
-    --to take a part of the recording, not of --reaches.
+    line along Z leads the hand; how far the null space bends; and crosstalk. Directions
+    are the paper's; crosstalk is that of --method. --from and --to take a part of the
+    recording, not of --reaches.
     """
     from ikns.calibration.simulated import is_simulated
 
     refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
     own = calibrated.chain
+    with naming(str(subject)):
+        readout = calibrated.readout(method)
     given = [(recording, read(recording, start=from_, end=to))]
     if reaches is not None:
         given.append((reaches, read(reaches)))
@@ -111,11 +130,13 @@ def compare(
     across = None
     with naming(str(reaches or recording)):
         try:
-            across = _crosstalk(calibrated, reaching, **options)
+            across = _crosstalk(calibrated, readout, reaching, **options)
         except NotEnoughData as error:
             if reaches is not None:
                 raise
             warned.append(f"no crosstalk: {error}")
+    if method != "paper":
+        warned.append(_PAPER_ONLY.format(method=method))
     simulated = is_simulated(
         calibrated, subject, [p for p in (recording, reaches) if p is not None]
     )
@@ -132,6 +153,7 @@ def compare(
             "reaches": reaches,
             "simulated": simulated,
             "chain": own,
+            "method": method,
             "task": task,
             "settings": options
             | {"level": 0.95}
@@ -161,14 +183,17 @@ def compare(
     )
 
 
-def _crosstalk(subject: ikns.Subject, motion: ikns.Motion, **options: Any) -> Crosstalk:
-    """Return the change of c on natural reaches."""
+def _crosstalk(
+    subject: ikns.Subject, readout: Readout, motion: ikns.Motion, **options: Any
+) -> Crosstalk:
+    """Return the change of a method's c on natural reaches."""
     from ikns.analysis.compare import motion_crosstalk
 
     return motion_crosstalk(
         subject.null_space_map,
         motion,
         chain=subject.chain,
+        c=readout.control_signal(subject.skeleton, motion),
         max_hand_speed=subject.gate["max_hand_speed"],
         **options,
     )

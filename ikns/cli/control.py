@@ -10,6 +10,7 @@ import typer
 
 import ikns
 from ikns.cli.options import (
+    AnyMethod,
     AsJson,
     Force,
     From,
@@ -19,6 +20,7 @@ from ikns.cli.options import (
 )
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.reading import Read, reads_markers
+from ikns.errors import naming
 from ikns.output.file import refuse_overwriting, write_csv
 
 
@@ -34,13 +36,7 @@ def control(
             help="c from the posture, as in the paper, or from null-space motion."
         ),
     ] = "position",
-    method: Annotated[
-        Literal["paper", "proximal", "intent"],
-        typer.Option(
-            help="What reads c off the posture: the paper's map over joint angles, the "
-            "upper arm and elbow alone, or the departure from the natural posture."
-        ),
-    ] = "paper",
+    method: AnyMethod = "paper",
     from_: From = None,
     to: To = None,
     force: Force = False,
@@ -57,6 +53,8 @@ def control(
 
     refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
+    with naming(str(subject)):
+        calibrated.readout(method)  # before anything is tracked
     frames = read(recording, start=from_, end=to)
     with progress() as report:
         motion, warned = judged_motion(
@@ -70,7 +68,13 @@ def control(
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
     show(
-        {"recording": recording, "csv": out, "method": method, "warnings": warned}
+        {
+            "recording": recording,
+            "csv": out,
+            "method": method,
+            "methods": calibrated.methods,
+            "warnings": warned,
+        }
         | result,
         table(
             str(recording),
@@ -88,6 +92,7 @@ def control(
                 ],
             ],
         ),
+        f"c as {method} reads it; this subject has {', '.join(calibrated.methods)}.",
         *notes(warned),
         f"Wrote {out}",
         as_json=as_json,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -57,5 +57,13 @@ OptionalMarkerSet = Annotated[
     typer.Option(
         help="A name that `ikns markers list` shows, such as plug_in_gait, or the path "
         "of a .toml file."
+    ),
+]
+#: What reads c off recordings.
+AnyMethod = Annotated[
+    Literal["paper", "proximal", "intent"],
+    typer.Option(
+        help="What reads c off the posture: the paper's map over joint angles, the "
+        "upper arm and elbow alone, or the departure from the natural posture."
     ),
 ]

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import ikns
-from ikns.cli.options import MARKER_FILES, AsJson, Force, From, To
+from ikns.cli.options import MARKER_FILES, AnyMethod, AsJson, Force, From, To
 from ikns.cli.output import progress, show, table
 from ikns.cli.reading import Read, reads_markers
-from ikns.errors import InvalidInput
+from ikns.errors import InvalidInput, naming
 from ikns.output.file import refuse_overwriting, write_bytes, write_text
 
 if TYPE_CHECKING:
+    from ikns.nullspace.readout import Method
     from ikns.view.scene import Scene
 
 
@@ -38,6 +39,7 @@ def view(
             "the one with the widest range."
         ),
     ] = None,
+    method: AnyMethod = "paper",
     open_page: Annotated[
         bool, typer.Option("--open", help="Show the page in the browser.")
     ] = False,
@@ -48,7 +50,8 @@ def view(
 ) -> None:
     """Show PCA points, volume and null space around the body, in one HTML file.
 
-    With a recording the page plays it, together with the map.
+    With a recording the page plays it, together with the map and the c that --method
+    reads.
     """
     from ikns.calibration.simulated import is_simulated
 
@@ -64,7 +67,14 @@ def view(
             )
     if recording is None and (from_, to) != (None, None):
         raise InvalidInput("expected a recording for --from and --to, found none.")
+    if recording is None and method != "paper":
+        raise InvalidInput(
+            f"expected a recording whose c --method {method} reads, found none; the "
+            "map without one is the paper's."
+        )
     person = ikns.Subject.load(subject)
+    with naming(str(subject)):
+        person.readout(method)  # before anything is tracked
     learned, row = person.null_space_map, None if point is None else point - 1
     simulated = is_simulated(person, subject, [] if recording is None else [recording])
     name = subject.resolve().name
@@ -80,6 +90,7 @@ def view(
         if recording is None
         else f"{recording.name}, {name}",
         point=row,
+        method=method,
     )
     page = scene_html(scene)
     picture = None if png is None else scene_picture(scene)
@@ -99,6 +110,7 @@ def view(
             "subject": subject,
             "recording": recording,
             "simulated": simulated,
+            "method": method,
             "html": out,
             "png": png,
             "points": len(learned.centers_),
@@ -125,6 +137,7 @@ def _scene(
     simulated: bool,
     title: str,
     point: int | None,
+    method: Method,
 ) -> Scene:
     """Track the recording, if there is one, and make the scene."""
     from ikns.motion.unseen import warn_unseen
@@ -139,7 +152,10 @@ def _scene(
         motion = ikns.MarkerIK(body).track(
             frames, chain=chain, progress=partial(report, Path(frames.source).name)
         )
-    return recording_scene(body, learned, chain, motion, frames, **own)
+    c = person.readout(method).control_signal(body, motion)
+    if method != "paper":
+        own["read_by"] = method
+    return recording_scene(body, learned, chain, motion, frames, c=c, **own)
 
 
 def _seconds(scene: Scene) -> float:

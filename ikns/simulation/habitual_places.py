@@ -96,7 +96,7 @@ def habitual_places(
     near = rng.normal(0.0, OFF_BOX_SD, (n, 3))
     layouts = [box_points(arms, angles, n=n, near=share * near) for share in _NEARER]
     scatter = rng.normal(0.0, habits.rest, (n, len(arms)))
-    farthest = rng.uniform(*_FARTHEST, (n, len(arms)))
+    farthest = rng.uniform(_FARTHEST[0], _FARTHEST[1], (n, len(arms)))
     wrists = rng.normal(size=(n, len(arms), 3)) * _WRIST_SD
     places: list[list[Place]] = [[] for _ in arms]
     chosen: list[list[Array]] = [[] for _ in arms]

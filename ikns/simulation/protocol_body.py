@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,11 @@ def draw_protocol_body(
     standing += rng.normal(0.0, STATIC_SD, len(standing))
     for arm in arms:
         standing[arm.columns[:2]] = girdle_rest
-    settings = {"girdle_rest": girdle_rest, "girdle_follow": girdle_follow, "rng": rng}
+    settings: dict[str, Any] = {
+        "girdle_rest": girdle_rest,
+        "girdle_follow": girdle_follow,
+        "rng": rng,
+    }
     if habits is not None:
         positions, places = habitual_places(
             arms, sitting, n=n_points, habits=habits, **settings

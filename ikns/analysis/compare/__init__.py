@@ -19,10 +19,11 @@ from ikns.analysis.compare.from_motion import compare_motion, motion_crosstalk
 from ikns.analysis.compare.from_robot import compare_robot, free_tasks
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.maps import compare
-from ikns.analysis.compare.reaching import Crosstalk, crosstalk, find_reaches
+from ikns.analysis.compare.reaching import Crosstalk, crosstalk
 from ikns.analysis.compare.samples import NullSpaceComparison, compare_samples
 from ikns.analysis.compare.subspaces import learned_directions
 from ikns.analysis.compare.visited import compare_visited
+from ikns.motion.reaches import find_reaches
 
 __all__ = [
     "COORDINATES",

@@ -141,16 +141,19 @@ def motion_crosstalk(
     motion: Motion,
     *,
     chain: str = "right_arm",
+    c: Array | None = None,
     max_hand_speed: float = 0.05,
     **options: Any,
 ) -> Crosstalk:
     """Measure how a person's natural reaches change the (first) control signal.
 
-    `learned` is a map of the joints of `chain`; `max_hand_speed`, m/s, is the gate
-    between reach and rest, and `options` are those of
-    :func:`ikns.analysis.compare.crosstalk`.
+    `learned` is a map of the joints of `chain`, or `c` (T,) the signal that something
+    else reads; `max_hand_speed`, m/s, is the gate between reach and rest, and `options`
+    are those of :func:`ikns.analysis.compare.crosstalk`.
     """
-    c = learned.control_signal(motion.chain_angles(chain), motion.task_position(chain))
+    if c is None:
+        q, x = motion.chain_angles(chain), motion.task_position(chain)
+        c = learned.control_signal(q, x)
     return crosstalk(
         c if c.ndim == 1 else c[:, 0],
         motion.hand_speed(chain),

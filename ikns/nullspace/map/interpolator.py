@@ -85,7 +85,7 @@ class NearestPoint:
         nearest, _ = nearest_center(flat[known], self.points, radius=np.inf)
         weights = np.full((len(flat), len(self.points)), np.nan)
         weights[known] = np.eye(len(self.points))[nearest]
-        return weights.reshape(*queries.shape[:-1], -1)
+        return weights.reshape(*queries.shape[:-1], len(self.points))
 
     def inside(self, x: ArrayLike) -> Mask:
         """Return false for queries (..., d), (...): the points enclose no volume."""

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import chain_sides
+from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
@@ -55,14 +55,32 @@ def readout_samples(
     y : (T, k) array
         rad; NaN, as `x`, where the chain is not in sight.
     """
-    hand = motion.task_position(chain)
     if method == "paper":
-        return hand, motion.chain_angles(chain)
+        return motion.task_position(chain), motion.chain_angles(chain)
     seen = motion.in_sight(chain)[:, None]
     angles = np.where(seen, motion.angles, np.nan)
+    x, y = posture_samples(skeleton, angles, chain, method, reference=reference)
+    if method == "proximal":
+        return motion.task_position(chain), y
+    return np.where(seen, x, np.nan), np.where(seen, y, np.nan)
+
+
+def posture_samples(
+    skeleton: Skeleton,
+    angles: Array,
+    chain: str,
+    method: Method,
+    *,
+    reference: Array | None = None,
+) -> tuple[Array, Array]:
+    """Place and coordinate of postures (T, 18), as of :func:`readout_samples`."""
     if method == "intent":
         wrist, swivel = arm_swivel(skeleton, angles, chain)
-        return np.where(seen, wrist, np.nan), np.where(seen, swivel[:, None], np.nan)
+        return wrist, swivel[:, None]
+    sides = [SIDES.index(side) for side in chain_sides(chain)]
+    hand = skeleton.hands_in_thorax(angles)[0][:, sides].mean(axis=1)
+    if method == "paper":
+        return hand, angles[:, [*map(skeleton.joint_names.index, chain_joints(chain))]]
     if method != "proximal" or reference is None:
         raise InvalidInput(
             f"expected a method of {', '.join(METHODS)}, and a reference for proximal; "

@@ -5,12 +5,15 @@
 s is the hinge swivel (:mod:`ikns.nullspace.hinge_swivel`), s_nat the natural posture at
 the wrist center w (:mod:`ikns.nullspace.natural_posture`), and a and b are the means
 over the held places of the lower and upper end of s - s_nat. Two numbers for the whole
-range: fields through ends that scatter would put this scatter back into c.
+range: fields through ends that scatter would put this scatter back into c. Where times
+are known, the ends are those of the motion without its noise
+(:mod:`ikns.nullspace.readout.ends`).
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -21,9 +24,9 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.estimator_base import EstimatorBase
 from ikns.nullspace.map.checks import MapWarning, checked_rows, format_point
 from ikns.nullspace.natural_posture import NaturalPosture
+from ikns.nullspace.readout.ends import checked_times, swept_ends_of
 
-#: A place whose ends differ from the mean by more than this share of the range was half
-#: explored, and is asked for again.
+#: A place whose ends are off the mean by more than this share of the range is named.
 _HALF_EXPLORED = 0.1
 #: Most places that are named.
 _NAMED = 3
@@ -41,7 +44,8 @@ class IntentMap(EstimatorBase):
     penalty : float
         Weight of other people in the natural posture, see :class:`NaturalPosture`.
     quantiles : (float, float)
-        Quantiles that define the ends at a place; (0, 1) are minimum and maximum.
+        Quantiles that define the ends at a place; (0, 1) are minimum and maximum. Not
+        used where times are known.
     radius : float, optional
         Samples farther from the center of their place are ignored, m; default as in
         :func:`ikns.nullspace.clustering.nearest_center`.
@@ -60,6 +64,8 @@ class IntentMap(EstimatorBase):
         Ends of s - s_nat at each place, rad.
     counts_ : (P,) integer array
         Samples at each place.
+    labels_ : (N,) integer array
+        Place of each sample, -1 for none; of a fitted map only.
     ends_ : (float, float)
         a and b, rad.
     scatter_ : (P,) array
@@ -103,6 +109,7 @@ class IntentMap(EstimatorBase):
         y: ArrayLike,
         *,
         groups: ArrayLike | None = None,
+        time: ArrayLike | None = None,
         natural_X: ArrayLike | None = None,
         natural_y: ArrayLike | None = None,
     ) -> Self:
@@ -118,6 +125,9 @@ class IntentMap(EstimatorBase):
         groups : (N,) integer array, optional
             Which samples are of one place, see
             :meth:`ikns.nullspace.clustering.BoundingBoxKMeans.fit`.
+        time : (N,) array, optional
+            When each sample was taken, s, increasing; the ends of each place are then
+            those of :func:`ikns.nullspace.readout.ends.swept_ends`.
         natural_X, natural_y : (K, 3) and (K,) array, optional
             Wrist centers and swivels of ordinary movement; without them the natural
             posture is that of other people.
@@ -147,10 +157,16 @@ class IntentMap(EstimatorBase):
             )
         self.natural_ = self._natural(natural_X, natural_y, width=w.shape[1])
         beyond = wrapped(s - self.natural_.swivel(w))
-        ends = np.array(
-            [np.quantile(beyond[found.labels_ == k], self.quantiles) for k in used]
+        rows = [np.flatnonzero(found.labels_ == k) for k in used]
+        ends = (
+            np.array([np.quantile(beyond[row], self.quantiles) for row in rows])
+            if time is None
+            else swept_ends_of(beyond, checked_times(time, len(w)), rows)
         )
         self.centers_, self.counts_ = found.cluster_centers_[used], found.counts_[used]
+        self.labels_ = np.full(len(w), -1)
+        for k, row in enumerate(rows):
+            self.labels_[row] = k
         self.lower_, self.upper_ = ends[:, 0], ends[:, 1]
         self._finish()
         return self
@@ -270,24 +286,35 @@ class IntentMap(EstimatorBase):
         off = np.maximum(np.abs(self.lower_ - a), np.abs(self.upper_ - b))
         self.scatter_ = off / (b - a)
 
-    def warn_of_scatter(self) -> None:
-        """Name the places whose ends are far from the mean, with a MapWarning."""
-        wide = [k for k in np.argsort(-self.scatter_).tolist() if self._half(k)]
-        named = [
-            f"{format_point(self.centers_, k)} by {self.scatter_[k]:.2f}"
-            for k in wide[:_NAMED]
-        ]
-        if named:
-            warnings.warn(
-                f"at {len(wide)} of {len(self.centers_)} places the elbow's ends are "
-                f"more than {_HALF_EXPLORED:g} of the range from their mean, most "
-                f"with the wrist at {'; '.join(named)}: repeat these.",
-                MapWarning,
-                stacklevel=2,
-            )
+    def warn_of_scatter(self, names: Sequence[str] | None = None) -> None:
+        """Name places whose ends are more than 0.1 of the range from their mean.
 
-    def _half(self, k: int) -> bool:
-        return bool(self.scatter_[k] > _HALF_EXPLORED)
+        Those that are also narrow were half explored; at the others the natural posture
+        is off. `names` (P,) are what the places are called, by default where they are.
+        """
+        width = self.upper_ - self.lower_
+        narrow = width < (1 - _HALF_EXPLORED) * (self.ends_[1] - self.ends_[0])
+        wide = self.scatter_ > _HALF_EXPLORED
+        for which, why, remedy in (
+            (wide & narrow, "half explored", "hold the hand there again, and turn the "
+             "elbow to both ends"),
+            (wide & ~narrow, "swept about another natural posture",
+             "record ordinary movement there too"),
+        ):  # fmt: skip
+            worst = [k for k in np.argsort(-self.scatter_).tolist() if which[k]]
+            named = [
+                f"{names[k] if names else format_point(self.centers_, k)} "
+                f"({self.scatter_[k]:.2f})"
+                for k in worst[:_NAMED]
+            ]
+            if named:
+                warnings.warn(
+                    f"{len(worst)} of {len(self.centers_)} places were {why}, their "
+                    f"ends more than {_HALF_EXPLORED:g} of the range from the mean: "
+                    f"{', '.join(named)}{', ...' * (len(worst) > _NAMED)}; {remedy}.",
+                    MapWarning,
+                    stacklevel=2,
+                )
 
 
 def wrapped(angle: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ikns.arrays import Indices
 from ikns.body.chains import SIDES, chain_sides
@@ -54,6 +55,8 @@ def recording_scene(
     simulated: bool,
     title: str = "Recording",
     point: int | None = None,
+    c: ArrayLike | None = None,
+    read_by: str = "",
 ) -> Scene:
     """Scene of a recording: the body plays it, with its markers and the hand's trail.
 
@@ -67,6 +70,10 @@ def recording_scene(
         The recording as tracked with `skeleton`.
     recording : Recording
         Gives the markers.
+    c : (T,) or (T, d) array, optional
+        Control signal to play, the first one of several; default that of `learned`.
+    read_by : str
+        Method that read it, where it is another than that of `learned`; for the page.
 
     Raises
     ------
@@ -96,8 +103,9 @@ def recording_scene(
     times = motion.time[kept] - motion.time[kept[0]]
     seen = _seen_markers(skeleton, motion, recording, kept)
     first = int(kept[np.argmax(known[kept])])
-    signals = learned.control_signal(motion.chain_angles(chain), place)
-    c = signals.reshape(len(place), -1)[:, 0]
+    if c is None:
+        c = learned.control_signal(motion.chain_angles(chain), place)
+    signal = np.reshape(np.asarray(c, dtype=np.float64), (len(place), -1))[:, 0]
     commands = [
         *root_commands(),
         *body_commands(skeleton, motion.q[first if known[first] else near], chain),
@@ -115,13 +123,15 @@ def recording_scene(
     ]
     return Scene(
         title,
-        "The recording as tracked, seen from the thorax.",
+        "The recording as tracked, seen from the thorax."
+        + f" c is read by the method {read_by}; points and directions are the paper's."
+        * bool(read_by),
         simulated,
         commands + hidden(layers),
         layers,
         *camera_and_target(skeleton, learned, chain, motion.q[kept]),
         times=times,
-        c=c[kept],
+        c=signal[kept],
         start=float(motion.time[first] - motion.time[kept[0]]),
     )
 

@@ -1,0 +1,200 @@
+"""What c of each method does where the person means nothing by it.
+
+On reaches, between the held places and in natural movement, and while the hand turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ikns.arrays import Array, Indices
+from ikns.body.chains import chain_sides
+from ikns.calibration.folds import Folds
+from ikns.calibration.subject import Subject
+from ikns.motion.motion import Motion
+from ikns.motion.reaches import find_reaches
+from ikns.nullspace.readout import METHODS, IntentMap, Method, Readout
+from ikns.nullspace.readout.coordinates import posture_samples
+from ikns.nullspace.self_motion import visited_posture
+
+#: The forearm turns by so much to either side, as for a glass that is emptied, rad.
+TURN = np.radians(29.0)
+#: A reach goes at least so far, m; fewer of them say nothing; c moves a lot by more
+#: than this.
+_FAR, _FEWEST, _LOT = 0.10, 5, 0.2
+#: Methods that `ikns run`, `track` and `pick` take.
+_LIVE: tuple[Method, ...] = ("paper", "intent")
+
+
+def method_summary(
+    subject: Subject,
+    explorations: Sequence[Motion] | None = None,
+    natural: Sequence[Motion] = (),
+    *,
+    own: bool = False,
+) -> dict[str, Any]:
+    """Compare the methods of a subject where nothing is meant.
+
+    Parameters
+    ----------
+    subject : Subject
+        Also one from a folder; methods that it lacks are left out.
+    explorations : sequence of Motion, optional
+        With reaches between held places; default those of the calibration, which a
+        folder does not hold.
+    natural : sequence of Motion
+        Ordinary movement.
+    own : bool
+        Whether the natural posture was learned from these motions. It is then learned
+        again for each quarter of them, from the other three.
+
+    Returns
+    -------
+    dict
+        ``reaches``: how many of 0.1 m or more, ``between_places`` and ``natural``;
+        ``turned_deg``; ``methods``, for each the mean change of c over a reach of
+        either kind, the share of reaches ``above_0.2``, the mean change with the
+        ``turned_hand`` at the held places, all None where unknown; ``recommended`` for
+        live use, and ``why``.
+    """
+    motions = [*(subject.motions if explorations is None else explorations)]
+    kinds = {"between_places": motions, "natural": [*natural]}
+    speed = subject.gate["max_hand_speed"]
+    ends = {
+        kind: [_reaches(motion, subject.chain, speed) for motion in of_kind]
+        for kind, of_kind in kinds.items()
+    }
+    known: list[Method] = [m for m in METHODS if m == "paper" or m in subject.readouts]
+    folds = Folds(subject, motions, natural, speed) if own else None
+    rows: dict[str, dict[str, float | None]] = {}
+    for method in known:
+        readout = subject.readout(method)
+        changes = {
+            kind: np.concatenate(
+                [
+                    _changes(subject, readout, motion, reach, folds)
+                    for motion, reach in zip(kinds[kind], ends[kind], strict=True)
+                ]
+                or [np.empty(0)]
+            )
+            for kind in kinds
+        }
+        both = np.concatenate(list(changes.values()))
+        rows[method] = {kind: _mean(change) for kind, change in changes.items()} | {
+            "above_0.2": _mean((both > _LOT).astype(float)),
+            "turned_hand": _turned(subject, readout),
+        }
+    counts = {kind: sum(map(len, ends[kind])) for kind in ends}
+    found = {
+        "reaches": counts,
+        "turned_deg": round(float(np.degrees(2 * TURN)), 6),
+        "methods": rows,
+    }
+    return found | _recommended(rows, counts)
+
+
+def _reaches(motion: Motion, chain: str, speed: float) -> Indices:
+    """First and last frame of each reach, (R, 2)."""
+    return find_reaches(
+        motion.hand_speed(chain),
+        motion.task_position(chain),
+        max_hand_speed=speed,
+        min_distance=_FAR,
+    )
+
+
+def _changes(
+    subject: Subject,
+    readout: Readout,
+    motion: Motion,
+    reaches: Indices,
+    folds: Folds | None,
+) -> Array:
+    """Size of the change of c over each reach, (R,), of the largest output."""
+    if not len(reaches):
+        return np.empty(0)
+    x, y = readout.samples(subject.skeleton, motion)
+    at = []
+    for frames in np.transpose(reaches):
+        if readout.method == "intent" and folds is not None and folds.postures:
+            # Both ends by the same posture: that of the first frame's part.
+            assert isinstance(readout.map, IntentMap)
+            c = folds.signal(
+                readout.map, motion, reaches[:, 0], y[frames, 0], x[frames]
+            )
+        else:
+            c = readout.map.control_signal(y[frames], x[frames])
+        at.append(np.reshape(c, (len(reaches), -1)))
+    return np.asarray(np.abs(at[1] - at[0]).max(axis=1, initial=0.0))
+
+
+def _turned(subject: Subject, readout: Readout) -> float | None:
+    """Mean change of c over the held places while the forearm turns by twice TURN."""
+    postures = [
+        visited_posture(subject.skeleton, subject.null_space_map, subject.chain, k)
+        for k in range(len(subject.null_space_map.centers_))
+    ]
+    known = [posture for posture in postures if posture is not None]
+    if not known:
+        return None
+    columns = [
+        subject.skeleton.joint_names.index(f"{side}_forearm_pronation")
+        for side in chain_sides(subject.chain)
+    ]
+    ends = []
+    for turn in (-TURN, TURN):
+        angles = np.array(known)
+        angles[:, columns] += turn
+        x, y = posture_samples(
+            subject.skeleton,
+            angles,
+            subject.chain,
+            readout.method,
+            reference=readout.reference,
+        )
+        c = np.asarray(readout.map.control_signal(y, x))
+        ends.append(c.reshape(len(known), -1))
+    return _mean(np.abs(ends[1] - ends[0]).max(axis=1))
+
+
+def _mean(values: Array) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else None
+
+
+def _recommended(
+    rows: dict[str, dict[str, float | None]], counts: dict[str, int]
+) -> dict[str, str]:
+    """Choose the method whose c moves least, of those that run live."""
+    kind = next(
+        (k for k in ("natural", "between_places") if counts[k] >= _FEWEST), None
+    )
+    words = {"natural": "a natural reach", "between_places": "a reach between places"}
+    cost = {}
+    for method in _LIVE:
+        if method not in rows:
+            continue
+        values = [rows[method]["turned_hand"]]
+        values += [] if kind is None else [rows[method][kind]]
+        told = [value for value in values if value is not None]
+        cost[method] = float(np.mean(told)) if told else np.inf
+    best = min(cost, key=lambda method: cost[method])
+    if len(cost) == 1:
+        return {"recommended": best, "why": f"{best} is the only method there is"}
+
+    def told_of(method: str) -> str:
+        row = rows[method]
+        parts = [] if kind is None else [(row[kind], words[kind])]
+        parts.append((row["turned_hand"], "a turned hand"))
+        return " and ".join(
+            f"{v:.2f} with {name}" for v, name in parts if v is not None
+        )
+
+    (other,) = (method for method in cost if method != best)
+    why = f"its c moves by {told_of(best)}, that of {other} by {told_of(other)}"
+    if kind is None:
+        why += f"; fewer than {_FEWEST} reaches were recorded"
+    return {"recommended": best, "why": why}

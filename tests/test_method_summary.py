@@ -1,0 +1,103 @@
+"""What a calibration says of each method: changes of c where nothing is meant."""
+
+import numpy as np
+import pytest
+import small_person
+
+from ikns.calibration import calibrate
+from ikns.calibration.method_summary import method_summary
+from ikns.calibration.subject import Subject
+from ikns.cli.calibration_tables import calibration_parts
+from ikns.live.control.recorded import control_table
+from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.motion import Motion
+from ikns.nullspace.readout import METHODS
+from ikns.simulation import simulate_protocol, virtual_subject
+
+
+@pytest.fixture(scope="module")
+def moved() -> tuple[Subject, Motion]:
+    """A simulated person with 15 s of ordinary movement, and that movement."""
+    run = small_person.protocol()
+    other = simulate_protocol(
+        virtual_subject(1),
+        seed=4,
+        static_seconds=1.2,
+        free_seconds=15.0,
+        point_seconds=0.2,
+        n_points=1,
+        rate=50,
+        occluded=0.0,
+    )
+    free = other.free.recording
+    subject = calibrate(run.static.recording, [run.points.recording], natural=[free])
+    return subject, MarkerIK(subject.skeleton).track(free, chain="right_arm")
+
+
+def rests(subject: Subject, motion: Motion, method: str) -> np.ndarray:
+    """Changes of c over reaches, by hand from what `ikns control` writes, unclipped."""
+    speed = control_table(subject, motion, method=method).rows[:, 2]
+    c = subject.readout(method).control_signal(subject.skeleton, motion)
+    hand = motion.task_position(subject.chain)
+    moving = ~(speed < 0.05)
+    edges = np.flatnonzero(np.diff(moving.astype(int)))
+    found = []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        whole = np.isfinite(speed[a : b + 2]).all()
+        if moving[a + 1] and whole and np.linalg.norm(hand[b + 1] - hand[a]) >= 0.1:
+            found.append(abs(c[b + 1] - c[a]))
+    return np.array(found)
+
+
+def test_changes_are_those_of_what_control_writes(moved):
+    subject, motion = moved
+    found = method_summary(subject, [], [motion])
+    for method in METHODS:
+        by_hand = rests(subject, motion, method)
+        assert found["reaches"] == {"between_places": 0, "natural": len(by_hand)}
+        row = found["methods"][method]
+        assert row["between_places"] is None
+        assert np.isclose(row["natural"], by_hand.mean(), atol=1e-9)
+
+
+def test_a_turned_hand_moves_the_paper_s_c_and_nothing_else(moved):
+    rows = method_summary(moved[0], [])["methods"]
+    assert rows["paper"]["turned_hand"] > 0.1
+    # The upper arm does not turn; places of the hand move by millimeters.
+    assert rows["proximal"]["turned_hand"] < 0.05
+    assert rows["intent"]["turned_hand"] == 0.0
+
+
+def test_the_report_judges_movement_by_what_the_rest_of_it_taught(moved):
+    subject, motion = moved
+    told = subject.report["methods"]["summary"]
+    known = method_summary(subject, natural=[motion])
+    for method in ("paper", "proximal"):
+        assert told["methods"][method] == pytest.approx(known["methods"][method])
+    ours = told["methods"]["intent"]["natural"]
+    # What is judged by itself looks better: by how much depends on the person.
+    assert ours != known["methods"]["intent"]["natural"]
+
+
+def test_a_method_is_recommended_for_live_use(moved):
+    found = method_summary(moved[0], natural=[moved[1]])
+    rows, best = found["methods"], found["recommended"]
+    cost = {m: rows[m]["natural"] + rows[m]["turned_hand"] for m in ("paper", "intent")}
+    assert best == min(cost, key=cost.get)
+    assert f"{rows[best]['turned_hand']:.2f} with a turned hand" in found["why"]
+
+
+def test_a_folder_of_before_says_what_there_is(moved, tmp_path):
+    subject, motion = moved
+    subject.save(tmp_path / "old")
+    for name in ("proximal", "intent"):
+        (tmp_path / "old" / f"{name}.json").unlink()
+    old = Subject.load(tmp_path / "old")
+    found = method_summary(old, natural=[motion])
+    assert list(found["methods"]) == ["paper"]
+    assert found["why"] == "paper is the only method there is"
+    assert found["methods"]["paper"]["turned_hand"] > 0.1
+    del old.report["methods"]
+    assert any(
+        "before there were others" in str(p) for p in calibration_parts(old.report)
+    )
