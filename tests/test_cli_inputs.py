@@ -80,7 +80,7 @@ READS: dict[str, tuple[list[str], dict[str, str]]] = {
 
 
 #: Paths that a command reads besides or instead of one of those.
-INSTEAD = {"ik": ["static"], "check": ["static"], "calibrate": ["natural"]}
+INSTEAD = {"ik": ["static"], "check": ["static"], "calibrate": ["natural", "subject"]}
 
 
 def leaves(command: Any, name: str = "") -> Iterator[tuple[str, Any]]:

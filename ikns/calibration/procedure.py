@@ -226,11 +226,11 @@ def _fit(
     learned.reference = elbow_reference(
         skeleton, posture.mean(axis=0), chain, n_dof=learned.n_dof
     )
-    check_places(x, n_points=learned.n_points)
     places = recorded_places(hands, n_points=learned.n_points)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
         try:
+            check_places(x, n_points=learned.n_points)
             learned.fit(x, q, groups=places)
         except NotEnoughData as error:
             if not side:
