@@ -229,6 +229,14 @@ def test_demo_runs_the_whole_line_and_says_that_it_is_simulated(
     assert summary.items() <= result.items()
     page = (out / "report.html").read_text()
     assert "imulated" in page
+    # One page shows all three methods, and what a turned hand does to each.
+    turned = {
+        name: row["turned_hand"] for name, row in result["methods"]["methods"].items()
+    }
+    assert list(turned) == ["paper", "proximal", "intent"]
+    # Pronation is in neither upper arm nor hinge: rounding alone is left to intent.
+    assert turned["intent"] < 1e-9 < turned["paper"]
+    assert "Posture or intent" in page
     assert not re.search(r"""(src|href)=["'](?!data:)""", page)
     assert len(ikns.read(out / "recordings" / "free.c3d").time) > 0
     ikns.Subject.load(out / "subject")

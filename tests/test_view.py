@@ -18,6 +18,7 @@ from ikns.body.chains import chain_joints
 from ikns.errors import InvalidInput
 from ikns.view.body import body_surfaces
 from ikns.view.directions import directions_figure, principal_angle_figure
+from ikns.view.methods import methods_figure
 from ikns.view.render import data_uri, png, svg
 from ikns.view.residuals import residual_figure
 from ikns.view.signals import control_figure, swivel_figure
@@ -50,6 +51,15 @@ DRAW: dict[str, Callable[[bool], Figure]] = {
     ),
     "control": lambda simulated: control_figure(
         TIME, *NOISE, TIME > 2, simulated=simulated
+    ),
+    "methods": lambda simulated: methods_figure(
+        TIME,
+        {"paper": NOISE[0], "intent": NOISE[1]},
+        TIME / 10,
+        {"paper": NOISE[1], "intent": 0 * TIME},
+        TIME / 20,
+        {"paper": TIME, "intent": 2 * TIME},
+        simulated=simulated,
     ),
     "residual": lambda simulated: residual_figure(TIME, NOISE[0], simulated=simulated),
 }
@@ -229,3 +239,19 @@ def test_labels_are_drawn_as_they_are_not_as_formulas() -> None:
     hostile = ["$\\frac{", "<&>\"'", "骨", "a\nb"]
     figure = principal_angle_figure({text: [0.1] for text in hostile}, simulated=False)
     assert svg(figure)
+
+
+def test_reaches_and_turns_of_each_method_are_drawn_from_0() -> None:
+    left, middle, right = DRAW["methods"](False).get_axes()[:3]
+    for axes, values, zero in (
+        (left, NOISE[0], NOISE[0][0]),
+        (middle, NOISE[1], NOISE[1][25]),
+        (right, TIME, 0.0),
+    ):
+        drawn = next(line for line in axes.get_lines() if len(line.get_xdata()) == 50)
+        np.testing.assert_allclose(drawn.get_ydata(), values - zero, atol=1e-12)
+    with pytest.raises(InvalidInput, match="turn"):
+        methods_figure(
+            TIME, {"paper": TIME}, TIME, {"paper": TIME[1:]}, TIME, {"paper": TIME},
+            simulated=False,
+        )  # fmt: skip

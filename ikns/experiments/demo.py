@@ -12,10 +12,12 @@ from typing import Any, NamedTuple
 from ikns.calibration import calibrate
 from ikns.calibration.simulated import SwivelSamples, swivel_samples
 from ikns.calibration.subject import Subject
+from ikns.experiments.method_curves import MethodCurves, method_curves
 from ikns.live.control.recorded import ControlTable, control_table
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.recording.files import read
+from ikns.recording.part import between
 from ikns.recording.recording import Recording
 from ikns.simulation import (
     Protocol,
@@ -23,6 +25,9 @@ from ikns.simulation import (
     virtual_subject,
     write_protocol,
 )
+
+#: Share of the free exploration that teaches the natural posture.
+_NATURAL = 1 / 3
 
 
 class Demo(NamedTuple):
@@ -39,11 +44,15 @@ class Demo(NamedTuple):
     points : Recording
         The exploration of the points, as read.
     reaching : Motion
-        The free exploration, which the map has not seen.
+        The free exploration, which the map has not seen; its first third taught the
+        natural posture.
     control : ControlTable
         Control signal during the free exploration.
     still : SwivelSamples
         Control signal and true swivel on the samples that the map was learned from.
+    curves : MethodCurves
+        What c of each method does on a reach that taught nothing, with a turned hand,
+        and at a held hand.
     """
 
     seed: int
@@ -54,6 +63,7 @@ class Demo(NamedTuple):
     reaching: Motion
     control: ControlTable
     still: SwivelSamples
+    curves: MethodCurves
 
 
 def run_demo(
@@ -83,7 +93,10 @@ def run_demo(
 
     # From here on as with a real person: nothing but the files is used.
     static, free, points = (read(path) for path in files)
-    subject = calibrate(static, [points], progress=progress)
+    parted = float(free.time[0] + _NATURAL * (free.time[-1] - free.time[0]))
+    subject = calibrate(
+        static, [points], natural=[between(free, end=parted)], progress=progress
+    )
     report = subject.report | {"simulated": True}
     subject = dataclasses.replace(subject, report=report)
     subject.save(folder / "subject")
@@ -93,7 +106,10 @@ def run_demo(
     control = control_table(subject, reaching)
 
     still = swivel_samples(subject, protocol.points.swivel)
-    return Demo(seed, quick, protocol, subject, points, reaching, control, still)
+    curves = method_curves(subject, reaching, still, after=parted)
+    return Demo(
+        seed, quick, protocol, subject, points, reaching, control, still, curves
+    )
 
 
 def demo_summary(
@@ -129,5 +145,6 @@ def demo_summary(
         "same_sign_everywhere": bool(min(correlations) * max(correlations) > 0),
         "points": rows,
         "control_while_reaching_freely": demo.control.summary,
+        "methods": report["methods"]["summary"],
         "warnings": [*report["warnings"], *warned],
     }

@@ -17,6 +17,7 @@ from ikns.view.figures import (
     arm_points,
     control_figure,
     directions_figure,
+    methods_figure,
     principal_angle_figure,
     residual_figure,
     swivel_figure,
@@ -85,7 +86,11 @@ def write_demo_report(path: Path, demo: Demo, summary: Mapping[str, Any]) -> Non
             "Python": platform.python_version(),
         },
         key_numbers=_key_numbers(summary),
-        sections=[*_map_sections(figures), _body_section(figures, demo, summary)],
+        sections=[
+            *_map_sections(figures),
+            _methods_section(figures, demo, summary),
+            _body_section(figures, demo, summary),
+        ],
         next_steps=_NEXT_STEPS,
         simulated=True,
     )
@@ -95,6 +100,7 @@ def write_demo_report(path: Path, demo: Demo, summary: Mapping[str, Any]) -> Non
 def _figures(demo: Demo, summary: Mapping[str, Any]) -> dict[str, Figure]:
     """Draw every figure, by name."""
     subject, reaching, still = demo.subject, demo.reaching, demo.still
+    curves = demo.curves
     learned, chain, motion = subject.null_space_map, subject.chain, subject.motions[0]
     rows = summary["points"]
     unknown = np.full(learned.directions_.shape[1:], np.nan).tolist()
@@ -132,6 +138,15 @@ def _figures(demo: Demo, summary: Mapping[str, Any]) -> dict[str, Figure]:
             reaching.hand_speed(chain),
             learned.inside(reaching.task_position(chain)),
             gate=_GATE,
+            simulated=True,
+        ),
+        "methods": methods_figure(
+            curves.reach_time,
+            curves.reach,
+            curves.turn,
+            curves.turned,
+            curves.swivel,
+            curves.held,
             simulated=True,
         ),
         "residual": residual_figure(motion.time, motion.residual, simulated=True),
@@ -240,6 +255,59 @@ def _map_sections(figures: Mapping[str, Figure]) -> list[Section]:
             ],
         ),
     ]
+
+
+def _methods_section(
+    figures: Mapping[str, Figure], demo: Demo, summary: Mapping[str, Any]
+) -> Section:
+    """Say what c of each method can mean, with this subject's numbers."""
+    found = summary["methods"]
+    reach = f"{100 * demo.curves.reach_distance:.0f} cm"
+    return Section(
+        "Posture or intent",
+        [
+            "A posture is not a wish: people turn the elbow whenever they reach, "
+            "and the paper's c follows posture. `paper` reads all joints of the chain, "
+            "so a turned hand moves it; `proximal` reads the upper arm and the elbow's "
+            "flexion only; `intent` reads the elbow's swivel less what this person's "
+            "ordinary movement does at that place. None of them knows what a person "
+            "wants: c is how far the elbow departs from what is usual.",
+            f"Recommended for this subject: {found['recommended']}, as {found['why']}.",
+        ],
+        [
+            Picture(
+                figures["methods"],
+                f"Left: a reach of {reach}, with nothing meant; it should leave c "
+                "alone. Middle: the forearm turns while elbow and wrist stay. Right: "
+                "the hand is held and the elbow lifted; here c should follow.",
+                "Three panels of the control signal, one line or cloud a method",
+            )
+        ],
+        [
+            Table(
+                ["method", "a reach", "more than 0.2", "turned hand"],
+                [
+                    [
+                        method,
+                        *(
+                            "-" if row[name] is None else f"{row[name]:.2f}"
+                            for name in _reach_columns(found)
+                        ),
+                    ]
+                    for method, row in found["methods"].items()
+                ],
+                "Mean change of c where nothing is meant, and the share of reaches "
+                f"with more than 0.2; the forearm turns by {found['turned_deg']:.0f} "
+                "deg.",
+            )
+        ],
+    )
+
+
+def _reach_columns(found: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Columns to show: ordinary movement where there was any."""
+    kind = "natural" if found["reaches"]["natural"] else "between_places"
+    return kind, "above_0.2", "turned_hand"
 
 
 def _body_section(

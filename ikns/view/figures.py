@@ -8,6 +8,7 @@ InvalidInput.
 from ikns.view.body import arm_points
 from ikns.view.comparison import comparison_figure
 from ikns.view.directions import directions_figure, principal_angle_figure
+from ikns.view.methods import methods_figure
 from ikns.view.residuals import residual_figure
 from ikns.view.signals import control_figure, swivel_figure
 from ikns.view.variance_split import variance_split_figure
@@ -18,6 +19,7 @@ __all__ = [
     "comparison_figure",
     "control_figure",
     "directions_figure",
+    "methods_figure",
     "principal_angle_figure",
     "residual_figure",
     "swivel_figure",
