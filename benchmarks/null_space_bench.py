@@ -100,10 +100,11 @@ def main() -> None:
     for name in options.method or []:
         if name not in METHODS:
             entrant(name)
+    entrants = ["intent", "swivel"] if options.quick else [*PACKAGE, *SHIPPED]
     virtual = virtual_people(
-        2 if options.quick else options.virtual,
-        [m for m in options.method or [*PACKAGE, *SHIPPED] if m not in REAL_ONLY],
-        jobs=options.jobs,
+        1 if options.quick else options.virtual,
+        [m for m in options.method or entrants if m not in REAL_ONLY],
+        jobs=1 if options.quick else options.jobs,
     )
     table = {} if options.no_real else real_people(options)
     if options.json:

@@ -74,7 +74,7 @@ def fields(arms: list[Arm]) -> dict[str, object]:
     return {
         "mean_rad": own.mean(axis=0),
         "covariance_rad2": np.cov(own.T),
-        "residual_rad": float(np.sqrt(np.mean(left))),
+        "residual_rad": round(float(np.sqrt(np.mean(left))), 6),
     }
 
 

@@ -22,9 +22,15 @@ from ikns.simulation import (
     virtual_subject,
 )
 from ikns.simulation.arm import GIRDLE_FOLLOW, ArmKinematics, girdle, self_motion
+from ikns.simulation.habitual_places import (
+    habitual_somewhere,
+    natural_swivel,
+    reach_by_joints,
+)
 from ikns.simulation.movement import (
     MovementPlan,
     execute_plan,
+    explore,
     join,
     reach,
     reach_samples,
@@ -75,8 +81,8 @@ class Person:
     subject : Subject
         As calibrated, with the motion of the calibration.
     natural, raised, tracking : Session
-        Reaches in comfortable postures; reaches with c meant to stay at 0.8; c meant to
-        follow a curve while holding and while reaching.
+        Reaches in natural postures (nothing is meant); reaches with c meant to stay at
+        0.8; c meant to follow a curve while holding and while reaching.
     room : float
         Elbow swivel from c = 0 to c = 1, on average, rad.
     """
@@ -104,20 +110,13 @@ def simulate(seed: int, *, quick: bool) -> Person:
     places = _places(run, arm, 5 if quick else 12, rng)
     n = 4 if quick else 17
     order = [places[i] for i in _wandering(len(places), n, rng)]
-    comfortable = [
-        (p.swivel - p.motion.swivel[0]) / np.ptp(p.motion.swivel) for p in order
-    ]
-
-    def constant(values: list[float]) -> tuple[MovementPlan, np.ndarray]:
-        return _go(order, values, hold=1.3)
-
     seconds = 12.0 if quick else 120.0
     curve = _curve(seconds, rng)
     stay = 3.0
     visits = [places[i] for i in _wandering(len(places), int(seconds / stay), rng)]
     exercises = {
-        "natural": constant(comfortable),
-        "raised": constant([0.8] * n),
+        "natural": _naturally(run, arm, n, rng),
+        "raised": _go(order, [0.8] * n, hold=1.3),
         "tracking": _go(visits, curve, hold=stay),
     }
     return Person(
@@ -134,22 +133,22 @@ def _places(
     run: Protocol, arm: ArmKinematics, n: int, rng: np.random.Generator
 ) -> list[Place]:
     """Find new places within the box, held as this person held the points."""
-    truth, point = run.points.truth, run.points.point
-    rows = [np.flatnonzero(point == k) for k in range(len(run.places))]
-    first = np.array([r[0] for r in rows])  # at rest, in the comfortable posture
-    sitting = truth.angles[first].mean(axis=0)
-    postures = truth.angles[first][:, arm.columns]
-    rest = np.mean(
-        [p[:2] - girdle(p, np.zeros(2), follow=GIRDLE_FOLLOW) for p in postures], axis=0
-    )
-    habit, wrist = run.points.swivel[first].mean(), postures[:, 6:].mean(axis=0)
+    rows = [np.flatnonzero(run.points.point == k) for k in range(len(run.places))]
+    sitting, rest, wrist = _sitting(run, arm)
     half = np.mean([np.ptp(run.points.swivel[r]) for r in rows]) / 2
     places: list[Place] = []
     while len(places) < n:
         position = rng.uniform(run.places.min(axis=0), run.places.max(axis=0))
-        swivel = habit + rng.normal(0.0, np.radians(3.0))
         turned = wrist + rng.normal(0.0, np.radians([8.0, 4.0, 3.0]))
         try:
+            swivel = natural_swivel(
+                arm,
+                sitting,
+                position,
+                wrist=turned,
+                habits=run.habits,
+                girdle_rest=rest,
+            ) + rng.normal(0.0, run.habits.rest)
             posture = comfortable_posture(
                 arm, sitting, position, swivel=swivel, wrist=turned, girdle_rest=rest
             )
@@ -160,6 +159,39 @@ def _places(
         if np.ptp(motion.swivel) >= _LEAST:
             places.append(Place(posture, *arm.hand(body), arm.swivel(body), motion))
     return places
+
+
+def _sitting(run: Protocol, arm: ArmKinematics) -> tuple[np.ndarray, ...]:
+    """Joint angles (18,), clavicle at rest (2,) and wrist (3,) of this person, rad."""
+    truth, point = run.points.truth, run.points.point
+    first = [np.flatnonzero(point == k)[0] for k in range(len(run.places))]
+    postures = truth.angles[first][:, arm.columns]
+    rest = [p[:2] - girdle(p, np.zeros(2), follow=GIRDLE_FOLLOW) for p in postures]
+    return (
+        truth.angles[first].mean(axis=0),
+        np.mean(rest, axis=0),
+        postures[:, 6:].mean(axis=0),
+    )
+
+
+def _naturally(
+    run: Protocol, arm: ArmKinematics, n: int, rng: np.random.Generator
+) -> tuple[MovementPlan, np.ndarray]:
+    """Reach from place to place, hands turned as real ones are, meaning nothing."""
+    sitting, rest, _ = _sitting(run, arm)
+    places = [
+        habitual_somewhere(arm, sitting, habits=run.habits, girdle_rest=rest, rng=rng)
+        for _ in range(n)
+    ]
+    parts = []
+    for i, place in enumerate(places):
+        if i:
+            before = places[i - 1]
+            m = reach_samples(before, place, rate=RATE)
+            parts.append(reach_by_joints(arm, sitting, before, place, n=m))
+        parts.append(explore(place, seconds=1.3, rate=RATE, rng=rng, index=i))
+    plan = join(parts)
+    return plan, np.zeros(len(plan.point))
 
 
 def _wandering(n: int, steps: int, rng: np.random.Generator) -> list[int]:

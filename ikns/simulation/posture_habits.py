@@ -32,7 +32,7 @@ _WAVES, _ALIKE, _ALIKE_AXIS = 48, 0.15, 0.5
 #: The wrist's distance from the shoulder, in arm lengths: an arm bent by 150 deg
 #: reaches a quarter, one bent by 25 deg 0.975.
 _NEAREST, _FARTHEST = 0.27, 0.97
-_TRIES = 1000
+_SHAPES = ("middle", "share", "pose_mean", "pose_covariance")
 
 
 class HabitPeople(NamedTuple):
@@ -75,15 +75,17 @@ def habit_people() -> HabitPeople:
     """
     try:
         table = tomllib.loads(_PEOPLE.read_text(encoding="utf-8"))
-        of = {
-            name: np.array(table[name], dtype=np.float64)
-            for name in ("middle", "share", "pose_mean", "pose_covariance")
-        }
+        of = {name: np.array(table[name], dtype=np.float64) for name in _SHAPES}
         cov = np.array(table["covariance_rad2"], dtype=np.float64)
         cov += _SHRINKAGE * (np.diag(np.diag(cov)) - cov)
         mean = np.array(table["mean_rad"], dtype=np.float64)
-        if mean.shape != (28,) or cov.shape != (28, 28):
-            raise ValueError(f"{mean.shape}, {cov.shape}")
+        k = len(of["share"])
+        shapes = [mean.shape, cov.shape, *(of[name].shape for name in _SHAPES)]
+        if shapes != [(28,), (28, 28), (3, 3), (k,), (k, 12), (k, 12, 12)]:
+            raise ValueError(f"arrays {shapes}")
+        # Written with six digits; a rotation needs all.
+        u, _, vt = np.linalg.svd(of["middle"])
+        of["middle"] = u @ vt
         return HabitPeople(
             mean, cov, float(table["residual_rad"]), float(table["rest_rad"]), **of
         )

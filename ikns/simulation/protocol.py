@@ -77,7 +77,7 @@ def simulate_protocol(
     occluded: float = 0.03,
     unsteadiness: Unsteadiness | None = None,
     girdle_rhythm: float = 0.0,
-    habits: PostureHabits | Literal["drawn"] | None = None,
+    habits: PostureHabits | Literal["drawn"] | None = "drawn",
     rate: float = 100.0,
     quick: bool = False,
 ) -> Protocol:
@@ -110,7 +110,7 @@ def simulate_protocol(
         still at each point, 1 moves it as much as between points.
     habits : PostureHabits, "drawn" or None
         How the elbow goes with the hand while the person means nothing; drawn from real
-        people. None is a person who holds nearly one posture everywhere,
+        people's by default. None is a person who holds nearly one posture everywhere,
         and the hand within 2 cm of the points.
     rate : float
         Frames per second.
