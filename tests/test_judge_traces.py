@@ -147,3 +147,37 @@ def test_every_mistake_of_units_is_named_whatever_the_persons_size(person, facto
     assert found is not None
     assert np.isclose(found[0], factor)
     assert found[1]
+
+
+@given(seed=st.integers(0, 10**6), first=st.integers(2, 110))
+@settings(max_examples=20)
+def test_a_jump_of_all_markers_is_none_of_a_single_one(seed, first):
+    # Recordings joined: the room, or the posture, is another from one frame on.
+    rng = np.random.default_rng(seed)
+    markers = swinging(seed)
+    markers[first:] += 0.5 + rng.uniform(0, 0.2, (MARKERS, 3))
+    found = find_jumps(TIME, markers)
+    assert found.together == [first]
+    assert not found.astray
+    # A pause of the cameras is no jump: time says so.
+    assert find_jumps(np.where(TIME < first / RATE, TIME, TIME + 1), markers) == (
+        {},
+        {},
+        [],
+    )
+
+
+@given(seed=st.integers(0, 10**6), first=st.integers(1, 80), count=st.integers(1, 35))
+@settings(max_examples=20)
+def test_three_names_that_went_round_are_told_together(seed, first, count):
+    rng = np.random.default_rng(seed)
+    own = rng.permutation(MARKERS)[:3]
+    # A slow one, as three have no line between them that turns round.
+    markers = np.tile(swinging(seed)[:1], (FRAMES, 1, 1))
+    markers += rng.normal(0, 1e-3, markers.shape)
+    rows = slice(first, first + count)
+    markers[rows, own] = markers[rows, np.roll(own, 1)]
+    found = find_jumps(TIME, markers)
+    assert list(found.exchanged) == [tuple(sorted(own.tolist()))]
+    (frames,) = found.exchanged.values()
+    assert np.flatnonzero(frames).tolist() == list(range(first, first + count))

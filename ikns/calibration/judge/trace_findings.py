@@ -61,18 +61,24 @@ def judge_traces(
                 say_frames(still[:, column]),
             )
         )
-    jumps = find_jumps(time, markers)
     spoiled: Mask = np.asarray((bad | still).any(axis=1))
-    for (a, b), frames in jumps.exchanged.items():
+    # What no camera measured jumps when it begins and ends.
+    jumps = find_jumps(time, np.where(still[..., None], np.nan, markers))
+    if jumps.together:
+        findings.append(_joined(where, time, jumps.together))
+    for wrong, frames in jumps.exchanged.items():
         spoiled = spoiled | frames
+        names = tuple(labels[i] for i in wrong)
         findings.append(
             Finding(
                 "exchanged",
                 _severity(frames),
                 where,
-                f"{labels[a]} and {labels[b]} carry each other's name",
-                f"exchange {labels[a]} and {labels[b]} there",
-                (labels[a], labels[b]),
+                f"{say_markers(names)} carry each other's name{'s' * (len(wrong) > 2)}",
+                f"exchange {say_markers(names)} there"
+                if len(wrong) == 2
+                else f"give {say_markers(names)} their own names there",
+                names,
                 say_frames(frames),
             )
         )
@@ -92,6 +98,21 @@ def judge_traces(
             )
         )
     return findings, spoiled, markers
+
+
+def _joined(where: str, time: Array, first: list[int]) -> Finding:
+    """Say that all markers jump at once, to these frames."""
+    part = np.zeros(len(time), dtype=bool)
+    part[first] = True
+    return Finding(
+        "joined",
+        "warn",
+        where,
+        "all markers jump at once: two recordings joined, or cameras that moved",
+        f"take each part by itself, as with --from {time[first[0]]:g}",
+        (),
+        say_frames(part),
+    )
 
 
 def _severity(frames: Mask) -> Severity:
