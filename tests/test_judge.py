@@ -296,3 +296,75 @@ def test_real_people_pass_and_their_wrong_recordings_do_not(data):
     )
     assert not found.findings
     assert ikns.check_recordings is check_recordings
+
+
+LEFT_RIGHT = {"Ann:R": "Ann:L", "Ann:L": "Ann:R"}
+
+
+def uneven() -> Skeleton:
+    """Somebody whose clusters differ from left to right, as everybody's do."""
+    rng = np.random.default_rng(5)
+    worn = generic().marker_set
+    places = generic().marker_positions + rng.normal(
+        0, [m.placement_sd for m in worn.markers]
+    )
+    return generic().with_markers(worn.at(places))
+
+
+def test_a_recording_mirrored_after_a_right_static_trial_is_told():
+    for axis in ([-1.0, 1.0, 1.0], [1.0, 1.0, -1.0]):
+        found = check(changed(reaching(), reaching().markers * axis))
+        assert not found.usable
+        assert found.findings[0].kind == "mirrored"
+    exchanged_axes = changed(reaching(), reaching().markers[:, :, [0, 2, 1]])
+    assert check(exchanged_axes).findings[0].kind == "mirrored"
+    assert check(changed(reaching(), reaching().markers[:, :, [1, 2, 0]])).usable
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (uneven, "left and right carry"),
+        (generic, "labels of left and right, or export"),
+    ],
+)
+def test_left_for_right_after_a_right_static_trial_is_told(make, words):
+    body = make()
+    labels = [LEFT_RIGHT.get(x[:5], x[:5]) + x[5:] for x in reaching(body).labels]
+    wrong = Recording(reaching().time, reaching(body).markers, labels, "wrong.c3d")
+    found = check_recordings([wrong], skeleton=body)
+    assert not found.usable
+    assert words in found.findings[0].sentence
+
+
+def test_names_that_went_round_a_cluster_are_told_together():
+    round_about = {"RUPA": "RUPB", "RUPB": "RUPC", "RUPC": "RUPA"}
+    labels = [
+        f"Ann:{round_about.get(label[4:], label[4:])}" for label in reaching().labels
+    ]
+    wrong = Recording(reaching().time, reaching().markers, labels, "wrong.c3d")
+    (found,) = check(wrong).findings
+    assert (found.kind, found.severity) == ("exchanged", "refuse")
+    assert set(found.markers) == set(round_about)
+    # Done one after the other, the exchanges it names make it right.
+    steps = found.right.removeprefix("exchange ").partition(":")[0].split(", then ")
+    mended = wrong
+    for step in steps:
+        mended = swapped(mended, *step.split(" and "))
+    assert not check(mended).findings
+
+
+def test_frames_that_repeat_the_one_before_are_told():
+    markers = np.array(reaching().markers)
+    markers[1::2] = markers[::2]
+    (found,) = check(changed(reaching(), markers)).findings
+    assert (found.kind, found.severity) == ("repeated", "warn")
+    assert found.found.startswith("50 %")
+
+
+def test_a_marker_that_no_posture_reaches_is_refused():
+    markers = np.array(reaching().markers)
+    markers[:, reaching().labels.index("Ann:RFIN")] *= -1
+    found = check(changed(reaching(), markers))
+    assert not found.usable
+    assert found.findings[0].markers == ("RFIN",)

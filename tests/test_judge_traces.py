@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from ikns.calibration.judge.distances import all_distances, exchanged_by_distance
 from ikns.calibration.judge.finding import say_frames
 from ikns.calibration.judge.jumps import find_jumps
-from ikns.calibration.judge.traces import frozen, stand_ins
+from ikns.calibration.judge.traces import frozen, stand_ins, straight
 from ikns.calibration.judge.unit import wrong_unit
 
 RATE, FRAMES, MARKERS = 100.0, 120, 6
@@ -147,3 +147,79 @@ def test_every_mistake_of_units_is_named_whatever_the_persons_size(person, facto
     assert found is not None
     assert np.isclose(found[0], factor)
     assert found[1]
+
+
+@given(seed=st.integers(0, 10**6), first=st.integers(2, 110))
+@settings(max_examples=20)
+def test_a_jump_of_all_markers_is_none_of_a_single_one(seed, first):
+    # Recordings joined: the room, or the posture, is another from one frame on.
+    rng = np.random.default_rng(seed)
+    markers = swinging(seed)
+    markers[first:] += 0.5 + rng.uniform(0, 0.2, (MARKERS, 3))
+    found = find_jumps(TIME, markers)
+    assert found.together == [first]
+    assert not found.astray
+    # A pause of the cameras is no jump: time says so.
+    assert find_jumps(np.where(TIME < first / RATE, TIME, TIME + 1), markers) == (
+        {},
+        {},
+        [],
+    )
+
+
+@given(seed=st.integers(0, 10**6), first=st.integers(1, 80), count=st.integers(1, 35))
+@settings(max_examples=20)
+def test_three_names_that_went_round_are_told_together(seed, first, count):
+    rng = np.random.default_rng(seed)
+    own = rng.permutation(MARKERS)[:3]
+    # A slow one, as three have no line between them that turns round.
+    markers = np.tile(swinging(seed)[:1], (FRAMES, 1, 1))
+    markers += rng.normal(0, 1e-3, markers.shape)
+    rows = slice(first, first + count)
+    markers[rows, own] = markers[rows, np.roll(own, 1)]
+    found = find_jumps(TIME, markers)
+    assert list(found.exchanged) == [tuple(sorted(own.tolist()))]
+    (frames,) = found.exchanged.values()
+    assert np.flatnonzero(frames).tolist() == list(range(first, first + count))
+
+
+def hidden(markers: np.ndarray, seed: int) -> np.ndarray:
+    """Hide 5 % of the positions."""
+    lost = np.random.default_rng(seed).random(markers.shape[:2]) < 0.05
+    return np.where(lost[..., None], np.nan, markers)
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    marker=st.integers(0, MARKERS - 1),
+    first=st.integers(0, 60),
+    count=st.integers(30, 60),
+    digits=st.sampled_from([5, 6, 9]),
+)
+@settings(max_examples=30)
+def test_filled_gaps_are_told_and_movement_is_not(seed, marker, first, count, digits):
+    markers = hidden(swinging(seed), seed)
+    assert not straight(TIME, markers).any()
+    assert not frozen(TIME, markers).any()
+    rows = slice(first, first + count)
+    # 0.3 mm a frame, written with three digits after the millimeter or more.
+    line = np.arange(count)[:, None] * [2e-4, -2e-4, 1e-3]
+    markers[rows, marker] = np.round(line, digits)
+    found = straight(TIME, markers)
+    assert np.flatnonzero(found.any(axis=0)).tolist() == [marker]
+    assert np.flatnonzero(found[:, marker]).tolist() == list(range(first, rows.stop))
+    markers[rows, marker] = [0.1, 0.2, 0.3]
+    found = frozen(TIME, markers)
+    assert np.flatnonzero(found[:, marker]).tolist() == list(range(first, rows.stop))
+
+
+@given(speed=st.floats(0.1, 3.0), rate=st.sampled_from([50.0, 100.0, 1000.0]))
+@settings(max_examples=20)
+def test_smooth_movement_is_no_filled_gap(speed, rate):
+    # Without any noise, half a second of a swing, through the middle of which a marker
+    # runs evenly.
+    time = np.arange(round(0.5 * rate)) / rate
+    place = 0.2 * np.sin(speed / 0.2 * (time - 0.25))
+    markers = place[:, None, None] * np.ones((1, 4, 3))
+    markers[:, 1:] += np.arange(1, 4)[:, None] + 0.1 * time[:, None, None] ** 2
+    assert not straight(time, markers).any()

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ikns._kernels.body.label_changes import follow_labels, labels_change
+from ikns._kernels.body.label_changes import follow_labels
 from ikns.calibration import calibrate
 from ikns.errors import NotEnoughData
 from ikns.live.control import FrameSolver
 from ikns.live.control.controller import Controller
 from ikns.motion.marker_ik import MarkerIK
-from ikns.motion.marker_ik.label_changes import LabelWatch
+from ikns.motion.marker_ik.label_changes import LabelWatch, label_changes
 from ikns.motion.marker_ik.rejection import (
     count_rejections,
     rejection_sentence,
@@ -171,7 +171,7 @@ def test_bodies_never_change_labels_by_themselves(seed, degrees, step):
         )
         place = place + rng.normal(0, step, 3)
         frames.append(turn.apply(body) + place)
-    assert not labels_change(np.array(frames), 0.01, 0.1)
+    assert not label_changes(np.arange(20) / 100, np.array(frames))[0]
 
 
 @settings(deadline=None, max_examples=40)

@@ -6,6 +6,7 @@ two names makes all of them steady, these two are exchanged.
 
 from __future__ import annotations
 
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ _LEFT = 0.25
 _CAP = 0.2
 #: Exchanges named one after the other.
 _MOST_EXCHANGES = 3
+#: Markers of one segment whose names are tried in every order; 120 orders.
+_MOST_ORDERED = 5
 
 
 class Distances(NamedTuple):
@@ -106,8 +109,58 @@ def exchanged_by_distance(
             break
         names, changes = trial[best], after[best]
         exchanges.append((int(min(a[best], b[best])), int(max(a[best], b[best]))))
+    if not exchanges and (changes > MOST_CHANGE).any():
+        exchanges, changes = _gone_round(found, pairs, worn, changes)
     with np.errstate(invalid="ignore"):
         return exchanges, np.asarray(changes > MOST_CHANGE)
+
+
+def _gone_round(
+    found: Distances, pairs: Indices, worn: Array | None, changes: Array
+) -> tuple[list[tuple[int, int]], Array]:
+    """Find a segment whose names went round, which no single exchange makes better.
+
+    Returns exchanges that mend it one after the other, and the changes left.
+    """
+    m = len(found.middle)
+    for own in _segments(pairs, m):
+        inside = np.isin(pairs, own).all(axis=1)
+        if (
+            not 3 <= len(own) <= _MOST_ORDERED
+            or not (changes[inside] > MOST_CHANGE).any()
+        ):
+            continue
+        orders = np.array(list(permutations(own)))
+        trial = np.tile(np.arange(m), (len(orders), 1))
+        trial[:, own] = orders
+        after = _changes(found, trial[:, pairs[:, 0]], trial[:, pairs[:, 1]], worn)
+        after = np.where(np.isnan(after), changes, after)
+        total = np.nansum(np.minimum(after[:, inside], _CAP) ** 2, axis=1)
+        best = int(np.argmin(total))
+        before = np.nansum(np.minimum(changes[inside], _CAP) ** 2)
+        fits = not (after[best, inside] > MOST_CHANGE).any()
+        if fits and total[best] <= _LEFT * before:
+            return _as_exchanges(trial[best]), after[best]
+    return [], changes
+
+
+def _segments(pairs: Indices, m: int) -> list[Indices]:
+    """Markers that pairs (N, 2) join, segment by segment."""
+    group = np.arange(m)
+    for a, b in pairs.tolist():
+        group[group == group[b]] = group[a]
+    return [np.flatnonzero(group == number) for number in np.unique(group)]
+
+
+def _as_exchanges(names: Indices) -> list[tuple[int, int]]:
+    """Exchanges of two entries each that turn 0, 1, 2, ... into this order."""
+    now, done = np.arange(len(names)), []
+    for i in range(len(names)):
+        if now[i] != names[i]:
+            j = int(np.flatnonzero(now == names[i])[0])
+            now[[i, j]] = now[[j, i]]
+            done.append((i, j))
+    return done
 
 
 def frame_changes(markers: Array, pairs: Indices, usual: Array) -> Array:

@@ -12,14 +12,22 @@ from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.distances import (
     MOST_CHANGE,
+    Distances,
     all_distances,
     changed_pairs,
     exchanged_by_distance,
     frame_changes,
 )
-from ikns.calibration.judge.finding import Finding, say_frames, worst_first
+from ikns.calibration.judge.finding import (
+    Finding,
+    say_frames,
+    say_markers,
+    worst_first,
+)
+from ikns.calibration.judge.sides import other_side, sides_exchanged
 from ikns.calibration.judge.static import body_size
 from ikns.calibration.judge.trace_findings import judge_traces
+from ikns.calibration.judge.traces import repeated
 from ikns.calibration.judge.tracking import judge_tracking
 from ikns.calibration.judge.unit import wrong_unit
 from ikns.motion.marker_ik.visibility import segment_pairs
@@ -31,6 +39,8 @@ _ASTRAY = 0.04
 #: Another person: so many of the distances within segments are off, by so much, m. Of
 #: the same person, 14 % were off by 5 mm, none of them by 16.
 _OTHERS, _OTHERS_CHANGE = 0.35, 0.008
+#: Share of the frames that may repeat the one before.
+_REPEATS = 0.02
 #: Shorter distances say nothing about a size, m.
 _SHORTEST = 0.01
 
@@ -89,6 +99,7 @@ def _judge(
     findings, spoiled, measured = judge_traces(
         where, worn.labels, recording.time, markers
     )
+    findings += _repeated(where, markers)
     if spoiled.all():
         return findings
     good = measured[~spoiled]
@@ -101,6 +112,25 @@ def _judge(
             order[[a, b]] = order[[b, a]]
         findings += judge_tracking(where, skeleton, good[:, order])
     return findings
+
+
+def _repeated(where: str, markers: Array) -> list[Finding]:
+    """Say that frames (T, M, 3) repeat the one before, which no camera does."""
+    again = repeated(markers)
+    if again.sum() <= _REPEATS * len(again):
+        return []
+    return [
+        Finding(
+            "repeated",
+            "warn",
+            where,
+            f"{100 * again.mean():.0f} % of the frames are the one before to the last "
+            "digit",
+            "export at the cameras' own rate, with gaps where they saw nothing",
+            (),
+            say_frames(again),
+        )
+    ]
 
 
 def _pairs(worn: MarkerSet) -> Indices:
@@ -148,25 +178,15 @@ def _judge_distances(
     with np.errstate(invalid="ignore"):
         if not (changes > MOST_CHANGE).any() and apart is None:
             return [], []
+    if apart is not None and _sides_exchanged(found, pairs, apart, labels):
+        return [sides_exchanged(where, "then all distances fit")], []
     exchanges, left = exchanged_by_distance(found, pairs, apart)
-    findings = [
-        Finding(
-            "exchanged",
-            "refuse",
-            where,
-            f"{labels[a]} and {labels[b]} carry each other's name: their distances to "
-            "other markers of their segments are off",
-            f"exchange {labels[a]} and {labels[b]}: then all distances fit",
-            (labels[a], labels[b]),
-        )
-        for a, b in exchanges
-    ]
+    findings = _exchanged(where, labels, exchanges)
     if apart is not None and not exchanges:
         i, j = pairs.T
         off = np.abs(found.middle[i, j] - apart)
-        known = np.isfinite(off)
         links = {worn.markers[i].link for i in pairs[off > _OTHERS_CHANGE][:, 0]}
-        share = np.mean(off[known] > _OTHERS_CHANGE) if known.any() else 0.0
+        share = _share_off(found, pairs, apart)
         if share > _OTHERS and len(links) > 2:
             return [
                 Finding(
@@ -187,6 +207,58 @@ def _judge_distances(
         else:
             findings.append(_unsteady(where, labels, pairs[left], spread))
     return findings, exchanges
+
+
+def _share_off(found: Distances, pairs: Indices, apart: Array) -> float:
+    """Share of the known distances that are off by more than a person's own."""
+    i, j = pairs.T
+    off = np.abs(found.middle[i, j] - apart)
+    known = np.isfinite(off)
+    return float(np.mean(off[known] > _OTHERS_CHANGE)) if known.any() else 0.0
+
+
+def _sides_exchanged(
+    found: Distances, pairs: Indices, apart: Array, labels: tuple[str, ...]
+) -> bool:
+    """Whether distances are another person's, but with left for right this one's."""
+    share = _share_off(found, pairs, apart)
+    if share <= _OTHERS:
+        return False
+    other = other_side(labels)
+    swapped = Distances(
+        found.middle[np.ix_(other, other)], found.spread[np.ix_(other, other)]
+    )
+    return _share_off(swapped, pairs, apart) < min(_OTHERS, share / 2)
+
+
+def _exchanged(
+    where: str, labels: tuple[str, ...], exchanges: list[tuple[int, int]]
+) -> list[Finding]:
+    """Name the markers of each exchange, those that share one together."""
+    groups: list[list[tuple[int, int]]] = []
+    for pair in exchanges:
+        joined = [g for g in groups if any(set(pair) & set(p) for p in g)]
+        groups = [g for g in groups if g not in joined]
+        groups.append([*(p for g in joined for p in g), pair])
+    findings = []
+    for group in groups:
+        names = tuple(
+            labels[i] for i in dict.fromkeys(i for pair in group for i in pair)
+        )
+        steps = ", then ".join(f"{labels[a]} and {labels[b]}" for a, b in group)
+        findings.append(
+            Finding(
+                "exchanged",
+                "refuse",
+                where,
+                f"{say_markers(names)} carry each other's name"
+                f"{'s' * (len(group) > 1)}: their distances to other markers of their "
+                "segments are off",
+                f"exchange {steps}: then all distances fit",
+                names,
+            )
+        )
+    return findings
 
 
 def _moved(

@@ -1,8 +1,9 @@
 """Markers that jump from one frame to the next: to another's place, or anywhere.
 
-Each position is compared with where the marker was, and with where its speed would have
-carried it. When two labels are exchanged, the line from one marker to the other turns
-round within a frame: no body does.
+That labels change places is seen as in the live loop and in tracking, see
+:mod:`ikns.motion.marker_ik.label_changes`; here without a body, so that the frames with
+fewer changes count as right. For the rest each position is compared with where the
+marker was, and with where its speed would have carried it.
 """
 
 from __future__ import annotations
@@ -11,25 +12,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns.arrays import Array, Mask
+from ikns.arrays import Array, Indices, Mask
+from ikns.motion.marker_ik.label_changes import label_changes
 
-#: Smaller jumps are not looked at, m: markers closer than this are one place.
-_SHORTEST = 0.012
-#: How far the line between two exchanged markers may miss the opposite of what it was,
-#: over its length.
-_EXCHANGED = 0.4
 #: A marker that jumps alone leaves its path by more than this, m, and faster than a
 #: hand that hits something, m/s^2 (60 g).
 _ASTRAY, _HARDEST = 0.06, 600.0
 #: Longest gap over which a position is compared, s; a hand turns over in 0.3 s.
 _GAP = 0.1
+#: Where so many of the markers jump at once, and at least so many, it is none of them.
+_TOGETHER, _FEWEST = 0.8, 4
 
 
 class Jumps(NamedTuple):
     """Jumps of M markers over T frames."""
 
-    exchanged: dict[tuple[int, int], Mask]  # frames in which two carry wrong names
+    exchanged: dict[tuple[int, ...], Mask]  # frames in which these carry wrong names
     astray: dict[int, Mask]  # frames in which one is somewhere else
+    together: list[int]  # frames to which all markers jump
 
 
 def find_jumps(time: Array, markers: Array) -> Jumps:
@@ -43,63 +43,75 @@ def find_jumps(time: Array, markers: Array) -> Jumps:
         m; NaN where not seen.
     """
     n, m = markers.shape[:2]
-    nothing = Jumps({}, {})
     if n < 2 or not m:
-        return nothing
+        return Jumps({}, {}, [])
+    changed, owners = label_changes(time, markers)
+    hard, known = _hard_jumps(time, markers)
+    hard[1:] &= owners[1:] == owners[:-1]
+    count = known.sum(axis=1)
+    together = (hard.sum(axis=1) > _TOGETHER * count) & (count >= _FEWEST)
+    hard[together] = False
+    return Jumps(
+        _wrong_names(owners) if changed else {},
+        {
+            marker: _between(np.flatnonzero(hard[:, marker]), n)
+            for marker in np.flatnonzero(hard.any(axis=0)).tolist()
+        },
+        np.flatnonzero(together).tolist(),
+    )
+
+
+def _hard_jumps(time: Array, markers: Array) -> tuple[Mask, Mask]:
+    """Where markers leave their paths, and where that can be told, (T, M) each."""
+    n, m = markers.shape[:2]
     step = float(np.median(np.diff(time)))
     rows = np.arange(n)[:, None]
     seen = np.isfinite(markers).all(axis=2)
     last = np.maximum.accumulate(np.where(seen, rows, -1), axis=0)
     before = np.vstack([np.full((1, m), -1), last[:-1]])
-    gap = rows - before
-    known = seen & (before >= 0) & (gap * step <= max(_GAP, 1.5 * step))
+    gap = time[:, None] - time[before]
+    known = seen & (before >= 0) & (gap <= max(_GAP, 1.5 * step))
     columns = np.arange(m)[None]
     here = markers[before, columns]
-    speed = here - markers[before - 1, columns]
+    speed = (here - markers[before - 1, columns]) / step
     speed[(before < 1) | ~np.isfinite(speed).all(axis=2)] = 0.0
     ahead = here + gap[..., None] * speed
     with np.errstate(invalid="ignore"):
         jump = np.minimum(_norm(markers - here), _norm(markers - ahead))
-    jump[~known] = 0.0
-    events: dict[tuple[int, int], list[int]] = {}
-    alone: dict[int, list[int]] = {}
-    for t in np.flatnonzero((jump > _SHORTEST).any(axis=1)):
-        found = np.flatnonzero(jump[t] > _SHORTEST)
-        pairs = _turned(here[t, found], markers[t, found])
-        for i, j in np.argwhere(np.triu(pairs, 1)):
-            pair = int(found[i]), int(found[j])
-            events.setdefault(pair, []).append(int(t))
-        hard = jump[t, found] > np.maximum(
-            _ASTRAY, _HARDEST * (gap[t, found] * step) ** 2
-        )
-        for i in np.flatnonzero(hard & ~pairs.any(axis=1)):
-            alone.setdefault(int(found[i]), []).append(int(t))
-    return Jumps(
-        {pair: _between(at, n) for pair, at in events.items()},
-        {marker: _between(at, n) for marker, at in alone.items()},
-    )
+        hard = jump > np.maximum(_ASTRAY, _HARDEST * gap**2)
+    return np.asarray(hard & known), np.asarray(known)
 
 
-def _turned(before: Array, now: Array) -> Mask:
-    """Which two of K markers, (K, 3) m each, have changed places, (K, K).
+def _wrong_names(owners: Indices) -> dict[tuple[int, ...], Mask]:
+    """Find the frames in which labels carry others' markers, by these labels.
 
-    The line from one to the other points the other way, and its middle stays nearby: so
-    it does not matter how the two move meanwhile. Of several, the best match counts.
+    Of `owners` (T, M), those that last longest count as right.
     """
-    line = before[:, None] - before[None]
-    apart = _norm(line)
-    over = _norm(line + now[:, None] - now[None])
-    way = now - before
-    middle = _norm(way[:, None] + way[None]) / 2
-    limit = _EXCHANGED * apart
-    likely = (over < limit) & (middle < np.maximum(limit, _ASTRAY))
-    likely &= apart > _SHORTEST
-    score = np.where(likely, over / np.maximum(apart, _SHORTEST), np.inf)
-    best = score == score.min(axis=1, keepdims=True)
-    return np.asarray(likely & best & best.T)
+    n, m = owners.shape
+    group = np.arange(m)
+    for a, b in np.unique(
+        np.stack([np.broadcast_to(np.arange(m), (n, m)), owners], axis=2).reshape(
+            -1, 2
+        ),
+        axis=0,
+    ):
+        group[group == group[b]] = group[a]
+    found: dict[tuple[int, ...], Mask] = {}
+    for number in np.unique(group).tolist():
+        own = np.flatnonzero(group == number)
+        ways, way, counts = np.unique(
+            owners[:, own], axis=0, return_inverse=True, return_counts=True
+        )
+        way, right = way.reshape(-1), int(counts.argmax())
+        for k, carried in enumerate(ways):
+            if k != right:
+                labels = tuple(own[carried != ways[right]].tolist())
+                frames = found.setdefault(labels, np.zeros(n, dtype=bool))
+                frames |= way == k
+    return found
 
 
-def _between(events: list[int], n: int) -> Mask:
+def _between(events: Indices, n: int) -> Mask:
     """Frames between the first and the second event, the third and the fourth, ...
 
     Of the two ways to count, the one with fewer frames.

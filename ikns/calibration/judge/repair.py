@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from ikns.calibration.judge.plausible import (
     assumed,
 )
 from ikns.calibration.judge.pose_cost import PoseCost
+from ikns.calibration.judge.sides import other_side
 from ikns.calibration.size_fit import fit_sizes
 
 #: Names are exchanged one pair after the other, at most so many.
@@ -115,19 +116,10 @@ def _candidates(reference: Skeleton, target: Array, found: Assumed) -> Indices:
 
 def _mirrored(worn: MarkerSet, target: Array) -> Iterator[Array]:
     """Exchange left and right; where not all of it is seen twice, mirror the places."""
-    other = _other_side(worn.labels)
+    other = other_side(worn.labels)
     if (other != np.arange(len(other))).any():
         yield target[other]
     yield target * [-1.0, 1.0, 1.0]
-
-
-def _other_side(labels: Sequence[str]) -> Indices:
-    """Find each marker's namesake on the other side; itself where there is none."""
-    swap = {"R": "L", "L": "R"}
-    names = [swap.get(label[:1], "") + label[1:] for label in labels]
-    return np.array(
-        [labels.index(name) if name in labels else i for i, name in enumerate(names)]
-    )
 
 
 def _exchange(order: Indices, a: int, b: int) -> Indices:

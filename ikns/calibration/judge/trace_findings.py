@@ -9,7 +9,7 @@ import numpy as np
 from ikns.arrays import Array, Mask
 from ikns.calibration.judge.finding import Finding, Severity, say_frames, say_markers
 from ikns.calibration.judge.jumps import find_jumps
-from ikns.calibration.judge.traces import frozen, stand_ins
+from ikns.calibration.judge.traces import frozen, stand_ins, straight
 
 #: From this share of the frames on, a recording is not used rather than cut.
 _MOST_SPOILED = 0.5
@@ -28,70 +28,112 @@ def judge_traces(
     measured : (T, M, 3) array
         The markers without what no camera measured, NaN there.
     """
-    findings: list[Finding] = []
     bad = stand_ins(markers)
-    if bad.any():
-        column = int(bad.sum(axis=0).argmax())
-        numbers = 1000 * markers[bad[:, column], column][0]
-        own = [labels[i] for i in np.flatnonzero(bad.any(axis=0)).tolist()]
-        findings.append(
-            Finding(
-                "not seen",
-                "refuse",
-                where,
-                f"{say_markers(own)} at {' '.join(f'{x:.0f}' for x in numbers)} mm "
-                "where nobody is",
-                "export what was not seen as empty cells",
-                tuple(own),
-                say_frames(np.asarray(bad.any(axis=1))),
-            )
-        )
-        markers = np.where(bad[..., None], np.nan, markers)
-    still = frozen(time, markers)
-    for column in np.flatnonzero(still.any(axis=0)).tolist():
-        findings.append(
-            Finding(
-                "frozen",
-                _severity(still[:, column]),
-                where,
-                f"{labels[column]} stands still to the last digit while markers next "
-                "to it move",
-                "export gaps unfilled",
-                (labels[column],),
-                say_frames(still[:, column]),
-            )
-        )
-    jumps = find_jumps(time, markers)
-    spoiled: Mask = np.asarray((bad | still).any(axis=1))
-    for (a, b), frames in jumps.exchanged.items():
+    findings = _not_seen(where, labels, markers, bad)
+    markers = np.where(bad[..., None], np.nan, markers)
+    still, filled = frozen(time, markers), straight(time, markers)
+    findings += [
+        _made(where, labels[column], found[:, column], kind)
+        for found, kind in ((still, "frozen"), (filled, "filled"))
+        for column in np.flatnonzero(found.any(axis=0)).tolist()
+    ]
+    made = still | filled
+    # What no camera measured jumps when it begins and ends.
+    jumps = find_jumps(time, np.where(made[..., None], np.nan, markers))
+    if jumps.together:
+        findings.append(_joined(where, time, jumps.together))
+    exchanged, astray = jumps.exchanged.items(), jumps.astray.items()
+    findings += [_exchanged(where, [labels[i] for i in o], f) for o, f in exchanged]
+    findings += [_ghost(where, labels[marker], frames) for marker, frames in astray]
+    spoiled: Mask = np.asarray((bad | made).any(axis=1))
+    for _, frames in (*exchanged, *astray):
         spoiled = spoiled | frames
-        findings.append(
-            Finding(
-                "exchanged",
-                _severity(frames),
-                where,
-                f"{labels[a]} and {labels[b]} carry each other's name",
-                f"exchange {labels[a]} and {labels[b]} there",
-                (labels[a], labels[b]),
-                say_frames(frames),
-            )
-        )
-    for marker, frames in jumps.astray.items():
-        spoiled = spoiled | frames
-        findings.append(
-            Finding(
-                "ghost",
-                _severity(frames),
-                where,
-                f"{labels[marker]} jumps to another place and back"
-                if not frames[[0, -1]].any()
-                else f"{labels[marker]} jumps to another place",
-                f"delete {labels[marker]} there, or give it its own trajectory",
-                (labels[marker],),
-                say_frames(frames),
-            )
-        )
     return findings, spoiled, markers
+
+
+def _not_seen(
+    where: str, labels: Sequence[str], markers: Array, bad: Mask
+) -> list[Finding]:
+    """Say which numbers stand for "not seen"."""
+    if not bad.any():
+        return []
+    column = int(bad.sum(axis=0).argmax())
+    numbers = 1000 * markers[bad[:, column], column][0]
+    own = [labels[i] for i in np.flatnonzero(bad.any(axis=0)).tolist()]
+    return [
+        Finding(
+            "not seen",
+            "refuse",
+            where,
+            f"{say_markers(own)} at {' '.join(f'{x:.0f}' for x in numbers)} mm where "
+            "nobody is",
+            "export what was not seen as empty cells",
+            tuple(own),
+            say_frames(np.asarray(bad.any(axis=1))),
+        )
+    ]
+
+
+#: What a marker does that a program made, by kind.
+_MADE = {
+    "frozen": "stands still to the last digit while markers next to it move",
+    "filled": "runs along a line at constant speed, as a filled gap does",
+}
+
+
+def _made(where: str, label: str, frames: Mask, kind: str) -> Finding:
+    return Finding(
+        kind,
+        _severity(frames),
+        where,
+        f"{label} {_MADE[kind]}",
+        "export gaps unfilled",
+        (label,),
+        say_frames(frames),
+    )
+
+
+def _exchanged(where: str, names: list[str], frames: Mask) -> Finding:
+    own = say_markers(names)
+    return Finding(
+        "exchanged",
+        _severity(frames),
+        where,
+        f"{own} carry each other's name{'s' * (len(names) > 2)}",
+        f"exchange {own} there"
+        if len(names) == 2
+        else f"give {own} their own names there",
+        tuple(names),
+        say_frames(frames),
+    )
+
+
+def _ghost(where: str, label: str, frames: Mask) -> Finding:
+    back = " and back" * (not frames[[0, -1]].any())
+    return Finding(
+        "ghost",
+        _severity(frames),
+        where,
+        f"{label} jumps to another place{back}",
+        f"delete {label} there, or give it its own trajectory",
+        (label,),
+        say_frames(frames),
+    )
+
+
+def _joined(where: str, time: Array, first: list[int]) -> Finding:
+    """Say that all markers jump at once, to these frames."""
+    part = np.zeros(len(time), dtype=bool)
+    part[first] = True
+    return Finding(
+        "joined",
+        "warn",
+        where,
+        "all markers jump at once (two recordings joined, or cameras moved)",
+        f"take each part by itself, as with --from {time[first[0]]:g}",
+        (),
+        say_frames(part),
+    )
 
 
 def _severity(frames: Mask) -> Severity:

@@ -9,7 +9,9 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.distances import quantile
 from ikns.calibration.judge.finding import Finding
 from ikns.calibration.judge.pose_cost import PoseCost
+from ikns.calibration.judge.sides import mirror_image, other_side, sides_exchanged
 from ikns.motion.marker_ik import MarkerIK, turned_markers
+from ikns.motion.motion import Motion
 from ikns.recording.recording import Recording
 
 #: Frames looked at, evenly spaced.
@@ -18,6 +20,8 @@ _GLANCES = 60
 #: square in the median frame. Seven people with clusters have 10 to 22 mm, one with
 #: single markers 9 mm, simulated ones 2 to 3 mm.
 MOST_RESIDUAL = 0.03
+#: From here on it is no body with one marker astray: three times that.
+_NO_BODY = 0.1
 #: The same for a single marker, over the frames; and where a wrong name is suspected.
 _MOST_MARKER, _SUSPECT_MARKER = 0.08, 0.05
 #: A joint beyond its limit by more than this, rad, in more than this share of frames.
@@ -37,26 +41,14 @@ def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Findi
     some = markers[enough][:: max(1, int(enough.sum()) // _GLANCES)]
     if not len(some):
         return []
-    seconds = np.arange(len(some), dtype=np.float64)
-    motion = MarkerIK(skeleton).track(Recording(seconds, some, worn.labels, where))
-    placed = np.stack(
-        [
-            turned_markers(skeleton, q, seen)
-            for q, seen in zip(motion.q, some, strict=True)
-        ]
-    )
-    weight = np.array([marker.weight for marker in worn.markers])
-    apart = np.linalg.norm(placed - some, axis=2)
-    weighed = np.where(np.isfinite(apart), weight, 0.0).sum(axis=1)
-    squares = np.nansum(weight * apart**2, axis=1)
-    residual = float(np.median(np.sqrt(squares / weighed)))
-    # What may give way more does not count more than it is weighed.
-    off = np.nan_to_num(quantile(apart, 0.5)) * np.minimum(1.0, np.sqrt(weight))
+    motion, residual, off = _follow(skeleton, some)
     with np.errstate(invalid="ignore"):
         # Also of frames whose markers are not believed: they are in question here.
         angles = motion.q[:, -len(skeleton.joint_names) :]
         beyond = np.maximum(skeleton.lower - angles, angles - skeleton.upper)
         share = (beyond > _BEYOND).mean(axis=0)
+    if image := _mirrored(where, skeleton, some, residual):
+        return [image]
     if (
         off.max() > _SUSPECT_MARKER or residual > MOST_RESIDUAL or share.max() > _SHARE
     ) and (pair := _exchanged(skeleton, some, off)):
@@ -101,6 +93,49 @@ def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Findi
     return findings
 
 
+def _follow(skeleton: Skeleton, markers: Array) -> tuple[Motion, float, Array]:
+    """Track frames that are apart from each other.
+
+    Returns the motion, the median frame's distance of all markers from the body, and
+    each marker's (M,), m.
+    """
+    worn = skeleton.marker_set
+    seconds = np.arange(len(markers), dtype=np.float64)
+    motion = MarkerIK(skeleton).track(Recording(seconds, markers, worn.labels))
+    placed = np.stack(
+        [
+            turned_markers(skeleton, q, seen)
+            for q, seen in zip(motion.q, markers, strict=True)
+        ]
+    )
+    weight = np.array([marker.weight for marker in worn.markers])
+    apart = np.linalg.norm(placed - markers, axis=2)
+    weighed = np.where(np.isfinite(apart), weight, 0.0).sum(axis=1)
+    squares = np.nansum(weight * apart**2, axis=1)
+    residual = float(np.median(np.sqrt(squares / weighed)))
+    # What may give way more does not count more than it is weighed.
+    off = np.nan_to_num(quantile(apart, 0.5)) * np.minimum(1.0, np.sqrt(weight))
+    return motion, residual, off
+
+
+def _mirrored(
+    where: str, skeleton: Skeleton, markers: Array, residual: float
+) -> Finding | None:
+    """Say that the body fits a mirror image, or with left for right."""
+    if residual <= MOST_RESIDUAL:
+        return None
+    limit = min(MOST_RESIDUAL, residual / 2)
+    image = _follow(skeleton, markers * [-1.0, 1.0, 1.0])[1]
+    swapped = _follow(skeleton, markers[:, other_side(skeleton.marker_set.labels)])[1]
+    if min(image, swapped) >= limit:
+        return None
+    then = "then a posture fits"
+    if max(image, swapped) < limit:  # a body so even that both are the same
+        return mirror_image(where, then, or_sides=True)
+    made = mirror_image if image < swapped else sides_exchanged
+    return made(where, then)
+
+
 def _near(skeleton: Skeleton, joint: str) -> tuple[str, ...]:
     """Name the markers of a joint's arm."""
     side = joint.partition("_")[0]
@@ -118,7 +153,7 @@ def _residual(
     return [
         Finding(
             "residual",
-            "warn",
+            "refuse" if residual > _NO_BODY else "warn",
             where,
             f"markers and body are {1000 * residual:.0f} mm apart, {labels[worst]} "
             f"{1000 * off[worst]:.0f} mm",

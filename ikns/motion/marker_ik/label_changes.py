@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.label_changes import follow_labels, labels_change
+from ikns._kernels.body.label_changes import follow_labels, label_owners
 from ikns._kernels.body.marker_gate import THORAX, MarkerGate
 from ikns.arrays import Array, Indices, Mask
 
@@ -136,6 +136,30 @@ class LabelWatch:
         return bool((carried[own] != np.flatnonzero(own)).any())
 
 
+def label_changes(time: Array, markers: Array) -> tuple[bool, Indices]:
+    """Follow the markers of a recording from label to label.
+
+    Parameters
+    ----------
+    time : (T,) array
+        s.
+    markers : (T, M, 3) array
+        m, NaN where not seen.
+
+    Returns
+    -------
+    changed : bool
+        Whether labels ever change places.
+    owners : (T, M) integer array
+        Which label of the first frame carried the marker that each one has.
+    """
+    owners = np.empty(markers.shape[:2], dtype=np.int64)
+    changed = label_owners(
+        np.ascontiguousarray(time), np.ascontiguousarray(markers), _LONGEST, owners
+    )
+    return bool(changed), owners
+
+
 def exchanges(
     gate: MarkerGate, markers: Array, error: Array, rate: float
 ) -> list[tuple[Indices, Indices]]:
@@ -159,7 +183,7 @@ def exchanges(
     """
     columns = np.flatnonzero(gate.group >= THORAX)
     worn = np.ascontiguousarray(markers[:, columns])
-    if not labels_change(worn, 1 / rate, _LONGEST):
+    if not label_changes(np.arange(len(worn)) / rate, worn)[0]:
         return []
     watch = LabelWatch(len(columns))
     wrong = np.zeros(worn.shape[:2], dtype=bool)

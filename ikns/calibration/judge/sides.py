@@ -1,0 +1,49 @@
+"""Left and right: markers that carry the other side's name, and mirror images."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ikns.arrays import Indices
+from ikns.calibration.judge.finding import Finding
+
+
+def other_side(labels: Sequence[str]) -> Indices:
+    """Find each marker's namesake on the other side; itself where there is none.
+
+    >>> other_side(["C7", "RSHO", "LSHO", "RMEP"]).tolist()
+    [0, 2, 1, 3]
+    """
+    swap = {"R": "L", "L": "R"}
+    names = [swap.get(label[:1], "") + label[1:] for label in labels]
+    return np.array(
+        [labels.index(name) if name in labels else i for i, name in enumerate(names)]
+    )
+
+
+def sides_exchanged(where: str, then: str) -> Finding:
+    """Say that left and right carry each other's names; `then` is what fits then."""
+    return Finding(
+        "exchanged",
+        "refuse",
+        where,
+        "left and right carry each other's names",
+        f"exchange the labels of left and right: {then}",
+    )
+
+
+def mirror_image(where: str, then: str, *, or_sides: bool = False) -> Finding:
+    """Say that a recording is mirrored; `then` is what fits when it is not.
+
+    Or that left and right may carry each other's names.
+    """
+    labels = "exchange the labels of left and right, or " * or_sides
+    return Finding(
+        "mirrored",
+        "refuse",
+        where,
+        "the body is a mirror image",
+        f"{labels}export without mirroring an axis: {then}",
+    )
