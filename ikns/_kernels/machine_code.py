@@ -55,8 +55,8 @@ class KernelCache:
 
         A damaged file is removed, which is said on stderr.
         """
-        # All that machine code needs of numba. Compiling loads the rest by itself, which
-        # takes longer than most commands.
+        # All that machine code needs of numba. Compiling loads the rest by itself,
+        # which takes longer than most commands.
         rtsys.initialize(target_context)
         path = self._path(signature, target_context.codegen())
         try:

@@ -16,7 +16,7 @@ import ikns
 from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import AsJson, Force, MarkerSetName
 from ikns.cli.output import held_sentences, notes, progress, show, table
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
@@ -149,8 +149,7 @@ def calibrate(
     From recordings (--static, --exploration) or live: 5 s standing still, a minute of
     free exploration, then the hand held at ten points while the elbow moves.
     """
-    from ikns.calibration.subject import FILES
-    from ikns.motion.unseen import warn_unseen
+    from ikns.calibration.subject_files import FILES
 
     if side == "both" and clavicle:
         raise InvalidInput("--clavicle goes with --side right or left, not with both.")
@@ -198,6 +197,10 @@ def calibrate(
         )
         natural = [*(natural or []), *movement]
     assert exploration is not None
+    check_inputs([static, *exploration, *(natural or [])])
+
+    from ikns.motion.unseen import warn_unseen
+
     explorations = [read(path) for path in exploration]
     with progress() as report:
         subject = ikns.calibrate(

@@ -23,7 +23,7 @@ from ikns.cli.comparison_tables import (
 from ikns.cli.options import AsJson, Force, RecordingFile, SubjectFolder
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
@@ -79,10 +79,12 @@ def compare(
     the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
     line along Z leads the hand; how far the null space bends; and crosstalk.
     """
+    refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
+    check_inputs([recording, reaches], subject)
+
     from ikns.calibration.simulated import is_simulated
     from ikns.motion.marker_ik.rejection import rejection_sentence
 
-    refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
     own = calibrated.chain
     tracked = _tracked(read, calibrated, [p for p in (recording, reaches) if p])

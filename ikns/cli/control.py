@@ -18,7 +18,7 @@ from ikns.cli.options import (
     To,
 )
 from ikns.cli.output import notes, progress, show, table
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.output.file import refuse_overwriting, write_csv
 
 
@@ -51,11 +51,13 @@ def control(
     This is the map's own signal; `ikns run --source replay:FILE` also smooths it. As
     there, frames whose markers cannot be right have none.
     """
+    refuse_overwriting(out, force=force, inputs=[recording, subject])
+    check_inputs([recording], subject)
+
     from ikns.live.control.recorded import control_table
     from ikns.motion.marker_ik.rejection import say_rejections
     from ikns.motion.unseen import warn_unseen
 
-    refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
     frames = read(recording, start=from_, end=to)
     warn_unseen(calibrated.skeleton, frames, calibrated.chain)

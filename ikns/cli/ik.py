@@ -11,7 +11,7 @@ import typer
 import ikns
 from ikns.cli.options import AsJson, Force, From, OptionalMarkerSet, RecordingFile, To
 from ikns.cli.output import notes, progress, show, table
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput, naming
 from ikns.output.file import refuse_overwriting
 
@@ -52,10 +52,7 @@ def ik(
     markers cannot be right; .mot and .sto, which have no empty cells, are without such
     frames.
     """
-    from ikns.motion.export import check_motion_file, write_motion
-    from ikns.motion.marker_ik.rejection import say_rejections
-    from ikns.motion.table import motion_table
-    from ikns.motion.unseen import warn_unseen
+    from ikns.motion.file_names import check_motion_file
 
     outputs = out or [Path("motion.csv")]
     for path in outputs:
@@ -72,6 +69,13 @@ def ik(
         raise InvalidInput(
             "--marker-set goes with --static; a subject has markers of its own."
         )
+    check_inputs([recording, static], subject)
+
+    from ikns.motion.export import write_motion
+    from ikns.motion.marker_ik.rejection import say_rejections
+    from ikns.motion.table import motion_table
+    from ikns.motion.unseen import warn_unseen
+
     left_out: list[str] = []
     if static is None:
         assert subject is not None

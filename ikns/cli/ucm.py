@@ -13,7 +13,7 @@ import ikns
 from ikns.cli.options import AsJson, Force, SubjectFolder
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.cli.ucm_designs import over_points, over_time
 from ikns.errors import InvalidInput
 
@@ -67,10 +67,6 @@ def ucm(
     Several recordings: variance over repetitions at each normalized time. One: variance
     over the still samples at each PCA point.
     """
-    from ikns.calibration.simulated import is_simulated
-    from ikns.motion.marker_ik.rejection import rejection_sentence
-    from ikns.motion.unseen import warn_unseen
-
     refuse_picture(figure, force=force, inputs=[*recordings, subject])
     if len({path.resolve() for path in recordings}) < len(recordings):
         raise InvalidInput(
@@ -79,6 +75,12 @@ def ucm(
         )
     if math.isnan(most_different):
         raise InvalidInput("expected a number for --most-different, found nan.")
+    check_inputs(recordings, subject)
+
+    from ikns.calibration.simulated import is_simulated
+    from ikns.motion.marker_ik.rejection import rejection_sentence
+    from ikns.motion.unseen import warn_unseen
+
     calibrated = ikns.Subject.load(subject)
     solver = ikns.MarkerIK(calibrated.skeleton)
     with progress() as report:

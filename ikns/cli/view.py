@@ -13,7 +13,7 @@ import typer
 import ikns
 from ikns.cli.options import MARKER_FILES, AsJson, Force, From, To
 from ikns.cli.output import progress, show, table
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput
 from ikns.output.file import refuse_overwriting, write_bytes, write_text
 
@@ -50,8 +50,6 @@ def view(
 
     With a recording the page plays it, together with the map.
     """
-    from ikns.calibration.simulated import is_simulated
-
     inputs = [subject, recording]
     refuse_overwriting(out, force=force, inputs=inputs)
     if png is not None:
@@ -64,6 +62,10 @@ def view(
             )
     if recording is None and (from_, to) != (None, None):
         raise InvalidInput("expected a recording for --from and --to, found none.")
+    check_inputs([recording], subject)
+
+    from ikns.calibration.simulated import is_simulated
+
     person = ikns.Subject.load(subject)
     learned, row = person.null_space_map, None if point is None else point - 1
     simulated = is_simulated(person, subject, [] if recording is None else [recording])
