@@ -21,7 +21,7 @@ from rich.markup import render
 
 import ikns
 from ikns.cli import main
-from ikns.cli.app import app
+from ikns.cli.app import make_app
 from ikns.recording.recording import Recording
 
 HEAVY = {
@@ -69,7 +69,7 @@ def commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:
         yield from commands(below, f"{name} {part}")
 
 
-COMMANDS = dict(commands(typer.main.get_command(app), "ikns"))
+COMMANDS = dict(commands(typer.main.get_command(make_app()), "ikns"))
 
 
 @pytest.mark.parametrize("name", COMMANDS)

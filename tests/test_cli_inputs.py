@@ -16,7 +16,7 @@ import pytest
 import typer
 from command_line import check_refused
 
-from ikns.cli.app import app
+from ikns.cli.app import make_app
 
 #: Options and arguments that name something to write, by command.
 FILES_OUT = {
@@ -91,7 +91,7 @@ def leaves(command: Any, name: str = "") -> Iterator[tuple[str, Any]]:
         yield from leaves(each, f"{name} {part}".strip())
 
 
-COMMANDS = dict(leaves(typer.main.get_command(app)))
+COMMANDS = dict(leaves(typer.main.get_command(make_app())))
 
 
 def paths(command: Any) -> list[str]:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.calibration.subject import FILES, Subject
+from ikns.calibration.subject import Subject
+from ikns.calibration.subject_files import FILES
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.finger import FingerError, SimulatedFinger
 from ikns.live.control.settings import ControlSettings

@@ -11,7 +11,8 @@ import small_person
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ikns.calibration.subject import FILES, Subject
+from ikns.calibration.subject import Subject
+from ikns.calibration.subject_files import FILES
 from ikns.errors import FileError, IknsError, InvalidInput
 from ikns.nullspace.map import NullSpaceMap
 

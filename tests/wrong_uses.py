@@ -6,7 +6,7 @@ that a new option without an entry is noticed.
 
 import typer
 
-from ikns.cli.app import app
+from ikns.cli.app import make_app
 
 __all__ = ["ALL", "options", "undescribed"]
 
@@ -358,7 +358,7 @@ def _leaves(group: object, name: Command = ()) -> dict[str, list]:
 
 def options() -> dict[str, list]:
     """Parameters of each command, as typer knows them."""
-    return _leaves(typer.main.get_command(app))
+    return _leaves(typer.main.get_command(make_app()))
 
 
 def _wrong(command: str, name: str) -> list[str] | None:

@@ -9,7 +9,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from ikns.calibration.subject import FILES, Subject
+from ikns.calibration.subject import Subject
+from ikns.calibration.subject_files import FILES
 from ikns.errors import FileError
 from ikns.finger import Finger, FingerState, Limits
 from ikns.live.control.settings import ControlSettings

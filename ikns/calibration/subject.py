@@ -20,6 +20,12 @@ from ikns.body.chains import chain_joints
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.model import read_urdf
+from ikns.calibration.subject_files import (
+    FILES,
+    OTHERS,
+    SAMPLES,
+    check_subject_folder,
+)
 from ikns.errors import FileError, IknsError, InvalidInput, naming
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
@@ -28,12 +34,6 @@ from ikns.output.folder import check_output_folder, output_folder
 
 #: Version of the folder's layout and of the JSON files in it.
 FORMAT = 1
-_NEEDED = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
-_SAMPLES = "samples.csv"
-#: Methods beside the paper's, which ``map.json`` holds.
-_OTHERS: tuple[str, ...] = tuple(method for method in METHODS if method != "paper")
-#: All files of a subject folder; those after the first four are optional.
-FILES = (*_NEEDED, *(f"{method}.json" for method in _OTHERS), _SAMPLES)
 
 #: Columns of the still samples: hand position, m in the thorax frame, and number of the
 #: PCA point, from 1; 0 for none.
@@ -91,7 +91,7 @@ class Subject:
     @property
     def methods(self) -> list[str]:
         """What can read c off this subject's postures: ``paper``, and what else."""
-        return ["paper", *(method for method in _OTHERS if method in self.readouts)]
+        return ["paper", *(method for method in OTHERS if method in self.readouts)]
 
     def readout(self, method: Method = "paper") -> Readout:
         """Return a method's map and what it reads.
@@ -109,7 +109,7 @@ class Subject:
             )
         if method not in self.readouts:
             known = self.methods
-            lost = [other for other in _OTHERS if other not in self.readouts]
+            lost = [other for other in OTHERS if other not in self.readouts]
             raise InvalidInput(
                 f"the subject has the method{'s' * (len(known) > 1)} "
                 f"{' and '.join(known)}, not {' and '.join(lost)}; calibrate one arm "
@@ -146,7 +146,7 @@ class Subject:
             if self.samples is not None:
                 # A tenth of a millimeter is finer than cameras see.
                 np.savetxt(
-                    part / _SAMPLES,
+                    part / SAMPLES,
                     self.samples,
                     fmt=["%.4f"] * 3 + ["%d"],
                     delimiter=",",
@@ -165,18 +165,7 @@ class Subject:
         MarkerMismatch
             When a marker sits on a link that the URDF does not have.
         """
-        place = Path(folder)
-        if not place.is_dir():
-            raise FileError(
-                f"{place}: expected a folder that `ikns calibrate` wrote, found "
-                f"{'a file' if place.exists() else 'nothing there'}."
-            )
-        missing = [name for name in _NEEDED if not (place / name).is_file()]
-        if missing:
-            raise FileError(
-                f"{place}: expected a subject folder with {', '.join(_NEEDED)}, found "
-                f"no {', '.join(missing)}."
-            )
+        place = check_subject_folder(folder)
         urdf = place / "skeleton.urdf"
         worn = MarkerSet.load(place / "markers.toml")
         text = read_urdf(urdf)
@@ -217,10 +206,10 @@ class Subject:
             raise FileError(
                 f"{place / 'map.json'}: cannot be read as a null-space map: {fault}"
             ) from None
-        samples = _read_samples(place / _SAMPLES, n_points=len(learned.centers_))
+        samples = _read_samples(place / SAMPLES, n_points=len(learned.centers_))
         readouts = {
             method: _read_readout(place / f"{method}.json", method, chain)
-            for method in _OTHERS
+            for method in OTHERS
             if (place / f"{method}.json").exists()
         }
         return cls(skeleton, learned, chain, report, samples=samples, readouts=readouts)

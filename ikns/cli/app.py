@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import importlib
 import signal
 import sys
 from collections.abc import Sequence
@@ -13,60 +14,41 @@ from typing import Annotated, Any
 import typer
 
 import ikns
-from ikns.cli.calibrate import calibrate
-from ikns.cli.check import check
 from ikns.cli.checks import checked
-from ikns.cli.compare import compare
-from ikns.cli.control import control
-from ikns.cli.convert import convert
-from ikns.cli.demo import demo
-from ikns.cli.ik import ik
-from ikns.cli.markers import markers_app
-from ikns.cli.pick import pick
+from ikns.cli.output import erase_loading
 from ikns.cli.repairs import repairs, tell
-from ikns.cli.replay import replay
-from ikns.cli.robot import robot
-from ikns.cli.run import run
-from ikns.cli.scale import scale
-from ikns.cli.servo import servo
-from ikns.cli.stream import stream
-from ikns.cli.study import study_app
-from ikns.cli.study_report import report
-from ikns.cli.track import track
-from ikns.cli.ucm import ucm
-from ikns.cli.view import view
 from ikns.endings import BROKEN_PIPE, signal_exit_code
 from ikns.errors import DataLoss, InvalidInput
 
-app = typer.Typer(
-    name="ikns",
-    help="Learn a person's kinematic null space and turn it into a control signal.",
-    no_args_is_help=True,
-    add_completion=False,
+#: Commands in the order of the help.
+_COMMANDS = (
+    *("demo", "check", "scale", "calibrate", "ik", "control", "convert", "compare"),
+    *("robot", "ucm", "view", "run", "replay", "stream", "servo", "track", "pick"),
+    *("report", "study", "markers"),
 )
-for command in (
-    demo,
-    check,
-    scale,
-    calibrate,
-    ik,
-    control,
-    convert,
-    compare,
-    robot,
-    ucm,
-    view,
-    run,
-    replay,
-    stream,
-    servo,
-    track,
-    pick,
-    report,
-):
-    app.command()(checked(command))
-app.add_typer(study_app, name="study")
-app.add_typer(markers_app, name="markers")
+#: Files of commands that are not called like them.
+_FILES = {"report": "study_report"}
+
+
+def make_app(*names: str) -> typer.Typer:
+    """Return the application with these commands, by default with all.
+
+    Who runs one command does not wait until the files of all are imported.
+    """
+    app = typer.Typer(
+        name="ikns",
+        help="Learn a person's kinematic null space and turn it into a control signal.",
+        no_args_is_help=True,
+        add_completion=False,
+    )
+    app.callback()(_options)
+    for name in names or _COMMANDS:
+        file = importlib.import_module(f"ikns.cli.{_FILES.get(name, name)}")
+        if group := getattr(file, f"{name}_app", None):
+            app.add_typer(group, name=name)
+        else:
+            app.command()(checked(getattr(file, name)))
+    return app
 
 
 def _version(wanted: bool) -> None:
@@ -75,7 +57,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _options(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, help="Print the version.")
@@ -110,7 +91,7 @@ def _run(given: list[str]) -> int:
     try:
         _refuse_empty(given)
         # Not standalone: typer then raises errors instead of printing several lines.
-        code = _commands().main(
+        code = _parser(*(name for name in given[:1] if name in _COMMANDS)).main(
             args=_repeat("--exploration", given),
             prog_name="ikns",
             standalone_mode=False,
@@ -138,14 +119,15 @@ def _run(given: list[str]) -> int:
         return code or 0
     # The terminal may be gone.
     with contextlib.suppress(OSError):
+        erase_loading()
         sys.stderr.write(f"ikns: {' '.join(message.split())}\n")
     return 2
 
 
 @functools.cache
-def _commands() -> Any:
-    """Build the parsers of all commands, once for all calls."""
-    return typer.main.get_command(app)
+def _parser(*names: str) -> Any:
+    """Return the parser of commands, built once for all calls."""
+    return typer.main.get_command(make_app(*names))
 
 
 def _refuse_empty(argv: Sequence[str]) -> None:

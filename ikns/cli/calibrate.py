@@ -17,7 +17,7 @@ from ikns.cli.calibration_tables import calibration_parts, methods_parts, shift_
 from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import AsJson, Force, From, MarkerSetName, To
 from ikns.cli.output import notes, progress, show
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
@@ -156,8 +156,7 @@ def calibrate(
     takes less, and --rewear a new wearing of the markers. --from and --to take a part
     of every exploration.
     """
-    from ikns.calibration.subject import FILES
-    from ikns.motion.unseen import warn_unseen
+    from ikns.calibration.subject_files import FILES
 
     if side == "both" and clavicle:
         raise InvalidInput("--clavicle goes with --side right or left, not with both.")
@@ -223,6 +222,10 @@ def calibrate(
         )
         natural = [*(natural or []), *movement]
     assert exploration is not None
+    check_inputs([static, *exploration, *(natural or [])])
+
+    from ikns.motion.unseen import warn_unseen
+
     explorations = [read(path, start=from_, end=to) for path in exploration]
     with progress() as report:
         person = ikns.calibrate(

@@ -10,7 +10,7 @@ import typer
 import ikns
 from ikns.cli.options import MARKER_FILES, AsJson, From, OptionalMarkerSet, To
 from ikns.cli.output import show, table
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput, MarkerMismatch
 
 
@@ -40,14 +40,16 @@ def check(
     with 2 when one must not be used. --from and --to take a part of every recording,
     not of --static.
     """
-    from ikns.calibration.judge.finding import refused
-
     if static is not None and subject is not None:
         raise InvalidInput("--static and --subject exclude each other; give one.")
     if subject is not None and marker_set is not None:
         raise InvalidInput(
             "--marker-set goes with --static; a subject has markers of its own."
         )
+    check_inputs([*recordings, static], subject)
+
+    from ikns.calibration.judge.finding import refused
+
     found = ikns.check_recordings(
         [read(path, start=from_, end=to) for path in recordings],
         static=None if static is None else read(static),

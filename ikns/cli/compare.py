@@ -31,7 +31,7 @@ from ikns.cli.options import (
 )
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
@@ -99,9 +99,11 @@ def compare(
     are the paper's; crosstalk is that of --method. --from and --to take a part of the
     recording, not of --reaches.
     """
+    refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
+    check_inputs([recording, reaches], subject)
+
     from ikns.calibration.simulated import is_simulated
 
-    refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
     calibrated = ikns.Subject.load(subject)
     own = calibrated.chain
     with naming(str(subject)):

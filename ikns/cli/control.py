@@ -19,7 +19,7 @@ from ikns.cli.options import (
     To,
 )
 from ikns.cli.output import notes, progress, show, table
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import naming
 from ikns.output.file import refuse_overwriting, write_csv
 
@@ -48,10 +48,12 @@ def control(
     there, frames whose markers cannot be right have none. A recording that must not be
     used is refused, as by `ikns check`.
     """
+    refuse_overwriting(out, force=force, inputs=[recording, subject])
+    check_inputs([recording], subject)
+
     from ikns.calibration.judged_motion import judged_motion
     from ikns.live.control.recorded import control_table
 
-    refuse_overwriting(out, force=force, inputs=[recording, subject])
     calibrated = ikns.Subject.load(subject)
     with naming(str(subject)):
         calibrated.readout(method)  # before anything is tracked

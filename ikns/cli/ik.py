@@ -12,7 +12,7 @@ import typer
 import ikns
 from ikns.cli.options import AsJson, Force, From, OptionalMarkerSet, RecordingFile, To
 from ikns.cli.output import notes, progress, show, table
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput, naming
 from ikns.output.file import refuse_overwriting
 
@@ -53,9 +53,7 @@ def ik(
     markers cannot be right; .mot and .sto, which have no empty cells, are without such
     frames. A recording that must not be used is refused, as by `ikns check`.
     """
-    from ikns.calibration.judged_motion import judged_motion
-    from ikns.motion.export import check_motion_file, write_motion
-    from ikns.motion.table import motion_table
+    from ikns.motion.file_names import check_motion_file
 
     outputs = out or [Path("motion.csv")]
     for path in outputs:
@@ -72,6 +70,12 @@ def ik(
         raise InvalidInput(
             "--marker-set goes with --static; a subject has markers of its own."
         )
+    check_inputs([recording, static], subject)
+
+    from ikns.calibration.judged_motion import judged_motion
+    from ikns.motion.export import write_motion
+    from ikns.motion.table import motion_table
+
     left_out: list[str] = []
     still, measured = None, True
     if static is None:

@@ -43,7 +43,7 @@ def live_session(
     start that failed does not stand in the way of the next one. What is missing on disk
     in the end is added to `losses`, a sentence per file.
     """
-    from ikns.calibration.subject import FILES
+    from ikns.calibration.subject_files import FILES
     from ikns.live.session import (
         create_session,
         discard_run,

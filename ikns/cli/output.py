@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +45,7 @@ def show(result: Mapping[str, Any], *parts: Any, as_json: bool) -> None:
     as_json : bool
         Which of the two.
     """
+    erase_loading()
     if as_json:
         sys.stdout.write(json_text(result))
         return
@@ -101,12 +104,82 @@ def held_sentences(joints: Sequence[str]) -> list[str]:
     return [f"Held, as no marker shows them: {', '.join(said)}."] if said else []
 
 
+def loading() -> None:
+    """Show on a terminal that the command works while it imports what it needs.
+
+    The cursor stays in front, so that :func:`progress` or :func:`show` goes over it.
+    """
+    if sys.stderr.isatty():
+        sys.stderr.write("loading ...\r")
+        sys.stderr.flush()
+
+
+def erase_loading() -> None:
+    """Erase what :func:`loading` wrote; the cursor still is in front of it."""
+    if sys.stderr.isatty():
+        sys.stderr.write("\x1b[K")
+        sys.stderr.flush()
+
+
+def seconds_left(
+    now: float, began: float, last: float, done: int, left: int
+) -> float | None:
+    """Estimate how long the rest of a step takes, s; None before anything is done.
+
+    Rich's own estimate is the pace between the last reports. Two that come together, as
+    the two visits of one participant do, make that one second for ten minutes.
+
+    Parameters
+    ----------
+    now, began, last : float
+        Time, when the step began, and when it reported last, s.
+    done, left : int
+        Parts done since it began, and parts to do.
+
+    Examples
+    --------
+    >>> seconds_left(25.0, began=0.0, last=20.0, done=2, left=8)
+    75.0
+    """
+    if done < 1:
+        return None
+    # What is overdue shows that the pace was too fast.
+    pace = max((last - began) / done, (now - began) / (done + 1))
+    return max(pace * left - (now - last), 0.0)
+
+
+def _time_left(bars: Any) -> Any:
+    """Return a column of rich with the time left."""
+    from rich.text import Text
+
+    class TimeLeft(bars.ProgressColumn):  # type: ignore[misc]
+        def render(self, task: Any) -> Any:
+            fields, done = task.fields, int(task.completed)
+            left = seconds_left(
+                time.monotonic(),
+                fields["began"],
+                fields["last"],
+                done - fields["first"],
+                int(task.total or 0) - done,
+            )
+            shown = "-:--:--" if left is None else str(timedelta(seconds=round(left)))
+            return Text(shown, style="progress.remaining")
+
+    return TimeLeft()
+
+
 @contextmanager
-def progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Show bars on stderr if it is a terminal; call with (step, done, total)."""
+def progress(*, kernels: bool = True) -> Iterator[Callable[[str, int, int], None]]:
+    """Show bars on stderr if it is a terminal; call with (step, done, total).
+
+    Kernels that are not compiled yet are compiled here, on two cores.
+    """
     if not sys.stderr.isatty():
+        if kernels:
+            _compile(None)
         yield lambda step, done, total: None
         return
+    erase_loading()
     from rich import progress as bars
     from rich.console import Console
 
@@ -114,7 +187,7 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
         bars.TextColumn("{task.description}"),
         bars.BarColumn(),
         bars.TaskProgressColumn(),
-        bars.TimeRemainingColumn(),
+        _time_left(bars),
     )
     with bars.Progress(
         *columns, console=Console(stderr=True), transient=True
@@ -122,12 +195,18 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
         tasks: dict[str, bars.TaskID] = {}
 
         def report(step: str, done: int, total: int) -> None:
+            now = time.monotonic()
             if step not in tasks:
-                tasks[step] = display.add_task(step)
-            display.update(tasks[step], completed=done, total=total)
+                tasks[step] = display.add_task(step, began=now, first=done, last=now)
+            display.update(tasks[step], completed=done, total=total, last=now)
 
-        from ikns.live.warm_up import compiled_before, warm_up
-
-        if not compiled_before():
-            warm_up(report)
+        if kernels:
+            _compile(report)
         yield report
+
+
+def _compile(report: Callable[[str, int, int], None] | None) -> None:
+    from ikns.live.warm_up import compiled_before, warm_up
+
+    if not compiled_before():
+        warm_up(report)

@@ -119,12 +119,11 @@ def pick(
     on the participant's page. Every attempt is saved when it ends; after Ctrl-C the
     same command continues the visit.
     """
-    from ikns.experiments.conduct import Experiment, PickingExperiment
-    from ikns.experiments.picking import OBJECT_IDS, pick_schedule
-
     identity = find_visit(
         visit, study, experiment="picking", participant=participant, number=number
     )
+    from ikns.experiments.picking import OBJECT_IDS, pick_schedule
+
     every = list(OBJECT_IDS)
     codes = every if objects == "all" else split_names(objects or "")
     design = resolve_design(
@@ -141,6 +140,9 @@ def pick(
         _DEFAULTS | {"objects": every},
         inputs=_INPUTS,
     )
+
+    from ikns.experiments.conduct import Experiment, PickingExperiment
+
     steps = pick_schedule(identity.number, **design)
 
     def make_experiment(rows: Sequence[Mapping[str, Any]]) -> Experiment:

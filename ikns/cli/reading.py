@@ -12,7 +12,9 @@ from typing import Annotated, Any
 import typer
 
 import ikns
+from ikns.calibration.subject_files import check_subject_folder
 from ikns.cli.options import LabelFile, Rename, SubjectPrefix
+from ikns.cli.output import loading
 from ikns.errors import InvalidInput
 from ikns.output.inputs import refuse_input, refuse_input_folder
 
@@ -100,6 +102,26 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
     run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
+
+
+def check_inputs(
+    recordings: Iterable[Path | None], subject: Path | None = None
+) -> None:
+    """Refuse what is not there, before the imports that take a while.
+
+    Raises
+    ------
+    FileError
+        As whoever reads the recordings and the subject folder does.
+    """
+    from ikns.recording.files import check_marker_file
+
+    if subject is not None:
+        check_subject_folder(subject)
+    for path in recordings:
+        if path is not None:
+            check_marker_file(path)
+    loading()
 
 
 def _keep(labels: Path | None, values: dict[str, Any]) -> None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 import ikns
+from ikns.calibration.subject_files import check_subject_folder
 from ikns.cli.live_session import live_session, say, software
 from ikns.cli.options import AsJson, LabelFile, Rename, SubjectFolder
 from ikns.cli.output import show, table
@@ -93,6 +94,12 @@ def run(
 
     Research software, not a medical device.
     """
+    if duration is not None and not 0 < duration < math.inf:
+        raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
+    if resume and session is None:
+        raise InvalidInput("--resume needs the --session to continue.")
+    check_subject_folder(subject)
+
     from ikns.calibration.simulated import is_simulated
     from ikns.finger import Safety, open_finger
     from ikns.live.control.settings import ControlSettings
@@ -100,10 +107,6 @@ def run(
     from ikns.live.runtime import run as drive
     from ikns.live.stream import open_source
 
-    if duration is not None and not 0 < duration < math.inf:
-        raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
-    if resume and session is None:
-        raise InvalidInput("--resume needs the --session to continue.")
     if realtime:
         check_realtime()
     settings = ControlSettings(hold_speed=hold_speed, method=method)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ikns.cli.options import AsJson, Force
-from ikns.cli.output import notes, progress, show, table
+from ikns.cli.output import loading, notes, progress, show, table
 from ikns.output.folder import check_output_folder, output_folder
 
 
@@ -37,6 +37,8 @@ def report(
     Everything is computed again from the recorded attempts. People and simulated
     participants are never pooled; the page says which is which.
     """
+    loading()
+
     from ikns.experiments.study.summary import summarize
     from ikns.experiments.study.summary.numbers import numbers
     from ikns.view.study_report import report_files, write_study_report
@@ -44,7 +46,7 @@ def report(
     place = study / "report" if out is None else out
     if study.is_dir():  # otherwise the study is missing, not the output
         check_output_folder(place, report_files(), force=force, inputs=[study])
-    with progress() as on_progress:
+    with progress(kernels=False) as on_progress:
         summary = summarize(study, workers=jobs, progress=on_progress)
         with output_folder(place) as folder:
             write_study_report(folder, summary, progress=on_progress)

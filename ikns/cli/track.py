@@ -139,9 +139,6 @@ def track(
     Two pages open: one for the participant, one for the experimenter. Every attempt is
     saved when it ends; after Ctrl-C the same command continues the visit.
     """
-    from ikns.experiments.conduct import Experiment, TrackingExperiment
-    from ikns.experiments.tracking import draw_profile, schedule
-
     identity = find_visit(
         visit, study, experiment="tracking", participant=participant, number=number
     )
@@ -160,6 +157,10 @@ def track(
         _DEFAULTS,
         inputs=_INPUTS,
     )
+
+    from ikns.experiments.conduct import Experiment, TrackingExperiment
+    from ikns.experiments.tracking import draw_profile, schedule
+
     wait = float(design.pop("align"))
     if not 0 <= design["seed"] < 2**32:
         raise InvalidInput(

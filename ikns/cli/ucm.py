@@ -13,7 +13,7 @@ import ikns
 from ikns.cli.options import AsJson, Force, From, SubjectFolder, To
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.cli.ucm_designs import over_points, over_time
 from ikns.errors import InvalidInput
 
@@ -70,9 +70,6 @@ def ucm(
     over the still samples at each PCA point. --from and --to take a part of every
     recording.
     """
-    from ikns.calibration.judged_motion import judged_motion
-    from ikns.calibration.simulated import is_simulated
-
     refuse_picture(figure, force=force, inputs=[*recordings, subject])
     if len({path.resolve() for path in recordings}) < len(recordings):
         raise InvalidInput(
@@ -81,6 +78,11 @@ def ucm(
         )
     if math.isnan(most_different):
         raise InvalidInput("expected a number for --most-different, found nan.")
+    check_inputs(recordings, subject)
+
+    from ikns.calibration.judged_motion import judged_motion
+    from ikns.calibration.simulated import is_simulated
+
     calibrated = ikns.Subject.load(subject)
     motions: list[ikns.Motion] = []
     warned: list[str] = []

@@ -13,7 +13,7 @@ import typer
 import ikns
 from ikns.cli.options import MARKER_FILES, AnyMethod, AsJson, Force, From, To
 from ikns.cli.output import progress, show, table
-from ikns.cli.reading import Read, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput, naming
 from ikns.output.file import refuse_overwriting, write_bytes, write_text
 
@@ -53,8 +53,6 @@ def view(
     With a recording the page plays it, together with the map and the c that --method
     reads.
     """
-    from ikns.calibration.simulated import is_simulated
-
     inputs = [subject, recording]
     refuse_overwriting(out, force=force, inputs=inputs)
     if png is not None:
@@ -72,6 +70,10 @@ def view(
             f"expected a recording whose c --method {method} reads, found none; the "
             "map without one is the paper's."
         )
+    check_inputs([recording], subject)
+
+    from ikns.calibration.simulated import is_simulated
+
     person = ikns.Subject.load(subject)
     with naming(str(subject)):
         person.readout(method)  # before anything is tracked

@@ -9,32 +9,17 @@ import numpy as np
 from ikns.arrays import Array
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
+from ikns.motion.file_names import FITTED, check_motion_file
 from ikns.motion.motion import Motion
 from ikns.motion.table import motion_table
 from ikns.output.file import write_csv
 from ikns.recording.files import write
 from ikns.recording.files.storage import (
-    STORAGE,
     CoordinateTable,
     complete_frames,
     write_storage,
 )
 from ikns.recording.recording import Recording
-
-#: Endings of files with the markers of the fitted body.
-_MARKERS = (".trc", ".c3d")
-
-#: Endings that :func:`write_motion` knows.
-MOTION_FILES = (".csv", *STORAGE, *_MARKERS)
-
-
-def check_motion_file(path: Path) -> None:
-    """Refuse a name whose ending :func:`write_motion` does not know."""
-    if path.suffix.lower() not in MOTION_FILES:
-        raise InvalidInput(
-            f"{path}: expected a name that ends in {', '.join(MOTION_FILES)}, found "
-            f"{path.suffix or 'no ending'}."
-        )
 
 
 def write_motion(
@@ -65,7 +50,7 @@ def write_motion(
         table = motion_table(motion)
         write_csv(path, table.columns, table.rows, force=force)
         return ""
-    if ending in _MARKERS:
+    if ending in FITTED:
         write(path, fitted_markers(skeleton, motion), force=force)
         return ""
     coordinates = motion_coordinates(motion)

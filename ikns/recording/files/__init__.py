@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 from ikns.errors import FileError, RecordingWarning
 from ikns.recording.files.c3d import read_c3d
 from ikns.recording.files.c3d_write import write_c3d
+from ikns.recording.files.conversion import existing_file
 from ikns.recording.files.file_events import event_time
 from ikns.recording.files.marker_csv import read_marker_csv
 from ikns.recording.files.qualisys_tsv import read_qualisys_tsv
@@ -24,7 +26,7 @@ from ikns.recording.recording import Recording
 
 __all__ = ["read", "write", "write_c3d"]
 
-_READERS = {
+_READERS: dict[str, Callable[[Path], Recording]] = {
     ".c3d": read_c3d,
     ".trc": read_trc,
     ".csv": read_marker_csv,
@@ -99,12 +101,7 @@ def read(
     (('RSHO',), [[[0.1, 0.2, 0.3]], [[nan, nan, nan]]])
     """
     path = Path(path)
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
-        raise FileError(
-            f"{path}: expected a marker file that ends in "
-            f"{', '.join(_READERS)}, found {path.suffix or 'no ending'}."
-        )
+    reader = _reader(path)
     if stream is None:
         recording = reader(path)
     elif reader is read_xdf:
@@ -118,6 +115,28 @@ def read(
     for note in recording.notes:
         warnings.warn(RecordingWarning(path, note), stacklevel=2)
     return recording
+
+
+def check_marker_file(path: str | Path) -> None:
+    """Refuse what is no file of markers by its name, or not there.
+
+    Raises
+    ------
+    FileError
+        As :func:`read` does.
+    """
+    _reader(Path(path))
+    existing_file(Path(path))
+
+
+def _reader(path: Path) -> Callable[[Path], Recording]:
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        raise FileError(
+            f"{path}: expected a marker file that ends in "
+            f"{', '.join(_READERS)}, found {path.suffix or 'no ending'}."
+        )
+    return reader
 
 
 def write(path: str | Path, recording: Recording, *, force: bool = False) -> None:

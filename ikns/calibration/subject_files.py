@@ -1,0 +1,39 @@
+"""Which files a subject folder has; to ask that loads nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ikns.errors import FileError
+
+#: Files that every subject folder has.
+NEEDED = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
+#: Methods next to the paper's, which ``map.json`` holds: one file each.
+OTHERS = ("proximal", "intent")
+#: Still samples of the calibration.
+SAMPLES = "samples.csv"
+#: All files of a subject folder; those after the first four are optional.
+FILES = (*NEEDED, *(f"{method}.json" for method in OTHERS), SAMPLES)
+
+
+def check_subject_folder(folder: str | Path) -> Path:
+    """Refuse what is not a subject folder, before anything is loaded.
+
+    Raises
+    ------
+    FileError
+        When there is no folder, or it lacks files.
+    """
+    place = Path(folder)
+    if not place.is_dir():
+        raise FileError(
+            f"{place}: expected a folder that `ikns calibrate` wrote, found "
+            f"{'a file' if place.exists() else 'nothing there'}."
+        )
+    missing = [name for name in NEEDED if not (place / name).is_file()]
+    if missing:
+        raise FileError(
+            f"{place}: expected a subject folder with {', '.join(NEEDED)}, found "
+            f"no {', '.join(missing)}."
+        )
+    return place

@@ -1,0 +1,23 @@
+"""Which files a motion can be written to; to ask that loads no body."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ikns.errors import InvalidInput
+from ikns.recording.files.storage import STORAGE
+
+#: Endings of files with the markers of the fitted body.
+FITTED = (".trc", ".c3d")
+
+#: Endings that :func:`ikns.motion.export.write_motion` knows.
+MOTION_FILES = (".csv", *STORAGE, *FITTED)
+
+
+def check_motion_file(path: Path) -> None:
+    """Refuse a name whose ending is not of :data:`MOTION_FILES`."""
+    if path.suffix.lower() not in MOTION_FILES:
+        raise InvalidInput(
+            f"{path}: expected a name that ends in {', '.join(MOTION_FILES)}, found "
+            f"{path.suffix or 'no ending'}."
+        )
