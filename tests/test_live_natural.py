@@ -13,6 +13,7 @@ from ikns.calibration.subject import Subject
 from ikns.cli import main
 from ikns.live.calibration import Judge, ProtocolStep, paper_steps
 from ikns.live.calibration.natural_verdict import half_explored, judge_natural
+from ikns.live.calibration.point_verdict import judge_point
 from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
 
@@ -34,12 +35,14 @@ def movement() -> Recording:
     return run.free.recording
 
 
-def point(k: int, share: float = 1.0) -> Recording:
-    """What is seen of a point, or of the first share of it."""
+def point(k: int, share: float = 1.0, seconds: float = 3.2) -> Recording:
+    """What is seen of a point, or of the first share of it, as slow as asked for."""
     trial = small_person.protocol().points
     (rows,) = np.nonzero(trial.point == k)
     stop = rows[0] + round(share * len(rows))
-    return small_person.cut(trial.recording, rows[0], stop)
+    part = small_person.cut(trial.recording, rows[0], stop)
+    time = np.arange(len(part.time)) * seconds / len(part.time)
+    return Recording(time, part.markers, part.labels, part.source)
 
 
 def test_movement_over_the_work_space_is_kept():
@@ -85,6 +88,14 @@ def test_a_half_explored_point_is_asked_for_once_more():
     again = judge.judge(STEP[part], point(part, 0.45))
     assert again.keep
     assert "goes no farther" in again.reason
+    # A second shows no whole sweep, whatever the place.
+    brief = Judge(Skeleton.load(), chain="right_arm")
+    brief.skeleton, brief.places, brief._ends = (
+        judge.skeleton,
+        judge.places,
+        judge._ends,
+    )
+    assert "The elbow went" not in brief.judge(STEP[part], point(part, 0.45, 1)).reason
 
 
 def _narrow(judge: Judge, k: int) -> bool:
@@ -127,3 +138,14 @@ def test_only_the_short_protocol_goes_without_free_exploration(
     argv += ["--natural-seconds", str(seconds), "--out", str(tmp_path / "new")]
     assert main(argv) == 2
     assert "only --short goes without free exploration" in capfd.readouterr().err
+
+
+def test_a_straight_arm_is_sent_back_nearer():
+    run = small_person.protocol()
+    skeleton = small_person.subject().skeleton
+    straight = judge_point(run.static.recording, skeleton, chain="right_arm")
+    assert not straight.keep
+    assert straight.values["elbow_deg"] < 35  # it hangs, a little bent
+    bent = judge_point(point(0), skeleton, chain="right_arm")
+    assert bent.values["elbow_deg"] > 45
+    assert "straight" not in bent.reason

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.readouts import LEAST_COVERED, LEAST_NATURAL
+from ikns.calibration.natural import LEAST_COVERED, LEAST_NATURAL
 from ikns.errors import IknsError
 from ikns.live.calibration.measures import (
     median,
@@ -35,7 +35,10 @@ Array = NDArray[np.float64]
 _MOVING_SHARE = 0.5
 #: A place with less than this share of the usual width, and an end more than a tenth of
 #: that short of its usual place, was half explored; known from so many places on.
-_NARROW, _SHORT, _PLACES = 0.9, 0.1, 3
+_NARROW, _SHORT, _PLACES = 0.8, 0.1, 3
+#: A sweep to both ends takes up to 3 s at a comfortable pace (0.3 to 0.6 Hz): a shorter
+#: recording that is narrow says nothing of the place, s.
+LEAST_SWEEP = 3.0
 
 
 def judge_natural(

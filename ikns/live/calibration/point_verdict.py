@@ -14,6 +14,7 @@ from ikns.analysis.compare.leak import slopes
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import elbow_reference, two_arms_fault
+from ikns.calibration.natural import LEAST_BENT, elbow_degrees
 from ikns.errors import IknsError
 from ikns.live.calibration.measures import (
     median,
@@ -21,7 +22,11 @@ from ikns.live.calibration.measures import (
     missing_percent,
     tracking_fault,
 )
-from ikns.live.calibration.natural_verdict import ends_beyond, half_explored
+from ikns.live.calibration.natural_verdict import (
+    LEAST_SWEEP,
+    ends_beyond,
+    half_explored,
+)
 from ikns.live.calibration.verdict import ONE_PLACE, Verdict
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
@@ -139,12 +144,19 @@ def judge_point(
     reason = reason or _fault(
         float(steady), components, n_dof, float(width.min()), float(leak.max()), apart
     )
+    values["elbow_deg"] = round(elbow_degrees(motion, gate, chain), 1)
+    if not reason and values["elbow_deg"] < LEAST_BENT:
+        reason = (
+            f"The arm is straight, with the elbow at {values['elbow_deg']:.0f} deg: "
+            f"hold the hand nearer, so that it bends by {LEAST_BENT:.0f} deg or more."
+        )
     ends = None
     if natural is not None and n_dof == 1:
         ends = ends_beyond(skeleton, motion, gate, chain, natural)
     if ends is not None:
         values["ends_deg"] = np.degrees(ends).round(1).tolist()
-        reason = reason or half_explored(ends, earlier_ends or {})
+        if values["seconds"] >= LEAST_SWEEP * (1 - 1e-6):
+            reason = reason or half_explored(ends, earlier_ends or {})
     if reason and (fault := two_arms_fault(chain, n_dof, components)):
         # Nothing that the person does would be better.
         reason = f"{fault[0].upper()}{fault[1:]}."
