@@ -98,7 +98,8 @@ def live(film: Path, out: Path, *more: str, speed: str = "max") -> list[str]:
             "--free-seconds",
             str(FREE / RATE),
         ],
-        *["--point-seconds", "1.5", "--countdown", str(COUNT / RATE), *more],
+        *["--point-seconds", "1.5", "--countdown", str(COUNT / RATE)],
+        *["--natural-seconds", "0", *more],
     ]
 
 

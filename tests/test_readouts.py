@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 
 from ikns.calibration import calibrate
+from ikns.calibration.natural import check_own_arm
 from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData
@@ -216,6 +217,44 @@ def test_natural_movement_that_covers_nothing_is_refused():
     still = small_person.cut(run.points.recording, 0, 60)  # one place
     with pytest.raises(NotEnoughData, match="natural movement over the work space"):
         calibrate(run.static.recording, [run.points.recording], natural=[still])
+
+
+def test_natural_movement_of_the_other_arm_is_refused():
+    run = small_person.protocol()
+    motion = small_person.subject().motions[0]
+    other = dataclasses.replace(
+        motion, hand_in_thorax=np.array(motion.hand_in_thorax[:, ::-1])
+    )
+    with pytest.raises(NotEnoughData, match="of the right_arm, but the right hand"):
+        check_own_arm([other], "right_arm")
+    check_own_arm([motion], "right_arm")
+    # The whole calibration of an arm that rests meanwhile says so too.
+    with pytest.raises(NotEnoughData, match="found one.* seems to be the wrong side"):
+        calibrate(run.static.recording, [run.points.recording], chain="left_arm")
+
+
+@pytest.mark.parametrize("n", [2, 10])
+def test_only_one_held_place_is_refused(n):
+    run = small_person.protocol()
+    (rows,) = np.nonzero(run.points.point == 3)
+    held = small_person.cut(run.points.recording, rows[0], rows[-1])
+    with pytest.raises(NotEnoughData, match=f"expected {n} held places, found one"):
+        calibrate(run.static.recording, [held], n_points=n)
+
+
+def test_a_straight_arm_has_no_intent():
+    subject, motion = small_person.subject(), small_person.subject().motions[0]
+    q = np.array(motion.q)
+    column = motion.joint_names.index("right_elbow_flexion") - len(motion.joint_names)
+    q[:, column] = np.radians(8.0)
+    straight = dataclasses.replace(motion, q=q)
+    gate = still_mask(motion, "right_arm")
+    found, report = learn_readouts(
+        subject.skeleton, subject.null_space_map, [(straight, gate)], "right_arm"
+    )
+    assert "intent" not in found
+    reason = report["without"]["intent"]
+    assert "straight wherever the hand is held, with the elbow at 8 deg" in reason
 
 
 def test_two_freedoms_leave_the_paper_s_method_alone():

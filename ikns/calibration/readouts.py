@@ -11,6 +11,13 @@ import numpy as np
 from ikns.arrays import Array, Mask
 from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.natural import (
+    LEAST_BENT,
+    LEAST_NATURAL,
+    check_covered,
+    check_own_arm,
+    elbow_degrees,
+)
 from ikns.calibration.places import ONE_PLACE
 from ikns.errors import IknsError, NotEnoughData
 from ikns.motion.motion import Motion
@@ -19,11 +26,6 @@ from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.nullspace.readout import IntentMap, Readout, readout_samples
 from ikns.nullspace.readout.coordinates import elbow_height_gradient, mean_orientation
 from ikns.nullspace.readout.ends import swept_ends
-
-#: Least natural movement of one's own, s; with less, other people's is all there is.
-LEAST_NATURAL = 2.0
-#: Natural movement within less than this along every axis covers nothing, m.
-LEAST_COVERED = 0.10
 
 
 def learn_readouts(
@@ -62,7 +64,7 @@ def learn_readouts(
     Raises
     ------
     NotEnoughData
-        When natural movement was given and covers nothing.
+        When natural movement was given and covers nothing, or is of the other arm.
     """
     found: dict[str, Readout] = {}
     report: dict[str, Any] = {"without": {}, "warnings": []}
@@ -135,6 +137,13 @@ def _intent(
     chain: str,
     moving: tuple[Array, Array] | None,
 ) -> Readout:
+    bent = max(elbow_degrees(motion, gate, chain) for motion, gate in explorations)
+    if bent < LEAST_BENT:
+        raise NotEnoughData(
+            f"the arm is straight wherever the hand is held, with the elbow at "
+            f"{bent:.0f} deg at most; hold it nearer, so that the elbow bends by "
+            f"{LEAST_BENT:.0f} deg or more"
+        )
     rows = [
         readout_samples(skeleton, motion, chain, "intent") for motion, _ in explorations
     ]
@@ -193,6 +202,7 @@ def _natural_samples(
 
     In the explorations these are the frames away from every held place.
     """
+    check_own_arm(natural, chain)
     if len(chain_sides(chain)) != 1:
         return None
     found = moving_samples(
@@ -242,20 +252,3 @@ def moving_samples(
             row[row] = nearest_center(hand, learned.centers_, radius=ONE_PLACE)[0] < 0
         found.append((wrist, swivel[:, 0], row))
     return found
-
-
-def check_covered(wrist: Array) -> None:
-    """Refuse natural movement within one place; wrist centers (N, 3) m.
-
-    Raises
-    ------
-    NotEnoughData
-        When the wrist moves by less than 0.1 m along every axis.
-    """
-    span = np.ptp(np.quantile(wrist, [0.01, 0.99], axis=0), axis=0) if len(wrist) else 0
-    if np.max(span) < LEAST_COVERED:
-        raise NotEnoughData(
-            "expected natural movement over the work space, found a hand that "
-            f"moves within {1e3 * np.max(span):.0f} mm: reach and carry things, "
-            "20 s over all of it."
-        )

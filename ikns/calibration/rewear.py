@@ -22,11 +22,11 @@ import numpy as np
 
 from ikns.calibration.measured_body import measured_body
 from ikns.calibration.method_summary import method_summary
-from ikns.calibration.readouts import LEAST_NATURAL, check_covered, moving_samples
+from ikns.calibration.natural import LEAST_NATURAL, check_covered, check_own_arm
+from ikns.calibration.readouts import moving_samples
 from ikns.calibration.report import exploration_report, static_report
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData, naming
-from ikns.motion.excursion import other_hand_moves
 from ikns.motion.motion import Motion
 from ikns.nullspace.readout import IntentMap, Readout
 from ikns.nullspace.readout.intent import wrapped
@@ -37,9 +37,6 @@ from ikns.recording.recording import Recording
 WEARING_SD = np.radians(2.0)
 #: A stretch of movement that is independent of the next, s: about a reach.
 _STRETCH = 1.5
-#: So many times as far as the chain's own hand the other one moves only where the
-#: recording is of the other arm.
-_OTHER_SIDE = 3.0
 
 
 def rewear(
@@ -101,11 +98,8 @@ def rewear(
         known=True,
     )
     motions = measured.explorations
-    if other := other_hand_moves(motions, chain, times=_OTHER_SIDE):
-        raise NotEnoughData(
-            f"{names}: expected natural movement of the {chain}, but {other}; record "
-            "that arm."
-        )
+    with naming(names):
+        check_own_arm(motions, chain)
     new = replace(subject, skeleton=measured.skeleton, motions=motions)
     with naming(names):
         found, about = _zeroed(new, motions)

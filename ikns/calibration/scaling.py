@@ -181,8 +181,12 @@ def judge_static(
     findings = traces + movement(where, worn.labels, measured[~spoiled])
     if refused(findings):
         return StaticJudgment(worst_first(findings), None, None)
-    fit = fit_sizes(reference, target, known=known)
+    # The judge knows people, not this one: a known body must not look exchanged only
+    # because its markers are put elsewhere than usual.
+    fit = fit_sizes(reference, target)
     findings += judge_posture(where, reference, target, fit)
+    if known:
+        fit = fit_sizes(reference, target, known=True)
     skeleton, report = _fitted(reference, target, fit, duration)
     return StaticJudgment(worst_first(findings), skeleton, report)
 

@@ -100,6 +100,14 @@ def calibrate(
     free_seconds: Annotated[
         float, typer.Option(help="Live: free exploration, s.", min=0.0, max=3600.0)
     ] = 60.0,
+    natural_seconds: Annotated[
+        float,
+        typer.Option(
+            help="Live: ordinary movement with everyday objects, s; 0 for none.",
+            min=0.0,
+            max=3600.0,
+        ),
+    ] = 20.0,
     point_seconds: Annotated[
         float, typer.Option(help="Live: each point, s.", min=0.0, max=3600.0)
     ] = 5.0,
@@ -187,8 +195,15 @@ def calibrate(
             as_json=as_json,
         )
         return
-    if short and "points" not in given_names:
-        points = 2
+    if short:
+        points = points if "points" in given_names else 2
+        static_seconds = static_seconds if "static_seconds" in given_names else 3.0
+        free_seconds = free_seconds if "free_seconds" in given_names else 0.0
+    elif live and not free_seconds > 0:
+        raise InvalidInput(
+            f"expected --free-seconds above 0 s, found {free_seconds:g} s; only "
+            "--short goes without free exploration."
+        )
     # Three times None is none of them.
     generic = (
         None
@@ -206,6 +221,7 @@ def calibrate(
                 points=points,
                 static_seconds=static_seconds,
                 free_seconds=free_seconds,
+                natural_seconds=natural_seconds,
                 point_seconds=point_seconds,
                 countdown=countdown,
                 resume=resume,

@@ -25,6 +25,7 @@ _LIVE_ONLY = (
     "recordings",
     "static_seconds",
     "free_seconds",
+    "natural_seconds",
     "point_seconds",
     "countdown",
     "resume",

@@ -37,6 +37,8 @@ _KEYS: dict[str, Key] = {
 _PROMPTS = {
     "static": "Stand still, arms a little off the body",
     "free": "Sit down, keep the torso still and move the hand wherever it goes",
+    "natural": "Do everyday things with objects at hand, all over the work space: "
+    "reach, drink, carry, put away",
     "point": "Hold the hand{where}, and move the elbow up and down",
 }
 
@@ -50,6 +52,7 @@ class LiveOptions:
     points: int
     static_seconds: float
     free_seconds: float
+    natural_seconds: float
     point_seconds: float
     countdown: float
     resume: bool
@@ -76,7 +79,7 @@ def record_live(
         Accepted recording.
     points : list of Path
     movement : list of Path
-        The free exploration, where it was accepted.
+        Free exploration and ordinary movement, where they were accepted.
     takes : list of dict
         Every take with its verdict.
     """
@@ -97,6 +100,7 @@ def record_live(
         points=options.points,
         static_seconds=options.static_seconds,
         free_seconds=options.free_seconds,
+        natural_seconds=options.natural_seconds,
         point_seconds=options.point_seconds,
         countdown=options.countdown,
     )
@@ -233,6 +237,9 @@ def _figures(verdict: Verdict) -> str:
         ("range_deg", "range {} deg"),
         ("leak_mm_per_c", "leak {} mm per c"),
         ("box_cm", "box {} cm"),
+        ("moving_s", "moving {:.0f} s"),
+        ("reaches", "{} reach(es)"),
+        ("span_cm", "span {} cm"),
         ("spread_mm", "stray {:.1f} mm"),
         ("residual_mm", "residual {:.1f} mm"),
         ("missing_percent", "missing {:.1f} %"),

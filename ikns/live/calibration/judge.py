@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,16 @@ from numpy.typing import NDArray
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import IknsError, InvalidInput
+from ikns.live.calibration.natural_verdict import (
+    half_explored,
+    judge_natural,
+    natural_of,
+)
 from ikns.live.calibration.point_verdict import judge_point
 from ikns.live.calibration.protocol import ProtocolStep
 from ikns.live.calibration.verdict import Verdict, judge_free, judge_static
+from ikns.motion.motion import Motion
+from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.recording.recording import Recording
 
 
@@ -73,6 +81,10 @@ class Judge:
         self._n_dof, self._variance = n_dof, variance
         self._max_hand_speed, self._min_still = max_hand_speed, min_still
         self._min_rest = min_rest
+        self._movement: list[tuple[Skeleton, Motion]] = []
+        self._natural: NaturalPosture | None = None
+        self._ends: dict[str, tuple[float, float]] = {}
+        self._narrow: set[str] = set()
 
     def judge(self, step: ProtocolStep, recording: Recording | None) -> Verdict:
         """Judge a recording of a step; None stands for no frames."""
@@ -88,8 +100,15 @@ class Judge:
         """Store the results of an accepted step."""
         if verdict.skeleton is not None:
             self.skeleton = verdict.skeleton
-        if verdict.explored is not None:
+        if verdict.explored is not None and (
+            step.kind == "free" or self.explored is None
+        ):
             self.explored = verdict.explored
+        if verdict.motion is not None and self.skeleton is not None:
+            self._movement.append((self.skeleton, verdict.motion))
+            self._natural = None
+        if verdict.ends is not None:
+            self._ends[step.name] = verdict.ends
         if verdict.place is not None:
             self.places[step.name] = verdict.place
 
@@ -104,9 +123,25 @@ class Judge:
         assert self.skeleton is not None, "the static trial comes first"
         if step.kind == "free":
             return judge_free(recording, self.skeleton, chain=self.chain)
-        return judge_point(
+        if step.kind == "natural":
+            return judge_natural(
+                recording,
+                self.skeleton,
+                chain=self.chain,
+                max_hand_speed=self._max_hand_speed,
+            )
+        return self._judge_point(step, recording, self.skeleton)
+
+    def _judge_point(
+        self, step: ProtocolStep, recording: Recording, skeleton: Skeleton
+    ) -> Verdict:
+        """Judge a point; where it is as narrow again, the elbow goes no farther."""
+        if self._natural is None:
+            self._natural = natural_of(self._movement, self.chain)
+        others = {k: v for k, v in self._ends.items() if k != step.name}
+        found = judge_point(
             recording,
-            self.skeleton,
+            skeleton,
             chain=self.chain,
             n_dof=self._n_dof,
             variance=self._variance,
@@ -114,4 +149,14 @@ class Judge:
             min_still=self._min_still,
             min_rest=self._min_rest,
             earlier=self.places,
+            natural=self._natural,
+            earlier_ends=others,
         )
+        if found.ends is None or found.reason != half_explored(found.ends, others):
+            return found
+        if step.name in self._narrow:
+            return replace(
+                found, keep=True, reason="The elbow goes no farther here, so it seems."
+            )
+        self._narrow.add(step.name)
+        return found

@@ -14,6 +14,7 @@ from ikns.analysis.compare.leak import slopes
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import elbow_reference, two_arms_fault
+from ikns.calibration.natural import LEAST_BENT, elbow_degrees
 from ikns.errors import IknsError
 from ikns.live.calibration.measures import (
     median,
@@ -21,9 +22,15 @@ from ikns.live.calibration.measures import (
     missing_percent,
     tracking_fault,
 )
+from ikns.live.calibration.natural_verdict import (
+    LEAST_SWEEP,
+    ends_beyond,
+    half_explored,
+)
 from ikns.live.calibration.verdict import ONE_PLACE, Verdict
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
+from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -48,6 +55,8 @@ def judge_point(
     min_still: float = 0.5,
     min_rest: float = 0.0,
     earlier: Mapping[str, Array] | None = None,
+    natural: NaturalPosture | None = None,
+    earlier_ends: Mapping[str, tuple[float, float]] | None = None,
 ) -> Verdict:
     """Judge a point: hand still, elbow moving, one degree of freedom, new position.
 
@@ -65,6 +74,10 @@ def judge_point(
         See :func:`ikns.calibrate`.
     earlier : mapping of str to (3,) array
         Points accepted so far, thorax frame, m.
+    natural : NaturalPosture, optional
+        The person's so far; then a point that was half explored is asked for again.
+    earlier_ends : mapping of str to (float, float)
+        Ends of the swivel beyond it at points accepted so far, rad.
     """
     values: dict[str, Any] = {
         "seconds": len(recording.time) / recording.rate,
@@ -131,11 +144,24 @@ def judge_point(
     reason = reason or _fault(
         float(steady), components, n_dof, float(width.min()), float(leak.max()), apart
     )
+    values["elbow_deg"] = round(elbow_degrees(motion, gate, chain), 1)
+    if not reason and values["elbow_deg"] < LEAST_BENT:
+        reason = (
+            f"The arm is straight, with the elbow at {values['elbow_deg']:.0f} deg: "
+            f"hold the hand nearer, so that it bends by {LEAST_BENT:.0f} deg or more."
+        )
+    ends = None
+    if natural is not None and n_dof == 1:
+        ends = ends_beyond(skeleton, motion, gate, chain, natural)
+    if ends is not None:
+        values["ends_deg"] = np.degrees(ends).round(1).tolist()
+        if values["seconds"] >= LEAST_SWEEP * (1 - 1e-6):
+            reason = reason or half_explored(ends, earlier_ends or {})
     if reason and (fault := two_arms_fault(chain, n_dof, components)):
         # Nothing that the person does would be better.
         reason = f"{fault[0].upper()}{fault[1:]}."
     words = reason or "The hand was steady and the elbow moved."
-    return Verdict(not reason, True, words, values, place=place)
+    return Verdict(not reason, True, words, values, place=place, ends=ends)
 
 
 def _fault(

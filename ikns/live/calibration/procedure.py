@@ -99,9 +99,9 @@ def accepted_recordings(
 def accepted_movement(
     folder: RecordingsFolder, steps: Sequence[ProtocolStep]
 ) -> list[Path]:
-    """Return the accepted free exploration: ordinary movement, for natural posture."""
-    accepted = folder.accepted
-    return [accepted[s.name] for s in steps if s.kind == "free" and s.name in accepted]
+    """Return accepted free exploration and ordinary movement, for natural posture."""
+    accepted, kinds = folder.accepted, ("free", "natural")
+    return [accepted[s.name] for s in steps if s.kind in kinds and s.name in accepted]
 
 
 def run_protocol(

@@ -31,7 +31,7 @@ class ProtocolStep:
     ----------
     name : str
         Also the stem of its file name.
-    kind : {"static", "free", "point"}
+    kind : {"static", "free", "natural", "point"}
     seconds : float
         Duration of the recording, s.
     countdown : float
@@ -39,7 +39,7 @@ class ProtocolStep:
     """
 
     name: str
-    kind: Literal["static", "free", "point"]
+    kind: Literal["static", "free", "natural", "point"]
     seconds: float
     countdown: float = 3.0
 
@@ -68,10 +68,14 @@ def paper_steps(
     points: int = 10,
     static_seconds: float = 5.0,
     free_seconds: float = 60.0,
+    natural_seconds: float = 0.0,
     point_seconds: float = 5.0,
     countdown: float = 3.0,
 ) -> tuple[ProtocolStep, ...]:
     """Return the steps of Lisini Baldi et al. (arXiv 2012.03600).
+
+    Ordinary movement for the natural posture comes before the points; of it or of the
+    free exploration, 0 s leave one out, not both.
 
     Raises
     ------
@@ -80,12 +84,21 @@ def paper_steps(
 
     Examples
     --------
-    >>> [step.name for step in paper_steps(points=2)]
-    ['static', 'free', 'point_01', 'point_02']
+    >>> [step.name for step in paper_steps(points=2, natural_seconds=20)]
+    ['static', 'free', 'natural', 'point_01', 'point_02']
     """
     if not 1 <= points <= 99:
         raise InvalidInput(f"expected 1 to 99 points, found {points}.")
-    for seconds in (static_seconds, free_seconds, point_seconds):
+    movement: list[tuple[Literal["free", "natural"], float]] = [
+        ("free", free_seconds),
+        ("natural", natural_seconds),
+    ]
+    asked = [(kind, seconds) for kind, seconds in movement if seconds != 0]
+    if not asked:
+        raise InvalidInput(
+            "expected free exploration or ordinary movement, found 0 s of both."
+        )
+    for seconds in (static_seconds, point_seconds, *(s for _, s in asked)):
         if not 0 < seconds <= 3600:
             raise InvalidInput(
                 f"expected steps of above 0 s to 3600 s, found {seconds:g} s."
@@ -96,7 +109,7 @@ def paper_steps(
         )
     return (
         ProtocolStep("static", "static", static_seconds, countdown),
-        ProtocolStep("free", "free", free_seconds, countdown),
+        *(ProtocolStep(kind, kind, seconds, countdown) for kind, seconds in asked),
         *(
             ProtocolStep(f"point_{k:02d}", "point", point_seconds, countdown)
             for k in range(1, points + 1)

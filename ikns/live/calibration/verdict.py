@@ -28,6 +28,7 @@ from ikns.live.calibration.measures import (
     tracking_fault,
 )
 from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import minimum_bounding_box
 from ikns.recording.recording import Recording
 
@@ -60,6 +61,10 @@ class Verdict:
         Where the hand went, thorax frame, m.
     skeleton : Skeleton, optional
         The person's, from the static trial.
+    motion : Motion, optional
+        Movement that shows the natural posture.
+    ends : (float, float), optional
+        Of s - s_nat at a held point, rad.
     """
 
     keep: bool
@@ -69,6 +74,8 @@ class Verdict:
     place: Array | None = field(default=None, repr=False)
     explored: Array | None = field(default=None, repr=False)
     skeleton: Skeleton | None = field(default=None, repr=False)
+    motion: Motion | None = field(default=None, repr=False)
+    ends: tuple[float, float] | None = None
 
 
 def judge_static(
@@ -191,4 +198,4 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
             f"thick, expected at least {100 * LEAST_BOX:.0f} cm."
         )
     words = reason or "The hand explored a volume."
-    return Verdict(not reason, True, words, values, explored=explored)
+    return Verdict(not reason, True, words, values, explored=explored, motion=motion)
