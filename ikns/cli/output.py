@@ -152,7 +152,7 @@ def _time_left(bars: Any) -> Any:
     """Return a column of rich with the time left."""
     from rich.text import Text
 
-    class TimeLeft(bars.ProgressColumn):  # type: ignore[misc]
+    class TimeLeft(bars.ProgressColumn):
         def render(self, task: Any) -> Any:
             fields, done = task.fields, int(task.completed)
             left = seconds_left(

@@ -107,7 +107,7 @@ def straight(time: Array, markers: Array) -> Mask:
     k = max(1, round(_APART / step))
     with np.errstate(invalid="ignore"):
         bend = np.abs(markers[2 * k :] - 2 * markers[k:-k] + markers[: -2 * k])
-        even = (bend <= _STRAIGHT).all(axis=2)
+        even = np.asarray((bend <= _STRAIGHT).all(axis=2))
     for column in np.flatnonzero(even.sum(axis=0) >= least - 2 * k).tolist():
         for first, end in _runs(even[:, column]):
             run = slice(first, end + 2 * k)
