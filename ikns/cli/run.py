@@ -262,7 +262,9 @@ def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], N
 def _line(s: LoopStatus) -> str:
     """Return the status, most important first: a narrow terminal cuts the rest."""
     drive = f"{s.state:<7} c {s.c:5.2f} flexion {s.flexion:4.2f} ({s.measured:4.2f})"
-    pace = f"{s.rate:4.0f}/s p99 {1e3 * s.latency:4.2f} ms"
+    late = 1e3 * s.latency
+    # Never wider, so that 80 columns hold the residual too.
+    pace = f"{s.rate:4.0f}/s p99 {late:4.{2 if late < 9.995 else 0}f} ms"
     if s.rejection:
         return f"{drive} {s.rejection} {pace} misses {s.misses}"
     place = "inside" if s.inside else "OUTSIDE"
