@@ -13,6 +13,7 @@ from ikns.arrays import Array, Mask
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
+from ikns.calibration.freedoms import check_freedoms, freedom_motions
 from ikns.calibration.measured_body import measured_body
 from ikns.calibration.method_summary import method_summary
 from ikns.calibration.places import check_places, recorded_places
@@ -227,16 +228,22 @@ def _fit(
         skeleton, posture.mean(axis=0), chain, n_dof=learned.n_dof
     )
     places = recorded_places(hands, n_points=learned.n_points)
+    motions = None
+    if learned.n_dof > 1:
+        motions = freedom_motions(
+            skeleton, posture.mean(axis=0), chain, n_dof=learned.n_dof
+        )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", MapWarning)
         try:
             check_places(x, n_points=learned.n_points)
-            learned.fit(x, q, groups=places)
+            learned.fit(x, q, groups=places, motions=motions)
+            together = [] if motions is None else check_freedoms(learned, q, motions)
         except NotEnoughData as error:
             if not side:
                 raise
             raise NotEnoughData(f"{error} {side}") from None
-    return x, [str(warning.message) for warning in caught]
+    return x, [*together, *(str(warning.message) for warning in caught)]
 
 
 def _faults(learned: NullSpaceMap, chain: str, side: str) -> list[str]:

@@ -73,12 +73,14 @@ def explore_points(
     seconds: float,
     rate: float,
     rng: np.random.Generator,
+    hand_turn: float = 0.0,
 ) -> list[MovementPlan]:
     """Plan to explore one place of each arm after the other, with reaches in between.
 
     Two elbows move in different rhythms: one in the slow third of the frequencies, the
     other in the fast third. Moving in step they would show one degree of freedom, not
-    two.
+    two. With `hand_turn` (rad) each hand turns too, see
+    :func:`ikns.simulation.movement.explore`.
     """
     parts: list[list[MovementPlan]] = []
     low, high = SWIVEL_HZ
@@ -95,7 +97,13 @@ def explore_points(
         parts.append(
             [
                 explore(
-                    place, seconds=seconds, rate=rate, rng=rng, index=i, swivel_hz=band
+                    place,
+                    seconds=seconds,
+                    rate=rate,
+                    rng=rng,
+                    index=i,
+                    swivel_hz=band,
+                    hand_turn=hand_turn,
                 )
                 for place, band in zip(stop, bands, strict=True)
             ]

@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 
 #: Range of the swivel frequency in exploration, Hz: a comfortable pace (assumption).
 SWIVEL_HZ = (0.3, 0.6)
+#: The same for turning the hand as a second freedom, and the column of forearm
+#: pronation among the nine joints of an arm with its clavicle.
+_TURN_HZ, _TWIST = (0.2, 0.28), 6
 #: Duration of a reach, s, and of each further meter (assumption: the peak speed of a
 #: minimum-jerk reach of 0.3 m is then 0.6 m/s, that of unhurried reaching).
 _REACH_S, _REACH_S_PER_M = 0.6, 1.2
@@ -110,12 +113,15 @@ def explore(
     rng: np.random.Generator,
     index: int,
     swivel_hz: tuple[float, float] = SWIVEL_HZ,
+    hand_turn: float = 0.0,
 ) -> MovementPlan:
     """Plan to hold the hand and swivel the elbow through its range at a place.
 
     The swivel is a sine with varying frequency (about one in `swivel_hz`, Hz) and
     amplitude (70 to 100 % of the range). It starts and ends at rest in the comfortable
-    posture. Without a self-motion at the place the arm does not move.
+    posture. Without a self-motion at the place the arm does not move. A second freedom
+    is a turn of the hand about its long axis by `hand_turn` (rad) to either side, in
+    a rhythm of its own.
     """
     n = max(2, round(seconds * rate))
     time = np.arange(n) / rate
@@ -137,12 +143,32 @@ def explore(
         envelope[-len(ramp) :] = ramp[::-1] if len(ramp) < n else 0.0
         swivel = place.swivel + envelope * (wave - place.swivel)
         postures = place.motion.at(swivel)
+    rotation = np.repeat(place.rotation[None], n, axis=0)
+    if hand_turn > 0:
+        turn = hand_turn * _turning(n, rate, rng)
+        postures = postures + turn[:, None] * (np.arange(postures.shape[1]) == _TWIST)
+        # The hand's long axis is its Y, from the fingers to the wrist.
+        axis = np.array([0.0, 1.0, 0.0])
+        rotation = rotation @ Rotation.from_rotvec(turn[:, None] * axis).as_matrix()
     return MovementPlan(
         postures=postures,
         position=np.repeat(place.position[None], n, axis=0),
-        rotation=np.repeat(place.rotation[None], n, axis=0),
+        rotation=rotation,
         point=np.full(n, index),
     )
+
+
+def _turning(n: int, rate: float, rng: np.random.Generator) -> Array:
+    """Turn (n,) from -1 to 1, slower than the elbow, from rest to rest at 0."""
+    hertz = rng.uniform(*_TURN_HZ) * np.exp(
+        wander(rng, n, 1, sd=0.1, cutoff=0.3, rate=rate)[:, 0]
+    )
+    phase = 2 * np.pi * (np.cumsum(hertz) / rate + rng.uniform())
+    ramp = minimum_jerk(max(2, min(n // 2, round(0.5 * rate))))
+    envelope = np.ones(n)
+    envelope[: len(ramp)] = ramp
+    envelope[-len(ramp) :] = ramp[::-1]
+    return np.asarray(envelope * np.sin(phase))
 
 
 def join(plans: Sequence[MovementPlan]) -> MovementPlan:

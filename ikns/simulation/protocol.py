@@ -77,6 +77,7 @@ def simulate_protocol(
     occluded: float = 0.03,
     unsteadiness: Unsteadiness | None = None,
     girdle_rhythm: float = 0.0,
+    hand_turn: float = 0.0,
     habits: PostureHabits | Literal["drawn"] | None = "drawn",
     rate: float = 100.0,
     quick: bool = False,
@@ -108,6 +109,9 @@ def simulate_protocol(
     girdle_rhythm : float
         How far the clavicle follows the upper arm while the hand is held: 0 keeps it
         still at each point, 1 moves it as much as between points.
+    hand_turn : float
+        A second freedom: the person also turns the hand, by so much to either side of
+        its long axis at each point, rad. 0.35 (20 deg) is comfortable.
     habits : PostureHabits, "drawn" or None
         How the elbow goes with the hand while the person means nothing; drawn from real
         people's by default. None is a person who holds nearly one posture everywhere,
@@ -144,6 +148,7 @@ def simulate_protocol(
         "occluded": occluded,
         "unsteadiness": asdict(unsteadiness),
         "girdle_rhythm": girdle_rhythm,
+        "hand_turn": hand_turn,
         "habits": habits is not None,
         "rate": rate,
     }
@@ -173,7 +178,11 @@ def simulate_protocol(
         rng=of_free,
     )
     points = explore_points(
-        person.places, seconds=point_seconds, rate=rate, rng=of_points
+        person.places,
+        seconds=point_seconds,
+        rate=rate,
+        rng=of_points,
+        hand_turn=hand_turn,
     )
     n_static = max(2, round(static_seconds * rate))
     q = {

@@ -30,6 +30,7 @@ from ikns.nullspace.map.checks import (
     usable_points,
     warn_of_components,
 )
+from ikns.nullspace.map.dual import Motions, assemble_dual
 from ikns.nullspace.map.interpolator import Interpolation, make_interpolator
 from ikns.nullspace.map.score import explained_share
 from ikns.numerics.subspace import principal_components
@@ -94,7 +95,7 @@ class NullSpaceMap(EstimatorBase):
     centers_ : (P, 3) array
         PCA points in use, m.
     directions_ : (P, d, n) array
-        Z; orthonormal rows for each point.
+        Z; orthonormal rows for each point, but see `fit` for motions.
     lower_, upper_ : (P, d) array
         m and M, rad.
     counts_ : (P,) integer array
@@ -166,6 +167,7 @@ class NullSpaceMap(EstimatorBase):
         *,
         velocity: ArrayLike | None = None,
         groups: ArrayLike | None = None,
+        motions: Motions | None = None,
     ) -> Self:
         """Learn the map from samples whose hand is still.
 
@@ -180,13 +182,20 @@ class NullSpaceMap(EstimatorBase):
         groups : (N,) integer array, optional
             Which samples are known to be of one place, see
             :meth:`ikns.nullspace.clustering.BoundingBoxKMeans.fit`.
+        motions : callable, optional
+            From the mean joint vector (n,) of a point to the `n_dof` motions (n_dof, n)
+            that the outputs shall read. Z are then the rows within the leading
+            components that rise with their own motion and do not see the others
+            (:func:`ikns.nullspace.map.dual.dual_rows`), instead of these components;
+            of unit length, not orthogonal.
 
         Raises
         ------
         InvalidInput, ValueError
             When a parameter is out of range, or samples are not finite or do not match.
         NotEnoughData
-            With fewer samples than points, too few usable points, or points in a plane.
+            With fewer samples than points, too few usable points, or points in a plane;
+            when a point does not show one of the motions.
         """
         from ikns.nullspace.clustering import BoundingBoxKMeans
 
@@ -211,15 +220,27 @@ class NullSpaceMap(EstimatorBase):
         moving = np.any(ratios, axis=1)
         n_components = np.where(moving, 1 + short.sum(axis=1), 0)
         warn_of_components(centers, n_components, self.n_dof)
-        keep = n_components if self.n_dof == 1 else np.where(moving, self.n_dof, 0)
-        self.directions_, self.lower_, self.upper_ = assemble(
-            centers,
-            [part[:k] for (part, _), k in zip(parts, keep, strict=True)],
-            [ratio[:k] for ratio, k in zip(ratios, keep, strict=True)],
-            [q[r] for r in rows],
-            settings=settings,
-            edges=interpolator.edges,
-        )
+        samples = [q[r] for r in rows]
+        if motions is not None:
+            keep = np.where(moving, np.maximum(n_components, self.n_dof), 0)
+            self.directions_, self.lower_, self.upper_ = assemble_dual(
+                centers,
+                [part[:k] for (part, _), k in zip(parts, keep, strict=True)],
+                samples,
+                motions,
+                n_dof=self.n_dof,
+                quantiles=settings.quantiles,
+            )
+        else:
+            keep = n_components if self.n_dof == 1 else np.where(moving, self.n_dof, 0)
+            self.directions_, self.lower_, self.upper_ = assemble(
+                centers,
+                [part[:k] for (part, _), k in zip(parts, keep, strict=True)],
+                [ratio[:k] for ratio, k in zip(ratios, keep, strict=True)],
+                samples,
+                settings=settings,
+                edges=interpolator.edges,
+            )
         self.centers_, self.counts_ = centers, found.counts_[used]
         self.all_centers_, self.all_counts_ = found.cluster_centers_, found.counts_
         self.labels_ = np.full(len(x), -1)
