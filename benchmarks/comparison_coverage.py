@@ -52,18 +52,18 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap
-from ikns.simulation import Unsteadiness, simulate_protocol, virtual_subject
-from ikns.simulation.arm import GIRDLE_FOLLOW, ArmKinematics
-from ikns.simulation.movement import MovementPlan, explore, join, reach, reach_samples
-from ikns.simulation.places import (
-    BOX_HIGH,
-    BOX_LOW,
-    VERTEX_SD,
-    Place,
-    box_points,
-    explored_places,
+from ikns.simulation import (
+    Protocol,
+    Unsteadiness,
+    simulate_protocol,
+    virtual_subject,
 )
-from ikns.simulation.protocol_body import RESTING, STATIC_SD, both_arms
+from ikns.simulation.arm import ArmKinematics
+from ikns.simulation.habitual_places import habitual_somewhere, reach_by_joints
+from ikns.simulation.movement import MovementPlan, explore, join, reach_samples
+from ikns.simulation.places import Place
+from ikns.simulation.posture_habits import PostureHabits
+from ikns.simulation.protocol_body import ProtocolBody, draw_protocol_body
 from ikns.simulation.wander import tremor, wander
 from ikns.view.render import png
 from ikns.view.style import GREY, INK, RED, figure_style, new_figure
@@ -81,79 +81,18 @@ ROWS = (
 )
 
 
-def habits(
-    arm: ArmKinematics, seed: int, positions_in_record: np.ndarray
-) -> tuple[np.ndarray, list[Place], np.ndarray]:
-    """Draw about a person what :func:`simulate_protocol` draws first."""
-    of_person = np.random.default_rng(seed).spawn(6)[0]
-    girdle_rest = of_person.normal(0.0, np.radians([3.0, 2.0]))
-    of_person.uniform(-np.pi, np.pi)
-    of_person.normal(0.0, STATIC_SD, len(arm.skeleton.joint_names))
-    sitting = both_arms(arm.skeleton, RESTING)
-    near = of_person.normal(0.0, VERTEX_SD, (POINTS, 3))
-    positions = box_points([arm], sitting, n=POINTS, near=near)
-    np.testing.assert_array_equal(positions[0], positions_in_record)  # in step with it
-    places = explored_places(
-        arm,
-        sitting,
-        positions[0],
-        rng=of_person,
-        girdle_rest=girdle_rest,
+def drawn_body(run: Protocol, arm: ArmKinematics) -> ProtocolBody:
+    """Draw again what :func:`simulate_protocol` drew about a person first."""
+    body = draw_protocol_body(
+        run.subject,
+        [arm],
+        n_points=POINTS,
         girdle_follow=0.0,
+        habits=run.habits,
+        rng=np.random.default_rng(run.settings["seed"]).spawn(7)[0],
     )
-    return sitting, places, girdle_rest
-
-
-def random_places(
-    arm: ArmKinematics,
-    sitting: np.ndarray,
-    girdle_rest: np.ndarray,
-    rng: np.random.Generator,
-) -> list[Place]:
-    """Draw places as :func:`ikns.simulation.places.random_place` does, all at a time.
-
-    Newton's method on the hand's position and the elbow's swivel; a place whose posture
-    is not found within the joint limits is drawn no further.
-    """
-    body, side, n = arm.skeleton, SIDES.index(SIDE), REACHES + 1
-    lengths = body.segment_lengths
-    full = sum(lengths[f"{SIDE}_{s}"] for s in ("upper_arm", "forearm", "hand"))
-    goal = arm.shoulder(sitting) + full * rng.uniform(BOX_LOW, BOX_HIGH, (n, 3))
-    swivel = rng.uniform(np.radians(15), np.radians(65), n)
-    wrist = rng.normal(0.0, np.radians([20, 8, 5]), (n, 3))
-
-    def bodies(four: np.ndarray) -> np.ndarray:
-        follow = np.column_stack(
-            [np.sin(four[:, 1]), 1 - np.cos(four[:, 0]) * np.cos(four[:, 1])]
-        )
-        girdle = girdle_rest + GIRDLE_FOLLOW * follow
-        angles = np.tile(sitting, (len(four), 1))
-        angles[:, arm.columns] = np.hstack([girdle, four, wrist])
-        return angles
-
-    def miss(four: np.ndarray) -> np.ndarray:
-        angles = bodies(four)
-        off = body.hands_in_thorax(angles)[0][:, side] - goal
-        turned = 0.2 * (body.swivel(angles)[:, side] - swivel)
-        return np.column_stack([off, turned])
-
-    four, h = np.tile([0.4, 0.6, 0.0, 1.4], (n, 1)), 1e-6
-    for _ in range(30):
-        columns = [(miss(four + e) - miss(four - e)) / (2 * h) for e in h * np.eye(4)]
-        step = np.linalg.solve(np.stack(columns, axis=2), -miss(four)[:, :, None])
-        step = step[:, :, 0]
-        longest = np.abs(step).max(axis=1, keepdims=True)
-        four += step * np.minimum(1.0, 0.3 / np.maximum(longest, 1e-300))
-    angles = bodies(four)
-    low, high = arm.lower[2:6] + 0.05, arm.upper[2:6] - 0.05
-    found = (np.abs(miss(four)).max(axis=1) < 1e-6) & (
-        (low < four) & (four < high)
-    ).all(axis=1)
-    x, R = (each[:, side] for each in body.hands_in_thorax(angles))
-    return [
-        Place(angles[i, arm.columns], x[i], R[i], float(swivel[i]))
-        for i in np.flatnonzero(found)
-    ]
+    np.testing.assert_array_equal(body.positions[0], run.places)  # in step with it
+    return body
 
 
 def carried_out(
@@ -212,15 +151,21 @@ def true_slopes(
 def true_crosstalk(
     learned: NullSpaceMap,
     arm: ArmKinematics,
-    sitting: np.ndarray,
-    girdle_rest: np.ndarray,
+    body: ProtocolBody,
+    habits: PostureHabits,
     rng: np.random.Generator,
 ) -> Crosstalk:
     """Crosstalk on many natural reaches of the true body."""
-    stops = random_places(arm, sitting, girdle_rest, rng)
+    sitting = body.sitting
+    stops = [
+        habitual_somewhere(
+            arm, sitting, habits=habits, girdle_rest=body.girdle_rest, rng=rng
+        )
+        for _ in range(REACHES + 1)
+    ]
     reaches = [
-        reach(start, end, n=reach_samples(start, end, rate=TRUE_RATE))
-        for start, end in pairwise(stops)
+        reach_by_joints(arm, sitting, *ends, n=reach_samples(*ends, rate=TRUE_RATE))
+        for ends in pairwise(stops)
     ]
     plan = join(reaches)
     angles = carried_out(arm, sitting, plan, rng)
@@ -232,7 +177,7 @@ def true_crosstalk(
 
 def reported(
     seed: int, resamples: int
-) -> tuple[NullSpaceComparison, Crosstalk, NullSpaceMap, ArmKinematics, np.ndarray]:
+) -> tuple[NullSpaceComparison, Crosstalk, NullSpaceMap, Protocol]:
     """Return what the recordings alone say about a virtual subject."""
     person = virtual_subject(seed)
     run = simulate_protocol(
@@ -261,20 +206,22 @@ def reported(
     )
     reaching = MarkerIK(subject.skeleton).track(run.free.recording, chain=CHAIN)
     across = motion_crosstalk(learned, reaching, resamples=resamples, seed=seed)
-    return found, across, learned, ArmKinematics(person.skeleton, SIDE), run.places
+    return found, across, learned, run
 
 
 def one_subject(seed: int, resamples: int) -> dict[str, list[list[float]]]:
     """Return the reported value, low, high, and the truth of each row."""
-    found, across, learned, arm, positions = reported(seed, resamples)
-    sitting, places, girdle_rest = habits(arm, seed, positions)
+    found, across, learned, run = reported(seed, resamples)
+    arm = ArmKinematics(run.subject.skeleton, SIDE)
+    body = drawn_body(run, arm)
+    (places,) = body.places
     rng = np.random.default_rng([seed, 1])
     order = [
         int(np.linalg.norm([p.position - center for p in places], axis=1).argmin())
         for center in learned.centers_[found.points]
     ]
-    true = [true_slopes(learned, arm, sitting, places[k], rng) for k in order]
-    truly = true_crosstalk(learned, arm, sitting, girdle_rest, rng)
+    true = [true_slopes(learned, arm, body.sitting, places[k], rng) for k in order]
+    truly = true_crosstalk(learned, arm, body, run.habits, rng)
     rows: dict[str, list[list[float]]] = {}
     for i, name in enumerate(("leak", "turn")):
         lengths = np.array([np.linalg.norm(slope[i]) for slope in true])

@@ -32,7 +32,6 @@ Map: the null space and its range where the hand is
 Control: from live markers to the control signal c
     open_source                  connect to live markers, or replay a file
     FrameSolver                  joint angles and c of one frame
-    RateControl                  c from null-space motion instead of posture
     run                          the control loop, from a source to a finger
     read_run                     read a recorded run
     replay_run                   compute a recorded run again, bit for bit

@@ -30,7 +30,6 @@ from .nullspace.interpolation import (
 # Control
 from .live.stream import open_source as open_source
 from .live.control import FrameSolver as FrameSolver
-from .live.control import RateControl as RateControl
 from .live.runtime import run as run
 from .live.session import read_run as read_run
 from .live.runtime import replay_run as replay_run

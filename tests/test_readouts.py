@@ -208,8 +208,6 @@ def test_control_writes_what_the_method_reads():
         found = control_table(subject, motion, method=method)
         c = subject.readout(method).control_signal(subject.skeleton, motion)
         np.testing.assert_array_equal(found.rows[:, 1], np.clip(c, 0, 1))
-    with pytest.raises(InvalidInput, match="rate mode moves on the paper's map"):
-        control_table(subject, motion, mode="rate", method="intent")
 
 
 def test_natural_movement_that_covers_nothing_is_refused():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -30,12 +30,6 @@ def control(
     recording: RecordingFile,
     subject: SubjectFolder,
     out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("control.csv"),
-    mode: Annotated[
-        Literal["position", "rate"],
-        typer.Option(
-            help="c from the posture, as in the paper, or from null-space motion."
-        ),
-    ] = "position",
     method: AnyMethod = "paper",
     from_: From = None,
     to: To = None,
@@ -66,7 +60,7 @@ def control(
             measured=calibrated.measured,
             progress=partial(report, recording.name),
         )
-    found = control_table(calibrated, motion, mode=mode, method=method)
+    found = control_table(calibrated, motion, method=method)
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
     show(

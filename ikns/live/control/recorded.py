@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ikns.calibration.subject import Subject
-from ikns.errors import InvalidInput
-from ikns.live.control.rate import RateControl
 from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
 from ikns.nullspace.readout import Method
@@ -41,7 +39,6 @@ def control_table(
     subject: Subject,
     motion: Motion,
     *,
-    mode: Literal["position", "rate"] = "position",
     method: Method = "paper",
 ) -> ControlTable:
     """Compute the control signal of a recording.
@@ -51,31 +48,18 @@ def control_table(
     subject : Subject
     motion : Motion
         Of that subject.
-    mode : {"position", "rate"}
-        c from the posture, as in the paper, or from null-space motion. In rate mode c
-        is held while the arm is not in sight, is NaN only before it was first seen,
-        and counts as clipped while it is at 0 or 1.
     method : {"paper", "proximal", "intent"}
         What reads c off the posture, see :mod:`ikns.nullspace.readout`.
 
     Raises
     ------
     InvalidInput
-        When the subject was calibrated without the method, or rate mode is to go on
-        another map than the paper's.
+        When the subject was calibrated without the method.
     """
-    if mode == "rate" and method != "paper":
-        raise InvalidInput(
-            f"rate mode moves on the paper's map, found the method '{method}'; choose "
-            "one of the two."
-        )
-    learned, chain = subject.null_space_map, subject.chain
+    chain = subject.chain
     readout = subject.readout(method)
     place = motion.task_position(chain)
-    if mode == "rate":
-        raw = RateControl(learned, subject.skeleton, chain).track(motion)
-    else:
-        raw = readout.control_signal(subject.skeleton, motion)
+    raw = readout.control_signal(subject.skeleton, motion)
     raw = raw.reshape(len(place), -1)
     c = np.clip(raw, 0.0, 1.0)
     inside = readout.inside(subject.skeleton, motion)
@@ -84,7 +68,7 @@ def control_table(
         [motion.time, c, motion.hand_speed(chain), inside, motion.residual]
     )
     known = np.isfinite(raw).all(axis=1)
-    clipped = (raw <= 0) | (raw >= 1) if mode == "rate" else (raw < 0) | (raw > 1)
+    clipped = (raw < 0) | (raw > 1)
     rejections = count_rejections(motion, chain)
     summary = {
         "frames": len(c),
