@@ -24,11 +24,10 @@ from ikns.recording.recording import Recording
 GOAL = 0.05
 #: Each place is held for so long, and so far apart in time, s (`recorded`).
 HELD, APART = 4.0, 5.0
-#: Held places by protocol: those above and below the middle of the box, two of its
-#: corners, all.
-PLACES = {"full": range(10), "four places": (8, 9, 0, 7), "short": (8, 9)}
+#: Held places by protocol: all, and those above and below the middle of the box.
+PLACES = {"full": range(10), "short": (8, 9)}
 #: Ordinary movement by protocol, s.
-SECONDS = {"full": 60.0, "four places": 20.0, "short": 20.0}
+SECONDS = {"full": 60.0, "short": 20.0}
 
 
 def part(recording: Recording, start: float, seconds: float) -> Recording:
