@@ -2,13 +2,14 @@
 
 Simulated people of `ikns.simulation` are calibrated; on another day the same body does
 the same movements with the old markers and with new ones, whose clusters are placed
-with 10 mm of standard deviation per axis, and landmarks with what the row says. Error:
+with 10 mm of standard deviation per axis, and landmarks with what the row says. Their
+habits, the natural posture and the scatter about it, are drawn from real people. Error:
 c read in the new wearing less c as the calibration reads the same movement in the old
 one, over all still samples at ten places.
 
 - as if nothing had happened: the old markers' places for the new ones;
 - new static trial: the body scaled anew, the map kept;
-- rewear: `ikns.calibration.rewear`, with a static trial and 20 s of movement;
+- rewear: `ikns.rewear`, with a static trial and 20 s of movement;
 - without shift: the same, the range of intent as it was.
 """
 
@@ -16,18 +17,19 @@ import argparse
 import dataclasses
 import platform
 import warnings
+from typing import Any
 
 import numpy as np
 
 import ikns
 from ikns.body.marker_set import MarkerSet
-from ikns.calibration import rewear
 from ikns.calibration.subject import Subject
 from ikns.errors import IknsError
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import MapWarning, still_mask
 from ikns.nullspace.readout import METHODS
 from ikns.simulation import VirtualSubject
+from ikns.simulation.posture_habits import draw_posture_habits
 
 #: Placement of clusters, and of landmarks by row, m per axis.
 CLUSTERS, LANDMARKS = 10e-3, (2e-3, 5e-3)
@@ -55,7 +57,8 @@ def worn_as_before(old: Subject, recording: ikns.Recording) -> Motion:
 
 def errors(seed: int, landmarks: float, *, quick: bool) -> dict[tuple[str, str], float]:
     """Root mean square error of c by (way, method) for one person."""
-    protocol = {
+    protocol: dict[str, Any] = {
+        "habits": draw_posture_habits(np.random.default_rng([seed, 2])),
         "free_seconds": 5.0 if quick else 20.0,
         "point_seconds": 2.0 if quick else 4.0,
         "rate": 50.0,
@@ -75,7 +78,7 @@ def errors(seed: int, landmarks: float, *, quick: bool) -> dict[tuple[str, str],
     before = worn_as_before(old, days[0].points.recording)
     static, points = days[1].static.recording, days[1].points.recording
     anew, _ = ikns.scale(ikns.Skeleton.load(), static)
-    new = rewear(old, static, [days[1].free.recording])
+    new = ikns.rewear(old, static, [days[1].free.recording])
     unshifted = dataclasses.replace(new, readouts=old.readouts)
     ways = {
         "as if nothing had happened": old,

@@ -23,6 +23,8 @@ Motion: joints over time
 Map: the null space and its range where the hand is
     check_recordings             what is wrong with recordings, before they are used
     calibrate                    static trial and explorations in, a subject out
+    rewear                       a subject whose markers were put on again
+    method_summary               what c of each method does where nothing is meant
     Subject                      skeleton, map and report of a person
     NullSpaceMap                 the map, learned from still samples
     null_space_samples           the still samples of a motion

@@ -19,6 +19,8 @@ from .motion.motion import Motion as Motion
 # Map
 from .calibration.judge.recordings import check_recordings as check_recordings
 from .calibration import calibrate as calibrate
+from .calibration.rewear import rewear as rewear
+from .calibration.method_summary import method_summary as method_summary
 from .calibration.subject import Subject as Subject
 from .nullspace.map import NullSpaceMap as NullSpaceMap
 from .nullspace.map import null_space_samples as null_space_samples

@@ -11,7 +11,7 @@ from test_cli_calibrate_live import RATE, film, live
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.subject import Subject
 from ikns.cli import main
-from ikns.live.calibration import Judge, ProtocolStep, paper_steps
+from ikns.live.calibration import Judge, ProtocolStep, TargetPoints, paper_steps
 from ikns.live.calibration.natural_verdict import half_explored, judge_natural
 from ikns.live.calibration.point_verdict import judge_point
 from ikns.recording.recording import Recording
@@ -128,6 +128,16 @@ def test_the_short_protocol_takes_movement_and_two_places(tmp_path, capfd):
     assert main(by_hand) == 0
     one, two = (Subject.load(tmp_path / name) for name in ("new", "other"))
     assert one.readout("intent").table() == two.readout("intent").table()
+
+
+def test_two_points_lie_above_and_below_the_middle():
+    rng = np.random.default_rng(0)
+    explored = rng.uniform([0.1, -0.4, 0.0], [0.5, 0.2, 0.3], (4000, 3))
+    two = TargetPoints(explored, 2).positions
+    # The nearest of 4000 points in 72 liters is within 5 cm.
+    assert np.allclose(two[0], [0.3, 0.2, 0.15], atol=0.05)
+    assert np.allclose(two[1], [0.3, -0.4, 0.15], atol=0.05)
+    assert len(TargetPoints(explored, 1).positions) == 1
 
 
 @pytest.mark.parametrize("seconds", [0.0, 5.0])

@@ -95,8 +95,9 @@ def test_a_half_explored_place_is_asked_for_again():
 def test_a_place_of_another_posture_is_no_half_explored_one():
     wrist, swivel, which = planted(2)
     intent = IntentMap(8).fit(wrist, swivel + 0.4 * (which == 3))
-    # 0.4 rad of a range of 1.2, of which the mean takes an eighth.
-    assert np.isclose(intent.scatter_.max(), 0.4 * 7 / 8 / 1.2, atol=1e-6)
+    # 0.4 rad of a range of 1.2; one place of eight moves the ends of all by nothing.
+    assert np.isclose(intent.scatter_.max(), 0.4 / 1.2, atol=1e-6)
+    assert np.allclose(intent.ends_, (-0.3, 0.9), atol=1e-6)
     with pytest.warns(MapWarning, match="1 of 8 .*another natural posture.*movement"):
         intent.warn_of_scatter()
 

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 from ikns.errors import InvalidInput
 from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.nullspace.readout import IntentMap
-from ikns.nullspace.readout.ends import local_quadratic, swept_ends
+from ikns.nullspace.readout.ends import local_quadratic, robust_mean, swept_ends
 
 CORNERS = 0.3 * np.array(list(np.ndindex(2, 2, 2))) + [0.1, -0.3, 0.0]
 TIME = np.arange(500) / 100
@@ -122,3 +122,26 @@ def test_intent_has_gain_one_where_times_are_known():
     assert c["plain"][0] < 0.9
     with pytest.raises(InvalidInput, match="4000 finite times"):
         IntentMap(8).fit(wrist, measured, time=time[:5])
+
+
+@given(st.integers(0, 1000), st.floats(-1e3, 1e3))
+@settings(max_examples=30)
+def test_the_mean_over_places_forgets_one_that_is_far_off(seed, far):
+    rng = np.random.default_rng(seed)
+    agreeing = rng.normal(size=9)
+    found = robust_mean([*agreeing, 100.0 + abs(far)])
+    assert np.isclose(found, robust_mean([*agreeing, 1e6]), atol=1e-9)
+    # Nine normal values: their mean is known to a third, twice to be safe, and the
+    # median beside it.
+    assert abs(found - agreeing.mean()) < 1.0
+
+
+@given(arrays(float, st.integers(1, 12), elements=st.floats(-1e3, 1e3)))
+def test_the_robust_mean_lies_among_the_values_and_moves_with_them(values):
+    found = robust_mean(values)
+    assert values.min() - 1e-9 <= found <= values.max() + 1e-9
+    assert np.isclose(robust_mean(values + 5.0), found + 5.0, atol=1e-6) or (
+        # Rounding may turn a spread of exactly zero into one that is not.
+        np.median(np.abs(values - np.median(values))) < 1e-9
+    )
+    assert robust_mean([values[0]] * 3) == values[0]

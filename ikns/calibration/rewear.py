@@ -32,9 +32,9 @@ from ikns.nullspace.readout import IntentMap, Readout
 from ikns.nullspace.readout.intent import wrapped
 from ikns.recording.recording import Recording
 
-#: Spread of what a new wearing leaves in the swivel after the fit, rad: 1 to 2 deg on
+#: Spread of what a new wearing leaves in the swivel after the fit, rad: 0.6 to 1 deg on
 #: simulated people (benchmarks/new_wearing.py).
-WEARING_SD = np.radians(2.0)
+WEARING_SD = np.radians(0.8)
 #: A stretch of movement that is independent of the next, s: about a reach.
 _STRETCH = 1.5
 

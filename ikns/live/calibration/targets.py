@@ -43,7 +43,8 @@ def target_points(explored: ArrayLike, box: BoundingBox, n: int) -> Array:
 
     The points on the box are its vertices, then the centers of its upper and lower face
     (Lisini Baldi et al., arXiv 2012.03600). As the hand cannot reach every corner of a
-    box around its workspace, the nearest explored positions are used.
+    box around its workspace, the nearest explored positions are used. One or two points
+    are the centers: corners are the places that ordinary movement teaches least.
 
     Parameters
     ----------
@@ -59,7 +60,9 @@ def target_points(explored: ArrayLike, box: BoundingBox, n: int) -> Array:
     (n, 3) array
     """
     places = np.asarray(explored, dtype=np.float64)
-    wanted = box_surface_points(box, n)
+    wanted = (
+        box_surface_points(box, n) if n > 2 else box_surface_points(box, 10)[8:][:n]
+    )
     nearest = [int(np.argmin(((places - w) ** 2).sum(axis=1))) for w in wanted]
     return places[nearest]
 

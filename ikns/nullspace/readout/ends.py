@@ -30,6 +30,10 @@ _JUMP = 5.0
 #: a sixth of its spread.
 _DRAWS = 40
 
+#: Of the biweight mean; it converges in about ten rounds.
+_TUKEY, _ROUNDS = 4.685, 100
+_EPS = float(np.finfo(float).eps)
+
 
 class SweptEnds(NamedTuple):
     """Ends of a sweep, and the noise of a single sample, in the unit of the values."""
@@ -94,6 +98,32 @@ def swept_ends(
 def swept_ends_of(values: Array, time: Array, rows: Sequence[Indices]) -> Array:
     """Return the ends for several sets of rows of a series, (P, 2)."""
     return np.array([swept_ends(values[row], time[row])[:2] for row in rows])
+
+
+def robust_mean(values: ArrayLike) -> float:
+    """Tukey's biweight mean: the mean of what agrees, outliers left out.
+
+    Weights are ``(1 - r^2)^2`` with r the distance in units of 4.685 robust standard
+    deviations (Beaton and Tukey 1974), 0 beyond; of normal values it is as good as the
+    mean of 95 % of them.
+
+    Examples
+    --------
+    >>> robust_mean([1.0, 1.1, 0.9, 1.0, 7.0])
+    1.0
+    """
+    x = np.asarray(values, dtype=np.float64)
+    middle = float(np.median(x))
+    for _ in range(_ROUNDS):
+        # 1.4826 median deviations are a standard deviation of normal values.
+        width = _TUKEY * 1.4826 * float(np.median(np.abs(x - middle)))
+        if width <= _EPS * float(np.abs(x).max()):
+            break  # most are the same
+        weight = np.clip(1 - ((x - middle) / width) ** 2, 0, None) ** 2
+        before, middle = middle, float(weight @ x / weight.sum())
+        if abs(middle - before) <= 1e-12 * width:
+            break
+    return middle
 
 
 def checked_times(time: ArrayLike, n: int) -> Array:

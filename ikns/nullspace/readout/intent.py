@@ -3,9 +3,10 @@
     c = (s - s_nat(w) - a) / (b - a)
 
 s is the hinge swivel (:mod:`ikns.nullspace.hinge_swivel`), s_nat the natural posture at
-the wrist center w (:mod:`ikns.nullspace.natural_posture`), and a and b are the means
+the wrist center w (:mod:`ikns.nullspace.natural_posture`), and a and b are robust means
 over the held places of the lower and upper end of s - s_nat. Two numbers for the whole
-range: fields through ends that scatter would put this scatter back into c. Where times
+range: fields through ends that scatter would put this scatter back into c. A place at
+which the natural posture is far off, or that was half explored, has no say. Where times
 are known, the ends are those of the motion without its noise
 (:mod:`ikns.nullspace.readout.ends`).
 """
@@ -24,7 +25,7 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.estimator_base import EstimatorBase
 from ikns.nullspace.map.checks import MapWarning, checked_rows, format_point
 from ikns.nullspace.natural_posture import NaturalPosture
-from ikns.nullspace.readout.ends import checked_times, swept_ends_of
+from ikns.nullspace.readout.ends import checked_times, robust_mean, swept_ends_of
 
 #: A place whose ends are off the mean by more than this share of the range is named.
 _HALF_EXPLORED = 0.1
@@ -276,7 +277,7 @@ class IntentMap(EstimatorBase):
 
     def _finish(self) -> None:
         """Set the mean ends, and name places that were half explored."""
-        a, b = float(self.lower_.mean()), float(self.upper_.mean())
+        a, b = robust_mean(self.lower_), robust_mean(self.upper_)
         if not b - a > 0:
             raise NotEnoughData(
                 "expected held places at which the elbow turns, found none "
