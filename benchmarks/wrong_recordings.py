@@ -202,7 +202,7 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, help="random pairs a set; default: all")
     parser.add_argument("--set", choices=["oxford24", "ue_adl"], help="only this set")
     parser.add_argument("--mode", choices=list(MODES), help="only this one")
-    parser.add_argument("--person", default="ADL005")
+    parser.add_argument("--person", nargs="+", default=["ADL005"], help="of ue_adl")
     parser.add_argument("--task", default="CR1")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
@@ -217,7 +217,7 @@ def main() -> None:
     if options.set != "ue_adl":
         people.append(simulated(options.seed))
     if options.set != "oxford24" and folder.is_dir():
-        people.append(real(folder, options.person, options.task))
+        people += [real(folder, name, options.task) for name in options.person]
     result: dict = {"exchanges": [], "clean": [], "twenty_of_60_s": {}}
     for person in people:
         pairs = pairs_of(person)
@@ -227,6 +227,8 @@ def main() -> None:
             if options.mode in (None, mode):
                 cases = [judge(person, a, b, share, rng) for a, b in pairs]
                 result["exchanges"].append(_summary(person, mode, cases))
+        if person.marker_set in result["twenty_of_60_s"]:
+            continue
         result["twenty_of_60_s"][person.marker_set] = speed(
             person, count=2 if options.quick else 20, seconds=60.0
         ) * (10 if options.quick else 1)

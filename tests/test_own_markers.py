@@ -200,3 +200,22 @@ def test_a_set_needs_landmarks_and_markers_that_are_seen(
     blind = Recording(static.time, hidden, static.labels)
     with pytest.raises(MarkerMismatch, match="RELB is never seen"):
         own_marker_set(Skeleton.load(), blind, answers, name="mine")
+
+
+@pytest.mark.parametrize("first", ["STRN", "CLAV"])
+def test_a_sternum_marker_alone_may_be_anywhere_on_the_bone(first: str) -> None:
+    # Vicon's STRN is the xiphoid, beside CLAV; others wear STRN alone, near its top.
+    labels = [first, *({"STRN", "CLAV"} - {first})]
+    found = usual_site("Ann:STRN", None, [f"Ann:{label}" for label in labels])
+    assert found is not None
+    assert found.name == "xiphoid"
+    alone = usual_site("STRN", None, ["RSHO1", "STRN"])
+    assert alone is not None
+    assert alone.position is not None
+    ends = [site(name).position for name in ("sternal_notch", "xiphoid")]
+    low, high = sorted(place[1] for place in ends if place is not None)
+    middle, spread = alone.position[1], alone.placement_sd[1]
+    # Both ends are likely places.
+    assert middle - 2 * spread < low
+    assert high < middle + 2 * spread
+    assert usual_site("XIPH").name == "xiphoid"

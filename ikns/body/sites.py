@@ -9,7 +9,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -38,6 +38,8 @@ class Site:
     placement_sd: tuple[float, float, float] | None  # m
     labels: tuple[str, ...]  # usual ones, without a letter for the side
     side: str  # "right", "left" or ""
+    labels_beside: tuple[str, ...] = ()  # usual ones if a marker is on the next
+    beside: str = ""  # name of another place
 
     def marker(self, label: str, *, static_only: bool) -> Marker:
         """Return a marker here; the position must be known."""
@@ -78,6 +80,8 @@ def _site(name: str, row: Mapping[str, Any], side: str) -> Site:
         spread,
         tuple(row["labels"]),
         side,
+        tuple(row.get("labels_beside", ())),
+        row.get("beside", ""),
     )
 
 
@@ -94,21 +98,34 @@ def site(name: str) -> Site:
     return known[key]
 
 
-def usual_site(label: str, answered: Mapping[str, str] | None = None) -> Site | None:
+def usual_site(
+    label: str,
+    answered: Mapping[str, str] | None = None,
+    others: Iterable[str] = (),
+) -> Site | None:
     """Return where a marker of this label usually sits; None where that is open.
 
     `answered` are places by label: what was said of the same label on the other side
-    comes first.
+    comes first. `others` are labels worn with it: the sternum's is at the lower end of
+    the bone where another one is at the upper end, else anywhere on it.
 
     >>> usual_site("Anna:RELB").name, usual_site("LUAR3").name, usual_site("XYZ")
     ('right_lateral_epicondyle', 'left_upper_arm', None)
     >>> usual_site("LKNOB", {"RKNOB": "right_knuckle_3"}).name
     'left_knuckle_3'
+    >>> usual_site("STRN").name, usual_site("STRN", others=["CLAV"]).name
+    ('sternum', 'xiphoid')
     """
     bare = label.rpartition(":")[2].strip()
     if twin := _mirrored(bare, answered or {}):
         return twin
-    middle = [s for s in sites().values() if not s.side]
+    middle = [
+        replace(s, labels=s.labels + s.labels_beside)
+        if s.beside and _is_worn(sites()[s.beside], answered or {}, others)
+        else s
+        for s in sites().values()
+        if not s.side
+    ]
     if found := _named(bare, middle):
         return found
     for side, rest in _readings(bare):
@@ -116,6 +133,14 @@ def usual_site(label: str, answered: Mapping[str, str] | None = None) -> Site | 
         if found := _named(rest, own):
             return found
     return None
+
+
+def _is_worn(place: Site, answered: Mapping[str, str], others: Iterable[str]) -> bool:
+    """Whether a marker is on a place, as was said or as its label says."""
+    said = {name.partition(" ")[0] for name in answered.values()}
+    usual = {name.casefold() for name in place.labels}
+    bare = {other.rpartition(":")[2].strip().casefold() for other in others}
+    return place.name in said or bool(usual & bare)
 
 
 def _named(label: str, among: Iterable[Site]) -> Site | None:

@@ -18,7 +18,7 @@ def ask_sites(labels: Sequence[str], *, guess: bool) -> dict[str, str]:
     answers: dict[str, str] = {}
     if guess:
         for label in labels:
-            if found := usual_site(label, answers):
+            if found := usual_site(label, answers, labels):
                 answers[label] = found.name
         return answers
     _say(
@@ -27,7 +27,7 @@ def ask_sites(labels: Sequence[str], *, guess: bool) -> dict[str, str]:
         "trials only."
     )
     for label in labels:
-        usual = usual_site(label, answers)
+        usual = usual_site(label, answers, labels)
         default = usual.name if usual else "skip"
         while True:
             said = _answer(f"{label} [{default}]: ") or default

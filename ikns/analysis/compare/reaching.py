@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.reaches import find_reaches
-from ikns.numerics.bootstrap import block_counts, block_length, student_interval
+from ikns.numerics.bootstrap import block_counts, blocks_for, student_interval
 
 Array = NDArray[np.float64]
 
 #: Neighboring reaches share the rest between them, so their changes are correlated, by
 #: 0.22 for normally distributed c at unrelated rests. Then G / g(0) of
-#: :func:`ikns.numerics.bootstrap.block_length` is 0.3, and three reaches lose a tenth
+#: :func:`ikns.numerics.bootstrap.blocks_for` is 0.3, and three reaches lose a tenth
 #: of the variance; a dozen reaches are too few to estimate that.
 _LEAST_BLOCK = 3
 
@@ -110,12 +110,14 @@ def crosstalk(
     intervals = [(np.nan, np.nan)] * 2
     if resamples and R >= 6 and mean > 0:
         scores = np.stack([size, size - ratio * distance], axis=1)
-        length = max(_LEAST_BLOCK, block_length(scores))
+        length, count = blocks_for(scores)
+        if length < _LEAST_BLOCK:
+            length, count = _LEAST_BLOCK, R / _LEAST_BLOCK
         counts = block_counts(R, length, resamples, np.random.default_rng(seed))
         with np.errstate(divide="ignore"):
             logs = np.log([counts @ size / R, (counts @ size) / (counts @ distance)])
         for i, value in enumerate((mean, ratio)):
-            ends = student_interval(np.log(value), logs[i], R / length, level=level)
+            ends = student_interval(np.log(value), logs[i], count, level=level)
             intervals[i] = (float(np.exp(ends[0])), float(np.exp(ends[1])))
     return Crosstalk(
         reaches=found,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.numerics.bootstrap import block_counts, block_length
+from ikns.numerics.bootstrap import block_counts, blocks_for
 
 Array = NDArray[np.float64]
 
@@ -16,8 +16,8 @@ class Moments(NamedTuple):
     """Mean and scatter of joint vectors: as recorded, then in B resamples.
 
     `counts` (1 + B, N) is how often each sample counts, ones in the first row;
-    `scatter` the covariance with divisor N, rad^2; `blocks` how many fit into the
-    samples, NaN without resamples.
+    `scatter` the covariance with divisor N, rad^2; `blocks` how many the samples are
+    worth, NaN without resamples.
     """
 
     counts: Array
@@ -46,10 +46,10 @@ def draw(
 ) -> tuple[Array, float]:
     """Draw blocks as long as these scores (N, m) ask for.
 
-    How often each sample was drawn, (B, N), and how many blocks fit into the samples.
+    How often each sample was drawn, (B, N), and how many blocks the samples are worth.
     """
-    n, length = len(scores), block_length(scores)
-    return block_counts(n, length, resamples, rng), n / length
+    length, count = blocks_for(scores)
+    return block_counts(len(scores), length, resamples, rng), count
 
 
 def _covariances(q: Array, counts: Array) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from ikns.analysis.ucm.split import VarianceSplit, half_log_ratio, parts
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.numerics.bootstrap import block_counts, block_length, student_interval
+from ikns.numerics.bootstrap import block_counts, blocks_for, student_interval
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def confidence_interval(
     method : {"jackknife", "bootstrap"}
     block : int, optional
         How many neighbors are drawn together. Default: as the samples' own correlation
-        asks for, see :func:`ikns.numerics.bootstrap.block_length`.
+        asks for, see :func:`ikns.numerics.bootstrap.blocks_for`.
     overall : bool
         Of the mean of dVz over all (...) instead of each.
     confidence : float
@@ -80,7 +80,10 @@ def confidence_interval(
     if method == "jackknife":
         counts = 1.0 - np.eye(n)
     else:
-        length = block_length(_influence(split)) if block is None else block
+        if block is None:
+            length, worth = blocks_for(_influence(split))
+        else:
+            length, worth = block, n / block
         rng = np.random.default_rng(seed)
         counts = block_counts(n, length, n_resamples, rng)
     shape = np.shape(split.delta_vz)
@@ -100,7 +103,7 @@ def confidence_interval(
     else:
         low, high = np.transpose(
             [
-                student_interval(float(value), drawn, n / length, level=level)
+                student_interval(float(value), drawn, worth, level=level)
                 for value, drawn in zip(estimate, again.T, strict=True)
             ]
         )
