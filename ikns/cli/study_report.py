@@ -37,6 +37,9 @@ def report(
     Everything is computed again from the recorded attempts. People and simulated
     participants are never pooled; the page says which is which.
     """
+    from ikns.experiments.visits import list_visits
+
+    list_visits(study)  # a missing study is reported before the rest loads
     loading()
 
     from ikns.experiments.study.summary import summarize

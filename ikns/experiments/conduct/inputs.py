@@ -6,11 +6,13 @@ import math
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from ikns.experiments.tracking.profiles import Profile
 from ikns.live.stream.delays import Delays
-from ikns.simulation.operator import Delay, Operator
+
+if TYPE_CHECKING:
+    from ikns.simulation.operator import Delay, Operator
 
 #: Without a sample for longer than this there is no control signal, s: of the 60 per
 #: second that a page sends, twelve in a row are missing.
