@@ -46,7 +46,7 @@ class Blocks(NamedTuple):
     """How a series is cut into blocks."""
 
     length: int  # samples that are drawn together
-    count: float  # how many such blocks the series is worth
+    worth: float  # how many such blocks the series is worth
 
 
 def blocks_for(series: ArrayLike) -> Blocks:
@@ -70,7 +70,7 @@ def blocks_for(series: ArrayLike) -> Blocks:
     >>> rng = np.random.default_rng(0)
     >>> blocks_for(rng.normal(size=1000)).length < 20
     True
-    >>> blocks_for(np.cumsum(rng.normal(size=1000))).count < 2
+    >>> blocks_for(np.cumsum(rng.normal(size=1000))).worth < 2
     True
     """
     rows = np.asarray(series, dtype=np.float64)
