@@ -16,6 +16,8 @@ from command_line import check_refused, contents, one_sentence
 from small_person import protocol as person
 
 from ikns.cli import main
+from ikns.cli.live_calibration import _Screen
+from ikns.live.calibration.protocol import Change, ProtocolStep
 from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
 from ikns.simulation import Protocol, Unsteadiness, simulate_protocol, virtual_subject
@@ -318,3 +320,11 @@ def test_labels_that_are_missing_are_reported(tmp_path, capfd):
     # That of the left hand takes no part.
     said = check_refused(argv, tmp_path, capfd)
     assert "expected markers RFIN of" in said
+
+
+def test_whoever_has_two_freedoms_is_told_to_turn_the_hand_too(capsys):
+    step = ProtocolStep("point1", "point", 5.0)
+    for turn in (False, True):
+        screen = _Screen([step], auto=True, turn=turn)
+        screen.change(Change(0.0, step, "countdown"), None, "10 cm to the left")
+        assert ("turn the hand" in capsys.readouterr().err) == turn

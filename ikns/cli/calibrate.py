@@ -115,7 +115,12 @@ def calibrate(
         float, typer.Option(help="Live: before each recording, s.", min=0.0, max=3600.0)
     ] = 3.0,
     n_dof: Annotated[
-        int, typer.Option(help="Degrees of freedom to control.", min=1, max=7)
+        int,
+        typer.Option(
+            help="Degrees of freedom to control: each elbow, then turning the hand.",
+            min=1,
+            max=7,
+        ),
     ] = 1,
     max_hand_speed: Annotated[
         float,

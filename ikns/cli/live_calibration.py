@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import ikns
+from ikns.body.chains import chain_sides
 from ikns.errors import InvalidInput, NotEnoughData
 
 if TYPE_CHECKING:
@@ -41,6 +42,8 @@ _PROMPTS = {
     "reach, drink, carry, put away",
     "point": "Hold the hand{where}, and move the elbow up and down",
 }
+#: Added where there are more freedoms than elbows.
+_TURN = ", and turn the hand about its long axis in a slower rhythm"
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,8 @@ def record_live(
             accepted=folder.accepted,
             pending={name: ikns.read(path) for name, path in pending.items()},
         )
-        screen = _Screen(steps, auto=options.auto)
+        turn = n_dof > len(chain_sides(chain))
+        screen = _Screen(steps, auto=options.auto, turn=turn)
         with _keys(listen=not options.auto) as keys:
             run_protocol(
                 source,
@@ -168,8 +172,10 @@ def record_live(
 class _Screen:
     """Lines on stderr: one for each change, and on a terminal one that is rewritten."""
 
-    def __init__(self, steps: Sequence[ProtocolStep], *, auto: bool) -> None:
-        self._auto = auto
+    def __init__(
+        self, steps: Sequence[ProtocolStep], *, auto: bool, turn: bool = False
+    ) -> None:
+        self._auto, self._turn = auto, turn
         self._points = [step for step in steps if step.kind == "point"]
         self._live = sys.stderr.isatty()
 
@@ -216,7 +222,8 @@ class _Screen:
         words = _PROMPTS[step.kind].format(where=f" {where}" if where else " still")
         if step.kind == "point":
             number = self._points.index(step) + 1
-            return f"Point {number} of {len(self._points)}: {words}"
+            also = _TURN if self._turn else ""
+            return f"Point {number} of {len(self._points)}: {words}{also}"
         return words
 
     def _say(self, sentence: str, *, bell: bool = False) -> None:
