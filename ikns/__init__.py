@@ -30,6 +30,9 @@ Map: the null space and its range where the hand is
     null_space_samples           the still samples of a motion
     analytic_map                 the same map from the Jacobian
     NaturalNeighborInterpolator  the interpolation between its points
+    IntentMap                    c as what the person means: swivel less posture
+    NaturalPosture               where a person's elbow is with the wrist here
+    hinge_swivel                 how far an arm is turned from shoulder to wrist
 
 Control: from live markers to the control signal c
     open_source                  connect to live markers, or replay a file

@@ -28,6 +28,9 @@ from .nullspace.map import analytic_map as analytic_map
 from .nullspace.interpolation import (
     NaturalNeighborInterpolator as NaturalNeighborInterpolator,
 )
+from .nullspace.readout import IntentMap as IntentMap
+from .nullspace.natural_posture import NaturalPosture as NaturalPosture
+from .nullspace.hinge_swivel import hinge_swivel as hinge_swivel
 
 # Control
 from .live.stream import open_source as open_source
