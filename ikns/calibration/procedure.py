@@ -127,9 +127,7 @@ def calibrate(
     """
     if not explorations:
         raise InvalidInput("expected at least one exploration recording, found none.")
-    for name, seconds in (("min_still", min_still), ("min_rest", min_rest)):
-        if not 0 <= seconds < np.inf:
-            raise InvalidInput(f"expected {name} of at least 0 s, found {seconds:g}.")
+    _check_seconds(min_still=min_still, min_rest=min_rest)
     names = ", ".join(recording.source for recording in explorations)
     measured = measured_body(
         static,
@@ -202,11 +200,21 @@ def calibrate(
             *caught,
         ],
     }
-    shown = np.column_stack([hands, learned.labels_ + 1.0])
-    shown = shown[:: len(hands) // _SHOWN + 1]
+    shown = _shown(hands, learned)
     subject = Subject(skeleton, learned, chain, report, motions, shown, readouts)
     methods["summary"] = method_summary(subject, natural=measured.natural, own=True)
     return subject
+
+
+def _check_seconds(**given: float) -> None:
+    for name, seconds in given.items():
+        if not 0 <= seconds < np.inf:
+            raise InvalidInput(f"expected {name} of at least 0 s, found {seconds:g}.")
+
+
+def _shown(hands: Array, learned: NullSpaceMap) -> Array:
+    """Still hands (K, 3) and their point from 1 on, at most so many for pictures."""
+    return np.column_stack([hands, learned.labels_ + 1.0])[:: len(hands) // _SHOWN + 1]
 
 
 def _fit(

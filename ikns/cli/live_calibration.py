@@ -107,17 +107,7 @@ def record_live(
         point_seconds=options.point_seconds,
         countdown=options.countdown,
     )
-    for least, seconds, name in (
-        (min_static, options.static_seconds, "static"),
-        (min_still, options.point_seconds, "point"),
-    ):
-        if seconds < least:
-            raise InvalidInput(
-                f"--{name}-seconds {seconds:g} is too short, expected at least "
-                f"{least:g} s."
-            )
-    if not options.auto and sys.stdin is None:
-        raise InvalidInput("expected a keyboard; use --auto where there is none.")
+    _check_options(options, min_static=min_static, min_still=min_still)
     body = ikns.Skeleton.load() if generic is None else generic
     judge = Judge(
         body,
@@ -167,6 +157,23 @@ def record_live(
         )
     static, points = accepted_recordings(folder, steps)
     return static, points, accepted_movement(folder, steps), folder.takes
+
+
+def _check_options(
+    options: LiveOptions, *, min_static: float, min_still: float
+) -> None:
+    """Refuse recordings that are too short, and a desk without a keyboard."""
+    for least, seconds, name in (
+        (min_static, options.static_seconds, "static"),
+        (min_still, options.point_seconds, "point"),
+    ):
+        if seconds < least:
+            raise InvalidInput(
+                f"--{name}-seconds {seconds:g} is too short, expected at least "
+                f"{least:g} s."
+            )
+    if not options.auto and sys.stdin is None:
+        raise InvalidInput("expected a keyboard; use --auto where there is none.")
 
 
 class _Screen:

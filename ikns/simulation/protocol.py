@@ -191,15 +191,7 @@ def simulate_protocol(
         "points": person.seated(points, unsteadiness, rate, of_points),
     }
     point = {"free": free[0].point, "points": points[0].point}
-    skin, n_joints = None, len(person.standing)
-    if soft_tissue > 0:
-        skin = SoftTissue(
-            subject.skeleton,
-            soft_tissue,
-            reference=q["static"][:, -n_joints:].mean(axis=0),
-            angles=q["points"][:, -n_joints:],
-            rng=of_skin,
-        )
+    skin = _skin(subject, soft_tissue, q, rng=of_skin)
     trials = {
         name: record_trial(
             arms,
@@ -223,4 +215,26 @@ def simulate_protocol(
         skin=skin,
         habits=habits,
         **trials,
+    )
+
+
+def _skin(
+    subject: VirtualSubject,
+    soft_tissue: float,
+    q: dict[str, Array],
+    *,
+    rng: np.random.Generator,
+) -> SoftTissue | None:
+    """Skin that moves with the posture by so much, m; None for markers on bone."""
+    if not soft_tissue > 0:
+        return None
+    joints = {
+        name: rows[:, -len(subject.skeleton.joint_names) :] for name, rows in q.items()
+    }
+    return SoftTissue(
+        subject.skeleton,
+        soft_tissue,
+        reference=joints["static"].mean(axis=0),
+        angles=joints["points"],
+        rng=rng,
     )

@@ -145,11 +145,7 @@ def judge_point(
         float(steady), components, n_dof, float(width.min()), float(leak.max()), apart
     )
     values["elbow_deg"] = round(elbow_degrees(motion, gate, chain), 1)
-    if not reason and values["elbow_deg"] < LEAST_BENT:
-        reason = (
-            f"The arm is straight, with the elbow at {values['elbow_deg']:.0f} deg: "
-            f"hold the hand nearer, so that it bends by {LEAST_BENT:.0f} deg or more."
-        )
+    reason = reason or _straight(values["elbow_deg"])
     ends = None
     if natural is not None and n_dof == 1:
         ends = ends_beyond(skeleton, motion, gate, chain, natural)
@@ -162,6 +158,15 @@ def judge_point(
         reason = f"{fault[0].upper()}{fault[1:]}."
     words = reason or "The hand was steady and the elbow moved."
     return Verdict(not reason, True, words, values, place=place, ends=ends)
+
+
+def _straight(elbow_deg: float) -> str:
+    if elbow_deg >= LEAST_BENT:
+        return ""
+    return (
+        f"The arm is straight, with the elbow at {elbow_deg:.0f} deg: hold the hand "
+        f"nearer, so that it bends by {LEAST_BENT:.0f} deg or more."
+    )
 
 
 def _fault(
