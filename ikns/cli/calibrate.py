@@ -171,16 +171,8 @@ def calibrate(
     """
     from ikns.calibration.subject_files import FILES
 
-    if side == "both" and clavicle:
-        raise InvalidInput("--clavicle goes with --side right or left, not with both.")
-    chain = f"{side}_arm" + "_clavicle" * clavicle if side != "both" else "both_arms"
-    body = {"--stature": stature, "--mass": mass, "--sex": sex}
-    given = [name for name, value in body.items() if value is not None]
-    if len(given) in (1, 2):
-        raise InvalidInput(
-            f"expected --stature, --mass and --sex together or none of them, found "
-            f"only {' and '.join(given)}."
-        )
+    chain = _chain(side, clavicle=clavicle)
+    _check_person({"--stature": stature, "--mass": mass, "--sex": sex})
     given_names = check_options(context, live=live, rewear=rewear, short=short)
     inputs = [static, *(exploration or []), *(natural or []), marker_set, recordings]
     inputs += [subject]
@@ -209,12 +201,9 @@ def calibrate(
             f"expected --free-seconds above 0 s, found {free_seconds:g} s; only "
             "--short goes without free exploration."
         )
-    # Three times None is none of them.
-    generic = (
-        None
-        if stature is None or mass is None or sex is None
-        else ikns.Skeleton.from_anthropometry(stature, mass, sex)
-    )
+    generic = None
+    if stature is not None and mass is not None and sex is not None:
+        generic = ikns.Skeleton.from_anthropometry(stature, mass, sex)
     takes: list[dict[str, Any]] = []
     if live:
         if radius is not None and not radius > 0:
@@ -277,6 +266,23 @@ def calibrate(
         f"Wrote {out}",
         as_json=as_json,
     )
+
+
+def _chain(side: str, *, clavicle: bool) -> str:
+    if side != "both":
+        return f"{side}_arm" + "_clavicle" * clavicle
+    if clavicle:
+        raise InvalidInput("--clavicle goes with --side right or left, not with both.")
+    return "both_arms"
+
+
+def _check_person(options: dict[str, object]) -> None:
+    given = [name for name, value in options.items() if value is not None]
+    if len(given) in (1, 2):
+        raise InvalidInput(
+            "expected --stature, --mass and --sex together or none of them, found "
+            f"only {' and '.join(given)}."
+        )
 
 
 def _rewear(

@@ -129,14 +129,10 @@ def compare(
         options=options | gate,
     )
     warned += left_out + judged
-    across = None
     with naming(str(reaches or recording)):
-        try:
-            across = _crosstalk(calibrated, readout, reaching, **options)
-        except NotEnoughData as error:
-            if reaches is not None:
-                raise
-            warned.append(f"no crosstalk: {error}")
+        across = _crosstalk(
+            calibrated, readout, reaching, None if reaches else warned, **options
+        )
     if method != "paper":
         warned.append(_PAPER_ONLY.format(method=method))
     simulated = is_simulated(
@@ -186,19 +182,32 @@ def compare(
 
 
 def _crosstalk(
-    subject: ikns.Subject, readout: Readout, motion: ikns.Motion, **options: Any
-) -> Crosstalk:
-    """Return the change of a method's c on natural reaches."""
+    subject: ikns.Subject,
+    readout: Readout,
+    motion: ikns.Motion,
+    warned: list[str] | None,
+    **options: Any,
+) -> Crosstalk | None:
+    """Return the change of a method's c on natural reaches.
+
+    Without reaches it warns, or raises where there is no list of warnings.
+    """
     from ikns.analysis.compare import motion_crosstalk
 
-    return motion_crosstalk(
-        subject.null_space_map,
-        motion,
-        chain=subject.chain,
-        c=readout.control_signal(subject.skeleton, motion),
-        max_hand_speed=subject.gate["max_hand_speed"],
-        **options,
-    )
+    try:
+        return motion_crosstalk(
+            subject.null_space_map,
+            motion,
+            chain=subject.chain,
+            c=readout.control_signal(subject.skeleton, motion),
+            max_hand_speed=subject.gate["max_hand_speed"],
+            **options,
+        )
+    except NotEnoughData as error:
+        if warned is None:
+            raise
+        warned.append(f"no crosstalk: {error}")
+        return None
 
 
 def _tracked(
