@@ -28,7 +28,7 @@ Array = np.ndarray
 RANGE = np.radians(70.0)
 #: Mean change of the hinge swivel a reach, of the range, of the people that the file is
 #: from (benchmarks/posture_habits.py).
-REAL = 0.12
+REAL = 0.14
 
 
 def constant(swivel: float, rest: float = 0.0) -> PostureHabits:
@@ -91,9 +91,8 @@ def test_people_turn_the_elbow_as_much_as_those_they_were_drawn_from() -> None:
         swivel = habits.swivel(w, -hands[..., 1])
         swivel += habits.rest * rng.normal(size=swivel.shape)
         change.append(np.abs(np.diff(swivel, axis=1)).mean() / RANGE)
-    # Between real arms it spreads by 0.04: 40 people leave 0.006 and the shape of an
-    # arm of one length a little more.
-    assert np.mean(change) == pytest.approx(REAL, abs=0.025)
+    # Within 20 %, as was asked; between arms it spreads by 0.03, so 40 leave 0.005.
+    assert np.mean(change) == pytest.approx(REAL, rel=0.2)
     assert 0.02 < np.std(change) < 0.08
 
 
