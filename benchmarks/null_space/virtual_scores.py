@@ -293,16 +293,26 @@ def _turned(c: Array, place: Array) -> float:
 
 
 def _gaps(c: Array, usual: Array, off: Array) -> dict[str, float]:
-    """Median over gaps of the farthest that c goes, and frames lost."""
+    """Median over gaps of the farthest that c goes, and frames lost.
+
+    NaN where no gap has a c: the finger is held through all of them.
+    """
     starts = np.flatnonzero(np.diff(np.r_[0, off.astype(int)]) == 1)
     most = []
     for a in starts:
         rows = a + np.flatnonzero(off[a : a + round(HIDDEN * RATE)])
         change = np.abs(c[rows] - usual[rows])
-        most.append(np.nanmax(change) if np.isfinite(change).any() else 0.0)
+        if np.isfinite(change).any():
+            most.append(np.nanmax(change))
     lost = np.isnan(c[off]) & np.isfinite(usual[off])
     return {"median": float(np.median(most)), "max": float(np.max(most)),
             "lost": float(lost.mean())}  # fmt: skip
+
+
+def _median(values: Array) -> float:
+    """Median of what is known; NaN where nothing is."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else np.nan
 
 
 def gathered(people: list[dict[str, dict[str, float]]]) -> dict[str, dict[str, float]]:
@@ -311,10 +321,10 @@ def gathered(people: list[dict[str, dict[str, float]]]) -> dict[str, dict[str, f
     for name in people[0]:
         rows = [person[name] for person in people]
         column = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-        made = {key: float(np.median(values)) for key, values in column.items()}
+        made = {key: _median(values) for key, values in column.items()}
         made["rms_p90"] = float(np.quantile(column["rms"], 0.9))
         made["gain_in"] = float(np.mean(np.abs(column["gain"] - 1) <= 0.03))
         made["offset_in"] = float(np.mean(np.abs(column["offset"]) <= 0.03))
-        made["forearm_max"] = float(np.max(column["forearm_max"]))
+        made["forearm_max"] = float(np.nanmax([*column["forearm_max"], 0.0]))
         table[name] = made
     return table

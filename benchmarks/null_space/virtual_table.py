@@ -79,6 +79,8 @@ def virtual_verdicts(table: dict[str, dict[str, float]]) -> list[str]:
         value = table["intent"][key]
         reached = value <= goal if at_most else value >= goal
         word = "reached" if reached else "NOT REACHED"
+        if np.isnan(value):
+            word = "held, there is no c to judge"
         lines.append(f"intent, virtual: {words} {value:.3f}, asked {goal}: {word}")
     return lines
 
