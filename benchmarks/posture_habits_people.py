@@ -5,7 +5,8 @@ center and long axis of the hand (28 terms). All arms together give one field; e
 arm's own departure from it has a ridge of 0.01, with which arms drawn from the mean and
 covariance change their swivel from rest to rest about as much as the real ones. When
 real arms had 0.117 of the range a reach, drawn ones had 0.183 with a ridge of 0.001
-(what is continued to where an arm never was), 0.111 with 0.01, and 0.099 with 0.1. What these quadratics leave is in the file as well.
+(what is continued to where an arm never was), 0.111 with 0.01, and 0.099 with 0.1. What
+these quadratics leave is in the file as well.
 
 Hands: wrist centers and orientations at both ends of reaches of 0.10 m or more, as a
 mixture of normal distributions. Each is the mean and covariance of 20 reaches or more;
