@@ -109,7 +109,11 @@ def main() -> None:
     table = {} if options.no_real else real_people(options)
     if options.json:
         rows = {f"{m}, {k}": row for (m, k), row in table.items()}
-        print(json.dumps(rows | {"virtual, simulated": virtual}, indent=1))
+        known = {
+            name: {k: None if np.isnan(v) else v for k, v in row.items()}
+            for name, row in virtual.items()
+        }
+        print(json.dumps(rows | {"virtual, simulated": known}, indent=1))
     else:
         if table:
             print_real(table, quick=options.quick)

@@ -305,7 +305,7 @@ def _gaps(c: Array, usual: Array, off: Array) -> dict[str, float]:
         if np.isfinite(change).any():
             most.append(np.nanmax(change))
     lost = np.isnan(c[off]) & np.isfinite(usual[off])
-    return {"median": float(np.median(most)), "max": float(np.max(most)),
+    return {"median": _median(np.array(most)), "max": float(np.max([*most, 0.0])),
             "lost": float(lost.mean())}  # fmt: skip
 
 
