@@ -19,6 +19,32 @@ def rigid_transform(source: Array, target: Array) -> tuple[Array, Array]:
     return rotation, b - rotation @ a
 
 
+def quaternion_matrix(quaternion: Array) -> Array:
+    """Rotation (3, 3) of a quaternion (4,), x, y, z, w, of any length but 0.
+
+    >>> quaternion_matrix(np.array([0.0, 0.0, 2.0, 2.0])).round(9).tolist()
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    x, y, z, w = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def turn_matrix(axis: Array, angle: float) -> Array:
+    """Rotation (3, 3) about a unit vector (3,) by an angle, rad (Rodrigues).
+
+    >>> turn_matrix(np.array([0.0, 0.0, 1.0]), np.pi / 2).round(9).tolist()
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    half = angle / 2
+    return quaternion_matrix(np.append(np.sin(half) * axis, np.cos(half)))
+
+
 def pose_steps(poses: Array) -> Array:
     """Return the step from each pose to the next, as seen from the first of the two.
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ikns.arrays import Array, Indices
 from ikns.body.skeleton import Skeleton
+from ikns.numerics.rigid import quaternion_matrix, turn_matrix
 
 
 def turning_clusters(skeleton: Skeleton) -> tuple[Indices, Indices]:
@@ -42,11 +43,9 @@ def turned_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
     >>> bool(np.allclose(turned_markers(body, q, markers), markers))
     True
     """
-    from scipy.spatial.transform import Rotation
-
     placed = skeleton.markers_in_world(q)
     worn, (joints, cluster) = skeleton.marker_set.markers, turning_clusters(skeleton)
-    thorax = Rotation.from_quat(q[3:7]).as_matrix()
+    thorax = quaternion_matrix(q[3:7])
     for k in range(len(joints)):
         own = cluster == k
         link = worn[int(np.flatnonzero(own)[0])].link
@@ -59,6 +58,6 @@ def turned_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
         p, s = placed[used] - origin, seen[used] - origin
         across = trust[used] @ (np.cross(p, s) @ axis)
         along = trust[used] @ (np.sum(p * s, axis=1) - (p @ axis) * (s @ axis))
-        turn = Rotation.from_rotvec(np.arctan2(across, along) * axis)
-        placed[own] = turn.apply(placed[own] - origin) + origin
+        turn = turn_matrix(axis, np.arctan2(across, along))
+        placed[own] = (placed[own] - origin) @ turn.T + origin
     return placed
