@@ -14,6 +14,12 @@ from ikns.live.warm_up import warm_up
 KERNELS = Path(module.__file__).parent
 
 
+def forget() -> None:
+    """Forget what was read of the sources, as a new process has."""
+    module._source.cache_clear()
+    module._cache_folder.cache_clear()
+
+
 @pytest.fixture
 def copy(tmp_path, monkeypatch):
     """A copy of the kernels' sources that the cache looks at."""
@@ -22,13 +28,13 @@ def copy(tmp_path, monkeypatch):
     )
     monkeypatch.setattr(module, "_HERE", tmp_path)
     monkeypatch.setattr(module.config, "CACHE_DIR", "")
-    module._cache_folder.cache_clear()
+    forget()
     yield tmp_path
-    module._cache_folder.cache_clear()
+    forget()
 
 
 def folder_of(name: str) -> Path:
-    module._cache_folder.cache_clear()
+    forget()
     folder = module._cache_folder(name)
     assert folder is not None
     return folder
@@ -58,7 +64,7 @@ def test_without_any_place_code_is_compiled_and_not_kept(copy, monkeypatch):
     (copy / "__pycache__").write_text("in the way")
     (copy / "home").write_text("in the way")
     monkeypatch.setenv("XDG_CACHE_HOME", str(copy / "home"))
-    module._cache_folder.cache_clear()
+    forget()
     assert module._cache_folder("body.step") is None
     assert not module.on_disk("body.step")
 

@@ -56,6 +56,13 @@ def on_disk(module: str) -> bool:
 
 
 @functools.cache
+def _source(path: Path) -> tuple[str, set[str]]:
+    """Return a kernel file's text and which kernel files it imports."""
+    text = path.read_text(encoding="utf-8")
+    return text, set(_IMPORT.findall(text))
+
+
+@functools.cache
 def _cache_folder(module: str) -> Path | None:
     """Cache folder for these sources; None where no folder is writable."""
     texts: dict[str, str] = {}
@@ -63,8 +70,8 @@ def _cache_folder(module: str) -> Path | None:
     while pending:
         name = pending.pop()
         path = _HERE.joinpath(*name.split(".")).with_suffix(".py")
-        texts[name] = path.read_text(encoding="utf-8")
-        pending += set(_IMPORT.findall(texts[name])) - set(texts)
+        texts[name], imported = _source(path)
+        pending += imported - set(texts)
     sources = "".join(texts[name] for name in sorted(texts))
     sources += f"{numba.__version__} {llvmlite.__version__} {sys.version} {_FORMAT}"
     name = f"{module}-{hashlib.sha256(sources.encode()).hexdigest()[:16]}"
