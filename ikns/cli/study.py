@@ -14,7 +14,7 @@ import typer
 
 from ikns.cli.checks import checked
 from ikns.cli.options import AsJson, Force
-from ikns.cli.output import notes, progress, show
+from ikns.cli.output import loading, notes, progress, show
 from ikns.cli.study_plan import plan
 from ikns.errors import InvalidInput
 
@@ -65,12 +65,14 @@ def run(
 
     Results are bit-identical for any number of processes, here or on a cluster.
     """
-    from ikns.experiments.study import read_study, run_study
-
     if scheduler is not None and not re.fullmatch(r"\w+://[^\s/].*", scheduler):
         raise InvalidInput(
             f"expected --scheduler as tcp://HOST:PORT, found '{scheduler}'."
         )
+    loading()
+
+    from ikns.experiments.study import read_study, run_study
+
     study = read_study(folder)
     with _progress_or_lines() as report:
         done = run_study(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ikns.cli.options import AsJson, Force
-from ikns.cli.output import notes, progress, show, table
+from ikns.cli.output import loading, notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.plan_inputs import PlannedDesign, resolve_plan, resolve_spread
 from ikns.errors import InvalidInput
@@ -112,14 +112,16 @@ def plan(
     one will be, one mean per participant. The spread is the paper's, a pilot's, or
     given; everything depends on it, so it is printed with its source.
     """
-    from ikns.statistics.plan import plan_participants
-
     refuse_picture(figure, force=force, inputs=[study, pilot])
     if margin is not None and margin > _LARGEST_MARGIN:
         raise InvalidInput(
             f"expected a --margin above 0 and up to {_LARGEST_MARGIN:g}, found "
             f"{margin:g}."
         )
+    loading()
+
+    from ikns.statistics.plan import plan_participants
+
     design = resolve_plan(
         study,
         experiment,
@@ -135,7 +137,7 @@ def plan(
             f"{where}expected a margin for {design.experiment}, declared in the study "
             "file or by --margin, or a --difference to be shown, found neither."
         )
-    with progress() as report:
+    with progress(kernels=False) as report:
         assumed = resolve_spread(
             design,
             given=(spread, level_spread, trial_spread),
