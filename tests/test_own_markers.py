@@ -1,6 +1,7 @@
 """A marker set of one's own: places, what the trial measures, what is held."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from ikns.calibration.observed import unshown_joints
 from ikns.calibration.own_markers import OwnMarkerSet, own_marker_set, read_answers
 from ikns.calibration.set_check import check_marker_set
 from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.recording.files import read
 from ikns.recording.labels import renamed
 from ikns.recording.recording import Recording
 
@@ -219,3 +221,20 @@ def test_a_sternum_marker_alone_may_be_anywhere_on_the_bone(first: str) -> None:
     assert middle - 2 * spread < low
     assert high < middle + 2 * spread
     assert usual_site("XIPH").name == "xiphoid"
+
+
+@pytest.mark.parametrize("name", ["ADL001", "ADL005"])
+def test_a_trunk_with_one_landmark_stands_upright(data: Path, name: str) -> None:
+    # Clusters on acromion and arms, one marker on the sternum; landmarks on the arms.
+    static = read(data / "ue_adl" / name / f"{name}_static.csv")
+    said = {
+        label: found.name
+        for label in static.labels
+        if (found := usual_site(label, None, static.labels))
+    }
+    body = Skeleton.load()
+    own = own_marker_set(body, static, said, name="mine", min_duration=0.1).marker_set
+    found = check_marker_set(body, static, marker_set=own, min_duration=0.1)
+    # The arms hang. With the trunk upside down they were raised by 170 deg.
+    shoulders = [j.angle for j in found.joints if "shoulder_abduction" in j.joint]
+    assert np.abs(shoulders).max() < np.radians(60)

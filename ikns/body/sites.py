@@ -28,7 +28,8 @@ _LETTERS = {"r": "right", "l": "left"}
 class Site:
     """A place on the body.
 
-    Without a position it is anywhere on the segment, and measured.
+    Without a position it is anywhere on the segment, and measured; `roughly` is where
+    to look first.
     """
 
     name: str
@@ -40,12 +41,16 @@ class Site:
     side: str  # "right", "left" or ""
     labels_beside: tuple[str, ...] = ()  # usual ones if a marker is on the next
     beside: str = ""  # name of another place
+    roughly: tuple[float, float, float] = (0.0, 0.0, 0.0)  # in the link's frame, m
+    roughly_sd: float = 0.1  # m
 
     def marker(self, label: str, *, static_only: bool) -> Marker:
-        """Return a marker here; the position must be known."""
-        assert self.position is not None
-        assert self.placement_sd is not None
-        return Marker(label, self.link, self.position, self.placement_sd, static_only)
+        """Return a marker here, or roughly here."""
+        place, spread = self.position, self.placement_sd
+        if place is None or spread is None:
+            sd = self.roughly_sd
+            place, spread = self.roughly, (sd, sd, sd)
+        return Marker(label, self.link, place, spread, static_only)
 
 
 @cache
@@ -65,8 +70,7 @@ def _site(name: str, row: Mapping[str, Any], side: str) -> Site:
     link = str(row["link"])
     position = spread = None
     if "position_mm" in row:
-        x, y, z = (float(value) / 1000 for value in row["position_mm"])
-        position = (x, y, 0.0 - z if side == "left" else z)
+        position = _place(row["position_mm"], side)
         sd = row["placement_sd_mm"]
         sx, sy, sz = (
             float(value) / 1000 for value in (sd if isinstance(sd, list) else 3 * [sd])
@@ -82,7 +86,15 @@ def _site(name: str, row: Mapping[str, Any], side: str) -> Site:
         side,
         tuple(row.get("labels_beside", ())),
         row.get("beside", ""),
+        _place(row.get("roughly_mm", (0, 0, 0)), side),
+        float(row.get("roughly_sd_mm", 100)) / 1000,
     )
+
+
+def _place(millimeters: Iterable[float], side: str) -> tuple[float, float, float]:
+    """Place in a link's frame, m; the table has the right side's."""
+    x, y, z = (float(value) / 1000 for value in millimeters)
+    return x, y, 0.0 - z if side == "left" else z
 
 
 def site(name: str) -> Site:

@@ -109,21 +109,20 @@ def own_marker_set(
     """
     placed = read_answers(answers)
     _check(placed, static)
-    landmarks = MarkerSet(
+    roughly = MarkerSet(
         name,
-        tuple(
-            p.site.marker(p.label, static_only=p.static_only)
-            for p in placed
-            if p.site.position is not None
-        ),
+        tuple(p.site.marker(p.label, static_only=p.static_only) for p in placed),
     )
-    landmarks = with_unshown_held(generic, landmarks.all_tracked())
+    # The others help to find the body, too: a trunk with a single landmark would turn.
+    roughly = with_unshown_held(generic, roughly.all_tracked())
     reference, target, _ = static_posture(
-        generic, static, marker_set=landmarks, min_duration=min_duration
+        generic, static, marker_set=roughly, min_duration=min_duration
     )
     fit = fit_sizes(reference, target)
-    measured = _measured(reference, fit, static, placed)
-    by_label = {m.label: m for m in (*landmarks.markers, *measured)}
+    measured = _measured(reference, fit, target, placed)
+    known = zip(roughly.markers, placed, strict=True)
+    landmarks = [m for m, p in known if p.site.position is not None]
+    by_label = {m.label: m for m in (*landmarks, *measured)}
     worn = MarkerSet(
         name,
         tuple(replace(by_label[p.label], static_only=p.static_only) for p in placed),
@@ -172,37 +171,26 @@ def _check(placed: tuple[PlacedLabel, ...], static: Recording) -> None:
 
 
 def _measured(
-    reference: Skeleton,
-    fit: SizeFit,
-    static: Recording,
-    placed: tuple[PlacedLabel, ...],
+    reference: Skeleton, fit: SizeFit, target: Array, placed: tuple[PlacedLabel, ...]
 ) -> list[Marker]:
-    """Markers that are no landmarks, where they sit on the generic body."""
-    loose = [one for one in placed if one.site.position is None]
+    """Markers that are no landmarks, where they sit on the generic body.
+
+    `target` (M, 3) m are all markers' mean positions in the trial, in this order.
+    """
+    loose = [k for k, one in enumerate(placed) if one.site.position is None]
     if not loose:
         return []
-    # All markers of one trial are averaged in one way, the landmarks with them.
-    start = Marker("", "thorax", (0.0, 0.0, 0.0), _CLUSTER_SD)
-    everything = replace(
-        reference.marker_set,
-        markers=(
-            *reference.marker_set.markers,
-            *(replace(start, label=p.label, link=p.site.link) for p in loose),
-        ),
-    )
-    _, target, _ = static_posture(
-        reference, static, marker_set=everything, min_duration=0.0
-    )
     factors = size_factors(fit.log_sizes)
     person = reference.resized(factors)
-    seen = target[-len(loose) :]
     places = []
-    for one, place in zip(loose, seen, strict=True):
-        at_link, rotation = _link_in_world(person, fit.q, one.site.link)
-        places.append(rotation.T @ (place - at_link))
-    worn = replace(reference.marker_set, markers=everything.markers[-len(loose) :]).at(
-        np.array(places)
+    for k in loose:
+        at_link, rotation = _link_in_world(person, fit.q, placed[k].site.link)
+        places.append(rotation.T @ (target[k] - at_link))
+    own = (
+        Marker(placed[k].label, placed[k].site.link, (0.0, 0.0, 0.0), _CLUSTER_SD)
+        for k in loose
     )
+    worn = replace(reference.marker_set, markers=tuple(own)).at(np.array(places))
     back = {link: 1 / factor for link, factor in factors.items()}
     on_generic = person.with_markers(worn).resized(back).marker_positions
     return list(worn.at(on_generic.round(_DIGITS)).markers)
