@@ -25,8 +25,8 @@ class GateLimits(NamedTuple):
         may have a third more.
     intermarker_error : float
         Largest change since calibration of the distance between two markers of a
-        segment of the chain, m. Seven people had up to 16 mm within clusters, two others 24
-        mm between landmarks on the skin (same benchmark).
+        segment of the chain, m. Seven people had up to 16 mm within clusters, two
+        others 24 mm between landmarks on the skin (same benchmark).
     """
 
     residual: float = 0.05
