@@ -20,13 +20,13 @@ class GateLimits(NamedTuple):
     residual : float
         Root mean square distance between pose and markers, m.
     worst_residual : float
-        Largest distance between pose and a marker of the chain, m. The default is
-        slightly above the 72 mm found with seven people in daily activities
-        (``benchmarks/stray_marker.py``).
+        Largest distance between pose and a marker of the chain, m. Seven people in
+        daily activities had up to 59 mm (``benchmarks/stray_marker.py``), and others
+        may have a third more.
     intermarker_error : float
         Largest change since calibration of the distance between two markers of a
-        segment of the chain, m. Seven people had up to 24 mm between skin landmarks and
-        18 mm within clusters (same benchmark).
+        segment of the chain, m. Seven people had up to 16 mm within clusters, two
+        others 24 mm between landmarks on the skin (same benchmark).
     """
 
     residual: float = 0.05
