@@ -7,7 +7,12 @@ from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
 from ikns.recording.files import write_c3d
 from ikns.recording.recording import Recording
-from ikns.simulation import Protocol, simulate_protocol, virtual_subject
+from ikns.simulation import (
+    Protocol,
+    VirtualSubject,
+    simulate_protocol,
+    virtual_subject,
+)
 
 #: Nothing above a map needs a natural posture, and drawing one takes a second: the
 #: people of these tests hold one posture everywhere.
@@ -47,6 +52,36 @@ def two_handed() -> Protocol:
 def subject() -> Subject:
     """The person as calibrated from the recordings."""
     return calibrate(protocol().static.recording, [protocol().points.recording])
+
+
+def on_another_day(person: VirtualSubject) -> Protocol:
+    """Six seconds of ordinary movement, and three places to judge by."""
+    return simulate_protocol(
+        person,
+        seed=8,
+        n_points=3,
+        static_seconds=1.2,
+        free_seconds=6.0,
+        point_seconds=2.0,
+        rate=50,
+        occluded=0.0,
+    )
+
+
+@cache
+def another_day() -> Protocol:
+    """The person of `protocol` on another day."""
+    return on_another_day(protocol().subject)
+
+
+@cache
+def known_by_movement() -> Subject:
+    """The person as calibrated with the ordinary movement of another day."""
+    return calibrate(
+        protocol().static.recording,
+        [protocol().points.recording],
+        natural=[another_day().free.recording],
+    )
 
 
 def write(folder: Path, name: str, recording: Recording) -> Path:

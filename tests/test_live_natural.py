@@ -1,7 +1,6 @@
 """Ordinary movement in the live calibration, and points that were half explored."""
 
 import json
-from functools import cache
 
 import numpy as np
 import pytest
@@ -15,24 +14,13 @@ from ikns.live.calibration import Judge, ProtocolStep, TargetPoints, paper_steps
 from ikns.live.calibration.natural_verdict import half_explored, judge_natural
 from ikns.live.calibration.point_verdict import judge_point
 from ikns.recording.recording import Recording
-from ikns.simulation import simulate_protocol, virtual_subject
 
 STEP = [ProtocolStep(f"point_{k:02d}", "point", 1.5) for k in range(1, 11)]
 
 
-@cache
 def movement() -> Recording:
-    """Six seconds of ordinary movement of the small person's body."""
-    run = simulate_protocol(
-        virtual_subject(1),
-        seed=8,
-        n_points=1,
-        static_seconds=0.1,
-        free_seconds=6.0,
-        point_seconds=0.1,
-        rate=50,
-    )
-    return run.free.recording
+    """Six seconds of ordinary movement of the small person."""
+    return small_person.another_day().free.recording
 
 
 def point(k: int, share: float = 1.0, seconds: float = 3.2) -> Recording:

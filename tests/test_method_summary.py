@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.calibration import calibrate
 from ikns.calibration.method_summary import method_summary
 from ikns.calibration.subject import Subject
 from ikns.cli.calibration_tables import calibration_parts
@@ -12,25 +11,13 @@ from ikns.live.control.recorded import control_table
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.nullspace.readout import METHODS
-from ikns.simulation import simulate_protocol, virtual_subject
 
 
 @pytest.fixture(scope="module")
 def moved() -> tuple[Subject, Motion]:
-    """A simulated person with 15 s of ordinary movement, and that movement."""
-    run = small_person.protocol()
-    other = simulate_protocol(
-        virtual_subject(1),
-        seed=4,
-        static_seconds=1.2,
-        free_seconds=15.0,
-        point_seconds=0.2,
-        n_points=1,
-        rate=50,
-        occluded=0.0,
-    )
-    free = other.free.recording
-    subject = calibrate(run.static.recording, [run.points.recording], natural=[free])
+    """A simulated person with six seconds of ordinary movement, and that."""
+    subject = small_person.known_by_movement()
+    free = small_person.another_day().free.recording
     return subject, MarkerIK(subject.skeleton).track(free, chain="right_arm")
 
 

@@ -10,7 +10,6 @@ import small_person
 from command_line import check_refused, contents
 
 from ikns.body.marker_set import MarkerSet
-from ikns.calibration import calibrate
 from ikns.calibration.rewear import WEARING_SD, rewear
 from ikns.calibration.subject import Subject
 from ikns.cli import main
@@ -20,7 +19,7 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import still_mask
 from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.nullspace.readout import IntentMap
-from ikns.simulation import Protocol, VirtualSubject, simulate_protocol
+from ikns.simulation import Protocol, VirtualSubject
 
 
 def reapplied(person: VirtualSubject, seed: int) -> VirtualSubject:
@@ -36,30 +35,11 @@ def reapplied(person: VirtualSubject, seed: int) -> VirtualSubject:
     return dataclasses.replace(person, skeleton=skeleton)
 
 
-def recorded(person: VirtualSubject) -> Protocol:
-    """Another day: 6 s of ordinary movement, and three places to judge by."""
-    return simulate_protocol(
-        person,
-        seed=8,
-        n_points=3,
-        static_seconds=1.2,
-        free_seconds=6.0,
-        point_seconds=2.0,
-        rate=50,
-        occluded=0.0,
-    )
-
-
 @cache
 def people() -> tuple[Subject, Protocol, Protocol]:
     """A person as calibrated; the same new day in the old and in a new wearing."""
-    run = small_person.protocol()
-    subject = calibrate(
-        run.static.recording,
-        [run.points.recording],
-        natural=[recorded(run.subject).free.recording],
-    )
-    return subject, recorded(run.subject), recorded(reapplied(run.subject, 5))
+    other = small_person.on_another_day(reapplied(small_person.protocol().subject, 5))
+    return small_person.known_by_movement(), small_person.another_day(), other
 
 
 @cache
