@@ -102,6 +102,16 @@ def test_a_place_of_another_posture_is_no_half_explored_one():
         intent.warn_of_scatter()
 
 
+@given(st.integers(0, 50), st.floats(0.1, 0.5))
+@settings(max_examples=10, deadline=None)
+def test_a_half_explored_place_does_not_narrow_the_others(seed, share):
+    wrist, swivel, which = planted(seed)
+    keep = (which != 3) | (np.arange(len(which)) % 60 < 60 * share)
+    intent = IntentMap(8).fit(wrist[keep], swivel[keep])
+    # Ends at -0.5 and 0.7 beyond a posture that is 0.2 off.
+    assert np.allclose(intent.ends_, (-0.3, 0.9), atol=1e-6)
+
+
 def test_own_movement_replaces_other_people():
     wrist, swivel, _ = planted(3)
     rng = np.random.default_rng(3)

@@ -79,6 +79,10 @@ def test_body_and_maps_stay():
     shift = new.report["rewear"]["shift_rad"]
     assert np.allclose(np.subtract(shifted.ends_, old.ends_), shift, atol=1e-12)
     assert abs(shift) <= abs(new.report["rewear"]["mean_rad"])
+    # The report says what the folder holds.
+    assert np.allclose(new.report["methods"]["ends_rad"], shifted.ends_, atol=1e-12)
+    lows = [place["lower_rad"] for place in new.report["methods"]["places"]]
+    assert np.allclose(lows, shifted.lower_, atol=1e-12)
 
 
 def test_a_posture_that_is_off_everywhere_is_shifted_by_what_is_known_of_it():

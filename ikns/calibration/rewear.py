@@ -119,6 +119,12 @@ def rewear(
     }
     new = replace(new, report=report, readouts={**subject.readouts, **found})
     methods = dict(subject.report.get("methods", {"without": {}, "warnings": []}))
+    if shift := about["shift_rad"]:
+        methods["ends_rad"] = [end + shift for end in methods.get("ends_rad", [])]
+        methods["places"] = [
+            place | {name: place[name] + shift for name in ("lower_rad", "upper_rad")}
+            for place in methods.get("places", [])
+        ]
     report["methods"] = methods | {"summary": method_summary(new, [], motions)}
     return new
 

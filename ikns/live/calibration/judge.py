@@ -137,7 +137,9 @@ class Judge:
     ) -> Verdict:
         """Judge a point; where it is as narrow again, the elbow goes no farther."""
         if self._natural is None:
-            self._natural = natural_of(self._movement, self.chain)
+            self._natural = natural_of(
+                self._movement, self.chain, max_hand_speed=self._max_hand_speed
+            )
         others = {k: v for k, v in self._ends.items() if k != step.name}
         found = judge_point(
             recording,

@@ -102,7 +102,9 @@ def judge_natural(
     )
 
 
-def natural_of(motions: list[tuple[Skeleton, Motion]], chain: str) -> NaturalPosture:
+def natural_of(
+    motions: list[tuple[Skeleton, Motion]], chain: str, *, max_hand_speed: float
+) -> NaturalPosture:
     """Return the natural posture by what was accepted; without enough, of people."""
     if len(chain_sides(chain)) != 1:
         return NaturalPosture.of_people()
@@ -110,7 +112,7 @@ def natural_of(motions: list[tuple[Skeleton, Motion]], chain: str) -> NaturalPos
     for skeleton, motion in motions:
         wrist, swivel = readout_samples(skeleton, motion, chain, "intent")
         row = np.isfinite(wrist).all(axis=1) & np.isfinite(swivel[:, 0])
-        row &= motion.hand_speed(chain) >= 0.05
+        row &= motion.hand_speed(chain) >= max_hand_speed
         wrists.append(wrist[row])
         swivels.append(swivel[row, 0])
         seconds += float(row.sum() * np.median(np.diff(motion.time)))

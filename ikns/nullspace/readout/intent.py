@@ -3,10 +3,11 @@
     c = (s - s_nat(w) - a) / (b - a)
 
 s is the hinge swivel (:mod:`ikns.nullspace.hinge_swivel`), s_nat the natural posture at
-the wrist center w (:mod:`ikns.nullspace.natural_posture`), and a and b are robust means
-over the held places of the lower and upper end of s - s_nat. Two numbers for the whole
-range: fields through ends that scatter would put this scatter back into c. A place at
-which the natural posture is far off, or that was half explored, has no say. Where times
+the wrist center w (:mod:`ikns.nullspace.natural_posture`), and a and b come from the
+lower and upper ends of s - s_nat at the held places: their middle is a robust mean over
+the places, their distance the mean width. Two numbers for the whole range: fields
+through ends that scatter would put this scatter back into c. A place at which the
+natural posture is far off, or that was half explored, has no say. Where times
 are known, the ends are those of the motion without its noise
 (:mod:`ikns.nullspace.readout.ends`).
 """
@@ -29,6 +30,8 @@ from ikns.nullspace.readout.ends import checked_times, robust_mean, swept_ends_o
 
 #: A place whose ends are off the mean by more than this share of the range is named.
 _HALF_EXPLORED = 0.1
+#: A place with less than this share of the usual width has no say in it.
+_HALF = 0.6
 #: Most places that are named.
 _NAMED = 3
 #: A place with less than this share of an equal part of the samples is left out.
@@ -277,8 +280,11 @@ class IntentMap(EstimatorBase):
 
     def _finish(self) -> None:
         """Set the mean ends, and name places that were half explored."""
-        a, b = robust_mean(self.lower_), robust_mean(self.upper_)
-        if not b - a > 0:
+        widths = self.upper_ - self.lower_
+        width = float(widths[widths >= _HALF * np.median(widths)].mean())
+        middle = robust_mean((self.lower_ + self.upper_) / 2)
+        a, b = middle - width / 2, middle + width / 2
+        if not width > 0:
             raise NotEnoughData(
                 "expected held places at which the elbow turns, found none "
                 f"(n_features={self.n_features_in_})."
