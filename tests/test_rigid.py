@@ -9,6 +9,7 @@ from scipy.linalg import expm
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
+from ikns.numerics.cross_product import cross
 from ikns.numerics.distance import distances
 from ikns.numerics.rigid import pose_steps, quaternion_matrix, turn_matrix
 
@@ -76,3 +77,10 @@ POINTS = arrays(
 @given(POINTS, POINTS)
 def test_distances_are_scipys(a: np.ndarray, b: np.ndarray) -> None:
     np.testing.assert_array_max_ulp(distances(a, b), cdist(a, b), maxulp=2)
+
+
+@pytest.mark.parametrize("shapes", [((3,), (3,)), ((5, 3), (3,)), ((2, 1, 3), (4, 3))])
+def test_cross_products_are_numpys(shapes: tuple) -> None:
+    draw = np.random.default_rng(0)
+    a, b = (draw.normal(size=shape) for shape in shapes)
+    np.testing.assert_array_equal(cross(a, b), np.cross(a, b))

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from ikns.arrays import Array
 from ikns.body.chains import chain_sides
 from ikns.errors import InvalidInput
+from ikns.numerics.cross_product import cross
 
 if TYPE_CHECKING:
     from ikns.body.skeleton import Skeleton
@@ -93,12 +94,12 @@ def hinge_swivel(
     with np.errstate(invalid="ignore", divide="ignore"):
         n = (w - p) / np.linalg.norm(w - p, axis=-1, keepdims=True)
         z = z / np.linalg.norm(z, axis=-1, keepdims=True)
-        elbow = -np.cross(z, n)
-        k = np.cross(FORWARD, n)
+        elbow = -cross(z, n)
+        k = cross(FORWARD, n)
         behind = 1.0 + n @ FORWARD
-        kd = np.cross(k, DOWN)
-        u = DOWN + kd + np.cross(k, kd) / behind[..., None]
-        s = np.arctan2((elbow * np.cross(-n, u)).sum(axis=-1), (elbow * u).sum(axis=-1))
+        kd = cross(k, DOWN)
+        u = DOWN + kd + cross(k, kd) / behind[..., None]
+        s = np.arctan2((elbow * cross(-n, u)).sum(axis=-1), (elbow * u).sum(axis=-1))
     bad = np.linalg.norm(elbow, axis=-1) < _DEGENERATE
     return np.asarray(np.where(bad | ~(behind > _DEGENERATE), np.nan, s))
 
