@@ -26,6 +26,7 @@ from ikns.calibration.judge.finding import (
 )
 from ikns.calibration.judge.sides import other_side, sides_exchanged
 from ikns.calibration.judge.static import body_size
+from ikns.calibration.judge.steps import judge_steps
 from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.judge.traces import repeated
 from ikns.calibration.judge.tracking import judge_tracking
@@ -106,6 +107,9 @@ def _judge(
     distant, exchanges = _judge_distances(where, worn, good, pairs, apart)
     findings += distant
     findings += _astray(where, worn, measured, spoiled, pairs, exchanges)
+    if not exchanges:
+        shown = np.where(spoiled[:, None, None], np.nan, measured)
+        findings += judge_steps(where, worn.labels, recording.time, shown, pairs)
     if skeleton is not None:
         order = np.arange(len(worn.markers))
         for a, b in exchanges:
