@@ -6,7 +6,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ikns.calibration.judge.distances import all_distances, exchanged_by_distance
+from ikns.calibration.judge.distances import (
+    all_distances,
+    exchanged_by_distance,
+    pair_distances,
+)
 from ikns.calibration.judge.finding import say_frames
 from ikns.calibration.judge.jumps import find_jumps
 from ikns.calibration.judge.steps import find_steps
@@ -243,12 +247,12 @@ def test_a_marker_that_is_knocked_is_told_and_skin_that_gives_way_is_not(
     skin = 0.004 * np.sin(2 * np.pi * TIME)
     markers += skin[:, None, None] * np.array([1.0, -1, 1, -1, 1, -1])[:, None]
     pairs = np.array(list(combinations(range(MARKERS), 2)))
-    assert find_steps(markers, pairs) == []
+    assert find_steps(pair_distances(markers, pairs), pairs) == []
     # Across the line on which they sit, and along it, so that distances change.
     row = np.array([0.06, 0.02, 0.0]) / np.hypot(0.06, 0.02)
     markers[first:, marker] += by * row
-    found = find_steps(markers, pairs)
+    found = find_steps(pair_distances(markers, pairs), pairs)
     assert [(t, m) for t, m, _ in found] == [(first, marker)]
-    # The two medians are of ten frames: noise of 0.6 mm, four times, and what the skin
-    # does in 0.1 s, 5 mm.
-    assert abs(found[0][2] - by) < 0.0075
+    # The difference of two medians of ten frames: noise of 0.8 mm, in the largest of
+    # five up to five times that; and what the skin does in 0.1 s, 5 mm.
+    assert abs(found[0][2] - by) < 0.009

@@ -18,13 +18,13 @@ _STEP, _BESIDE = 0.008, 10
 _MOST = 3
 
 
-def find_steps(markers: Array, pairs: Indices) -> list[tuple[int, int, float]]:
+def find_steps(apart: Array, pairs: Indices) -> list[tuple[int, int, float]]:
     """Find frames from which on a marker sits elsewhere on its segment.
 
     Parameters
     ----------
-    markers : (T, M, 3) array
-        m; NaN where not seen.
+    apart : (T, N) array
+        Distances of pairs, m; NaN where not seen.
     pairs : (N, 2) integer array
         Markers of one segment each.
 
@@ -33,15 +33,13 @@ def find_steps(markers: Array, pairs: Indices) -> list[tuple[int, int, float]]:
     list of (frame, marker, change)
         The change is the largest of its distances to the others, m.
     """
-    if len(markers) < 2 * _BESIDE or not len(pairs):
+    if len(apart) < 2 * _BESIDE or not len(pairs):
         return []
-    away = markers[:, pairs[:, 0]] - markers[:, pairs[:, 1]]
-    apart = np.sqrt(np.einsum("tni,tni->tn", away, away))
     with np.errstate(invalid="ignore"):
         sudden = np.abs(np.diff(apart, axis=0)) > _STEP
     found = []
     for t in (np.flatnonzero(sudden.any(axis=1)) + 1).tolist():
-        if not _BESIDE <= t <= len(markers) - _BESIDE:
+        if not _BESIDE <= t <= len(apart) - _BESIDE:
             continue
         own = np.flatnonzero(sudden[t - 1])
         before, after = apart[t - _BESIDE : t, own], apart[t : t + _BESIDE, own]
@@ -53,18 +51,16 @@ def find_steps(markers: Array, pairs: Indices) -> list[tuple[int, int, float]]:
         )
         if change.max() <= _STEP:
             continue
-        total = np.bincount(
-            pairs[own[seen]].ravel(), np.repeat(change, 2), markers.shape[1]
-        )
+        total = np.bincount(pairs[own[seen]].ravel(), np.repeat(change, 2))
         found.append((t, int(total.argmax()), float(change.max())))
     return found
 
 
 def judge_steps(
-    where: str, labels: tuple[str, ...], time: Array, markers: Array, pairs: Indices
+    where: str, labels: tuple[str, ...], time: Array, apart: Array, pairs: Indices
 ) -> list[Finding]:
     """Say which markers sit elsewhere from a frame on; arguments as above."""
-    steps = find_steps(markers, pairs)
+    steps = find_steps(apart, pairs)
     if len(steps) > _MOST:
         return []
     return [
