@@ -1,12 +1,19 @@
 """The judge of single traces, and of names that are exchanged for a while."""
 
+from itertools import combinations
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ikns.calibration.judge.distances import all_distances, exchanged_by_distance
+from ikns.calibration.judge.distances import (
+    all_distances,
+    exchanged_by_distance,
+    pair_distances,
+)
 from ikns.calibration.judge.finding import say_frames
 from ikns.calibration.judge.jumps import find_jumps
+from ikns.calibration.judge.steps import find_steps
 from ikns.calibration.judge.traces import frozen, stand_ins, straight
 from ikns.calibration.judge.unit import wrong_unit
 
@@ -223,3 +230,29 @@ def test_smooth_movement_is_no_filled_gap(speed, rate):
     markers = place[:, None, None] * np.ones((1, 4, 3))
     markers[:, 1:] += np.arange(1, 4)[:, None] + 0.1 * time[:, None, None] ** 2
     assert not straight(time, markers).any()
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    marker=st.integers(0, MARKERS - 1),
+    first=st.integers(10, FRAMES - 10),
+    by=st.floats(0.02, 0.05),
+)
+@settings(max_examples=30)
+def test_a_marker_that_is_knocked_is_told_and_skin_that_gives_way_is_not(
+    seed, marker, first, by
+):
+    # Distances change by 16 mm and back once a second, as the worst of seven people's.
+    markers = swinging(seed)
+    skin = 0.004 * np.sin(2 * np.pi * TIME)
+    markers += skin[:, None, None] * np.array([1.0, -1, 1, -1, 1, -1])[:, None]
+    pairs = np.array(list(combinations(range(MARKERS), 2)))
+    assert find_steps(pair_distances(markers, pairs), pairs) == []
+    # Across the line on which they sit, and along it, so that distances change.
+    row = np.array([0.06, 0.02, 0.0]) / np.hypot(0.06, 0.02)
+    markers[first:, marker] += by * row
+    found = find_steps(pair_distances(markers, pairs), pairs)
+    assert [(t, m) for t, m, _ in found] == [(first, marker)]
+    # The difference of two medians of ten frames: noise of 0.8 mm, in the largest of
+    # five up to five times that; and what the skin does in 0.1 s, 5 mm.
+    assert abs(found[0][2] - by) < 0.009

@@ -163,15 +163,7 @@ def _as_exchanges(names: Indices) -> list[tuple[int, int]]:
     return done
 
 
-def frame_changes(markers: Array, pairs: Indices, usual: Array) -> Array:
-    """How far the worst pair of each frame is from its usual distance, (T,) m.
-
-    `usual` (N,) m is what the pair's distance is; 0 where a frame shows no pair.
-    """
-    if not len(pairs):
-        return np.zeros(len(markers))
-    first, second = markers[:, pairs[:, 0]], markers[:, pairs[:, 1]]
-    apart = first - second
-    change = np.abs(np.sqrt(np.einsum("tpi,tpi->tp", apart, apart)) - usual)
-    change[np.isnan(change)] = 0.0
-    return np.asarray(change.max(axis=1))
+def pair_distances(markers: Array, pairs: Indices) -> Array:
+    """Distance of each of pairs (N, 2) in each of frames (T, M, 3), (T, N) m."""
+    apart = markers[:, pairs[:, 0]] - markers[:, pairs[:, 1]]
+    return np.asarray(np.sqrt(np.einsum("tpi,tpi->tp", apart, apart)))

@@ -16,7 +16,8 @@ from ikns.calibration.judge.distances import (
     all_distances,
     changed_pairs,
     exchanged_by_distance,
-    frame_changes,
+    pair_distances,
+    quantile,
 )
 from ikns.calibration.judge.finding import (
     Finding,
@@ -26,6 +27,7 @@ from ikns.calibration.judge.finding import (
 )
 from ikns.calibration.judge.sides import other_side, sides_exchanged
 from ikns.calibration.judge.static import body_size
+from ikns.calibration.judge.steps import judge_steps
 from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.judge.traces import repeated
 from ikns.calibration.judge.tracking import judge_tracking
@@ -39,6 +41,8 @@ _ASTRAY = 0.04
 #: Another person: so many of the distances within segments are off, by so much, m. Of
 #: the same person, 14 % were off by 5 mm, none of them by 16.
 _OTHERS, _OTHERS_CHANGE = 0.35, 0.008
+#: Frames whose median distance is the usual one.
+_GLANCES = 60
 #: Share of the frames that may repeat the one before.
 _REPEATS = 0.02
 #: Shorter distances say nothing about a size, m.
@@ -105,7 +109,11 @@ def _judge(
     good = measured[~spoiled]
     distant, exchanges = _judge_distances(where, worn, good, pairs, apart)
     findings += distant
-    findings += _astray(where, worn, measured, spoiled, pairs, exchanges)
+    if not exchanges and len(pairs):
+        every = pair_distances(measured, pairs)
+        every[spoiled] = np.nan
+        findings += _astray(where, worn, every, pairs)
+        findings += judge_steps(where, worn.labels, recording.time, every, pairs)
     if skeleton is not None:
         order = np.arange(len(worn.markers))
         for a, b in exchanges:
@@ -299,28 +307,19 @@ def _unsteady(
     )
 
 
-def _astray(
-    where: str,
-    worn: MarkerSet,
-    markers: Array,
-    spoiled: Mask,
-    pairs: Indices,
-    exchanges: list[tuple[int, int]],
-) -> list[Finding]:
-    """Find frames in which a distance is off that is right in most others."""
-    if not len(pairs) or exchanges:
-        return []
-    usual = all_distances(markers[~spoiled]).middle[pairs[:, 0], pairs[:, 1]]
-    off = frame_changes(markers, pairs, usual) > _ASTRAY
-    off &= ~spoiled
+def _astray(where: str, worn: MarkerSet, apart: Array, pairs: Indices) -> list[Finding]:
+    """Find frames in which a distance is off that is right in most others.
+
+    `apart` (T, N) are the distances of pairs (N, 2), m.
+    """
+    usual = quantile(apart[:: max(1, len(apart) // _GLANCES)], 0.5)
+    with np.errstate(invalid="ignore"):
+        wrong: Mask = np.asarray(np.abs(apart - usual) > _ASTRAY)
+    off: Mask = np.asarray(wrong.any(axis=1))
     if not off.any() or off.mean() > 0.5:
         return []
-    change = np.zeros(len(worn.markers))
-    for (i, j), wont in zip(pairs, usual, strict=True):
-        apart = np.linalg.norm(markers[off, i] - markers[off, j], axis=1)
-        much = np.nansum(np.abs(apart - wont) > _ASTRAY)
-        change[[i, j]] += much
-    named = [worn.labels[i] for i in np.argsort(-change)[:2]]
+    often = np.bincount(pairs.ravel(), np.repeat(wrong.sum(axis=0), 2))
+    named = [worn.labels[i] for i in np.argsort(-often)[:2]]
     return [
         Finding(
             "astray",
