@@ -118,6 +118,10 @@ def test_what_shows_nothing_is_refused():
     static, free = other.static.recording, other.free.recording
     with pytest.raises(InvalidInput, match="natural movement of the new wearing"):
         rewear(subject, static, [])
+    named = dataclasses.replace(subject.skeleton.marker_set, name="mine")
+    own = dataclasses.replace(subject, skeleton=subject.skeleton.with_markers(named))
+    with pytest.raises(InvalidInput, match=r"markers of 'mine'.*give its .toml file"):
+        rewear(own, static, [free])
     place = np.flatnonzero(other.points.point == 0)
     held = small_person.cut(other.points.recording, place[0], place[-1])
     with pytest.raises(NotEnoughData, match="over the work space, found a hand"):

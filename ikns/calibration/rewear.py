@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ikns.body.marker_set import MarkerSet
 from ikns.calibration.measured_body import measured_body
 from ikns.calibration.method_summary import method_summary
 from ikns.calibration.natural import LEAST_NATURAL, check_covered, check_own_arm
@@ -84,6 +85,12 @@ def rewear(
     """
     if not natural:
         raise InvalidInput("expected natural movement of the new wearing, found none.")
+    worn = subject.skeleton.marker_set.name
+    if marker_set is None and worn not in MarkerSet.names():
+        raise InvalidInput(
+            f"the calibration was with the markers of '{worn}', a set of one's own; "
+            "give its .toml file with --marker-set (marker_set)."
+        )
     chain = subject.chain
     names = ", ".join(recording.source for recording in natural)
     measured = measured_body(
@@ -91,7 +98,7 @@ def rewear(
         natural,
         (),
         generic=subject.skeleton,
-        marker_set=marker_set or subject.skeleton.marker_set.name,
+        marker_set=marker_set or worn,
         chain=chain,
         min_static=min_static,
         progress=progress,
