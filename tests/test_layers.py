@@ -44,6 +44,7 @@ ONLY_IN = {
     "distributed": {"experiments"},
     "tornado": {"experiments", "view"},
     "pylsl": {"live"},
+    "natnet": {"live"},
     "qtm_rt": {"live"},
     "serial": {"finger"},
     "statsmodels": {"statistics"},

@@ -64,7 +64,10 @@ def calibrate(
     ] = False,
     source: Annotated[
         str | None,
-        typer.Option(help="replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST."),
+        typer.Option(
+            help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or "
+            "natnet:HOST (OptiTrack)."
+        ),
     ] = None,
     recordings: Annotated[
         Path | None,

@@ -33,7 +33,10 @@ ForIkns = Annotated[
 ]
 SourceAddress = Annotated[
     str | None,
-    typer.Option(help="For ikns: replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST."),
+    typer.Option(
+        help="For ikns: replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or "
+        "natnet:HOST (OptiTrack)."
+    ),
 ]
 SessionFolder = Annotated[
     Path | None,

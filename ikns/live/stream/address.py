@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl
 from ikns.body.marker_set import MarkerSet
 from ikns.calibration.subject import Subject
 from ikns.errors import IknsError, InvalidInput, MarkerMismatch
-from ikns.live.stream import qualisys, vicon
+from ikns.live.stream import natnet, qualisys, vicon
 from ikns.live.stream.frame import Feed
 from ikns.live.stream.lsl_feed import LslFeed
 from ikns.live.stream.lsl_search import Wanted
@@ -20,7 +20,7 @@ from ikns.live.stream.source import Source
 from ikns.live.stream.subjects import SubjectFeed, check_one_subject, subjects_of
 from ikns.recording.files import read
 
-_KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST"
+_KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or natnet:HOST"
 #: So many frames of a recording show the size of the body.
 _GLANCES = 1000
 
@@ -46,7 +46,8 @@ def open_source(
         ``?loop=yes``), ``lsl:NAME`` (``?scope=machine`` for streams of this machine
         only, ``?source_id=ID`` and ``?host=HOST`` for one of several streams of that
         name, ``?unit=mm``, cm or m for positions whose description names no unit or a
-        wrong one), ``qualisys:HOST`` or ``vicon:HOST`` (also ``HOST:PORT``). All take
+        wrong one), ``qualisys:HOST``, ``vicon:HOST``, or ``natnet:HOST`` for OptiTrack
+        (also ``HOST:PORT``). All take
         ``?subject=NAME`` for one of several subjects (``NAME:RSHO`` or ``NAME_RSHO``),
         and all but a replay ``?timeout=SECONDS``; options are joined by ``&``.
     needs : MarkerSet, optional
@@ -195,11 +196,16 @@ def _vicon(host: str, options: Options) -> Feed:
     return vicon.ViconFeed(*_host(host, vicon.PORT), timeout=_timeout(options))
 
 
+def _natnet(host: str, options: Options) -> Feed:
+    return natnet.NatNetFeed(*_host(host, natnet.PORT), timeout=_timeout(options))
+
+
 _KINDS: dict[str, tuple[Callable[[str, Options], Feed], tuple[str, ...]]] = {
     "replay": (_replay, ("speed", "loop", "subject")),
     "lsl": (_lsl, ("timeout", "scope", "source_id", "host", "unit", "subject")),
     "qualisys": (_qualisys, ("timeout", "subject")),
     "vicon": (_vicon, ("timeout", "subject")),
+    "natnet": (_natnet, ("timeout", "subject")),
 }
 
 
