@@ -44,18 +44,16 @@ def check_publish(address: str) -> PublishAddress:
     scheme, colon, rest = address.partition(":")
     name, _, query = rest.partition("?")
     if scheme != "lsl" or not (colon and name.strip() and name.isprintable()):
-        raise InvalidInput(f"--publish {address!r}: expected {_KNOWN}.")
+        raise InvalidInput(f"unknown place to publish {address!r}, expected {_KNOWN}.")
     options = dict(parse_qsl(query, keep_blank_values=True))
     scope = options.pop("scope", "machine")
     if options:
         raise InvalidInput(
-            f"--publish {address}: unknown option '{next(iter(options))}', expected "
-            "scope."
+            f"{address}: unknown option '{next(iter(options))}', expected scope."
         )
     if scope not in ("machine", "network"):
         raise InvalidInput(
-            f"--publish {address}: expected scope=machine or network, found "
-            f"scope={scope}."
+            f"{address}: expected scope=machine or network, found scope={scope}."
         )
     return PublishAddress(name, scope == "network")
 
@@ -96,4 +94,4 @@ def open_publisher(
     sink = LslSink(
         name, rate=rate, n_dof=n_dof, everywhere=everywhere, simulated=simulated
     )
-    return Publisher(f"--publish {address}", sink, on_fault=on_fault)
+    return Publisher(address, sink, on_fault=on_fault)

@@ -55,10 +55,10 @@ class LslSink:
         everywhere: bool = False,
         simulated: bool = False,
     ) -> None:
-        self._pylsl = lsl("--publish lsl:NAME", this_machine=not everywhere)
+        self._pylsl = lsl(f"publishing to lsl:{name}", this_machine=not everywhere)
         if everywhere and only_this_machine():
             raise StreamError(
-                f"--publish lsl:{name}: LSL was started for this machine only, by a "
+                f"lsl:{name}: LSL was started for this machine only, by a "
                 "source with scope=machine; leave scope out there, or here."
             )
         _check_free(self._pylsl, name)
@@ -156,6 +156,6 @@ def _check_free(pylsl: Any, name: str) -> None:
     found = pylsl.resolve_bypred(predicate, 1, _SEARCH)
     if found:
         raise StreamError(
-            f"--publish lsl:{name}: expected a name that no LSL stream has, found "
-            f"{describe_stream(found[0])}."
+            f"lsl:{name}: expected a name to publish under that no LSL stream has, "
+            f"found {describe_stream(found[0])}."
         )
