@@ -54,6 +54,7 @@ WRITE_FILE = ["", "{folder}", "{nowhere}/x", "{binary}/x", "{latin}", "{deep}"]
 PICTURE = [*WRITE_FILE, "x.exe", "x", "{binary}"]
 WRITE_FOLDER = ["", "{binary}", "{nowhere}/x", "{binary}/x", "{latin}", "{deep}"]
 SOURCE = ["", "x", "replay:", "replay:{nowhere}", "replay:{binary}", "replay:{folder}"]
+PUBLISH = ["", "x", "lsl:", "lsl: ", "udp:c", "lsl:c?scope=moon", "lsl:c?x=1"]
 FINGER = ["", "x", "sim:?safe=x", "dynamixel:", "dynamixel:{nowhere}?id=-1"]
 TEXT = ["", "a\udcff"]
 FLAG: list[str] = []
@@ -122,6 +123,7 @@ WRONG = {
     "participants": COUNT,
     "pilot": READ_FOLDER,
     "png": PICTURE,
+    "publish": PUBLISH,
     "point": [*COUNT, "99"],
     "point_seconds": POSITIVE,
     "points": COUNT,

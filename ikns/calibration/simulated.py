@@ -30,6 +30,16 @@ def is_simulated(
     return bool(subject.report.get("simulated")) or any(map(_says_simulated, places))
 
 
+def played_files(source: str) -> list[Path]:
+    """Return the file that a live source plays, if it plays one.
+
+    >>> [path.name for path in played_files("replay:walk.c3d?speed=2")]
+    ['walk.c3d']
+    """
+    scheme, _, rest = source.partition(":")
+    return [Path(rest.partition("?")[0])] if scheme == "replay" else []
+
+
 def _says_simulated(path: Path) -> bool:
     try:
         about = json.loads(path.read_text(encoding="utf-8"))

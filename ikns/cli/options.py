@@ -52,6 +52,13 @@ MarkerSetName = Annotated[
         "of a .toml file."
     ),
 ]
+Publish = Annotated[
+    str | None,
+    typer.Option(
+        help="lsl:NAME: c, flexion, state and residual as an LSL stream, and events as "
+        "another; on this machine only without lsl:NAME?scope=network.",
+    ),
+]
 OptionalMarkerSet = Annotated[
     str | None,
     typer.Option(

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ikns.cli.options import AsJson, LabelFile, Rename
+from ikns.cli.options import AsJson, LabelFile, Publish, Rename
 from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
@@ -104,6 +104,7 @@ def pick(
             max=100.0,
         ),
     ] = None,
+    publish: Publish = None,
     view: View = True,
     method: LiveMethod = "paper",
     realtime: Realtime = False,
@@ -162,6 +163,7 @@ def pick(
             realtime=realtime,
             method=method,
             names=label_names(rename, labels),
+            publish=publish,
         ),
         PageOptions(host, port, browser, _RATE),
         conditions=design["conditions"],

@@ -17,7 +17,7 @@ import typer
 import ikns
 from ikns.calibration.subject_files import check_subject_folder
 from ikns.cli.live_session import live_session, say, software
-from ikns.cli.options import AsJson, LabelFile, Rename, SubjectFolder
+from ikns.cli.options import AsJson, LabelFile, Publish, Rename, SubjectFolder
 from ikns.cli.output import show, table
 from ikns.cli.reading import label_names
 from ikns.cli.stop_notice import STOPPED, stop_line, watch_stops
@@ -34,7 +34,11 @@ _LINE_EVERY = 0.2
 def run(
     subject: SubjectFolder,
     source: Annotated[
-        str, typer.Option(help="replay:FILE, lsl:NAME, qualisys:HOST or vicon:HOST.")
+        str,
+        typer.Option(
+            help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or "
+            "natnet:HOST (OptiTrack)."
+        ),
     ],
     rename: Rename = None,
     labels: LabelFile = None,
@@ -77,6 +81,7 @@ def run(
             "the natural posture."
         ),
     ] = "paper",
+    publish: Publish = None,
     view: Annotated[
         bool, typer.Option("--view", help="Show the body live in a browser.")
     ] = False,
@@ -100,15 +105,18 @@ def run(
         raise InvalidInput("--resume needs the --session to continue.")
     check_subject_folder(subject)
 
-    from ikns.calibration.simulated import is_simulated
+    from ikns.calibration.simulated import is_simulated, played_files
     from ikns.finger import Safety, open_finger
     from ikns.live.control.settings import ControlSettings
+    from ikns.live.publish import check_publish, open_publisher
     from ikns.live.runtime import check_realtime
     from ikns.live.runtime import run as drive
     from ikns.live.stream import open_source
 
     if realtime:
         check_realtime()
+    if publish is not None:
+        check_publish(publish)
     settings = ControlSettings(hold_speed=hold_speed, method=method)
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
@@ -118,6 +126,18 @@ def run(
         stream = stack.enter_context(
             open_source(source, subject=calibrated, names=names)
         )
+        simulated = is_simulated(calibrated, subject, played_files(source))
+        publisher = None
+        if publish is not None:
+            publisher = stack.enter_context(
+                open_publisher(
+                    publish,
+                    rate=stream.rate * stream.speed,
+                    n_dof=calibrated.null_space_map.n_dof,
+                    simulated=simulated,
+                    on_fault=say,
+                )
+            )
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
         losses: list[str] = []
@@ -130,6 +150,7 @@ def run(
                 "renamed": names,
                 "finger": None if dry_run else finger,
                 "safe_state": safe_state,
+                "publish": publish,
                 "settings": dataclasses.asdict(settings),
             }
             writer = stack.enter_context(
@@ -150,7 +171,7 @@ def run(
             from ikns.view.scene import body_view
 
             window, take = stack.enter_context(
-                body_view(calibrated, simulated=is_simulated(calibrated, subject))
+                body_view(calibrated, simulated=simulated)
             )
             sys.stderr.write(f"ikns: the view is at {window.url} on this machine.\n")
             window.open()
@@ -167,6 +188,7 @@ def run(
             on_status=_each(shown),
             status_every=1 / 30 if view else _LINE_EVERY,
             on_notice=say,
+            listener=publisher,
             realtime=realtime,
         )
     if writer is not None:
@@ -175,7 +197,12 @@ def run(
             session = None
             sys.stderr.write("ikns: no frame came, so no session was kept.\n")
     title = f"{source} to {'nothing (dry run)' if dry_run else finger}"
-    _show_report(report, title, session, losses, as_json=as_json)
+    published = publisher and {
+        "sent": publisher.sent,
+        "dropped": publisher.dropped,
+        "fault": publisher.fault,
+    }
+    _show_report(report, title, session, losses, published, as_json=as_json)
     if code := _exit_code(report, losses):
         raise typer.Exit(code)
 
@@ -185,17 +212,22 @@ def _show_report(
     title: str,
     session: Path | None,
     losses: list[str],
+    published: dict[str, Any] | None,
     *,
     as_json: bool,
 ) -> None:
     """Print how a run went."""
-    result = _result(report) | {"session": session, "losses": losses}
+    result = _result(report) | {
+        "session": session,
+        "losses": losses,
+        "published": published,
+    }
     show(
         result,
         table(
             title,
             {"quantity": "s", "value": "s"},
-            _rows(report),
+            _rows(report, published),
         ),
         *([f"Note: {report.problem}"] if report.problem else []),
         *(
@@ -297,7 +329,7 @@ def _result(report: Report) -> dict[str, Any]:
     }
 
 
-def _rows(report: Report) -> list[list[str]]:
+def _rows(report: Report, published: dict[str, Any] | None) -> list[list[str]]:
     total = report.stages["total"]
     counted = report.source
     return [
@@ -317,4 +349,9 @@ def _rows(report: Report) -> list[list[str]]:
         ],
         ["frames that took longer than a frame", str(report.misses)],
         ["rows that are missing on disk", str(report.lost_rows)],
+        *(
+            [["published / dropped", "{sent} / {dropped}".format(**published)]]
+            if published
+            else []
+        ),
     ]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from ikns.cli.options import AsJson, LabelFile, Rename
+from ikns.cli.options import AsJson, LabelFile, Publish, Rename
 from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
@@ -118,6 +118,7 @@ def track(
         Literal["left", "trigger"],
         typer.Option(help="Gamepad input: left stick, up, or right trigger."),
     ] = "left",
+    publish: Publish = None,
     view: View = True,
     method: LiveMethod = "paper",
     realtime: Realtime = False,
@@ -193,6 +194,7 @@ def track(
             realtime=realtime,
             method=method,
             names=label_names(rename, labels),
+            publish=publish,
         ),
         PageOptions(host, port, browser, rate, stick),
         conditions=design["conditions"],

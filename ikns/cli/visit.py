@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import ikns
-from ikns.cli.live_session import software
+from ikns.cli.live_session import say, software
 from ikns.cli.output import show, table
 from ikns.cli.stop_notice import watch_stops
 from ikns.cli.visit_drivers import (
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         HeldInput,
         VisitLog,
     )
+    from ikns.live.publish import Publisher
     from ikns.live.runtime import LoopStatus
 
 #: A virtual operator begins after this long, s.
@@ -92,11 +93,18 @@ def conduct(
     with ExitStack() as stack:
         stack.enter_context(visit_lock(identity.folder))
         subject, simulated = _checked(identity, arm, pages, conditions)
+        rate = 0.0
         stop = stack.enter_context(stop_on_signals())
         if subject is not None:
             # A source that does not answer is reported before anything is written.
-            with open_arm_source(arm, subject):
+            with open_arm_source(arm, subject) as source:
                 ikns.warm_up()
+                rate = source.rate * source.speed
+        publisher = None
+        if arm.publish is not None:
+            publisher = _open_publisher(
+                stack, arm.publish, subject, rate, simulated=simulated
+            )
         common = _about(identity, arm, pages, conditions, simulated=simulated)
         common |= {
             "seed": seed,
@@ -112,6 +120,7 @@ def conduct(
             page_conditions={*PAGE, "ring"},
             rest=rest,
             auto=_VIRTUAL_WAIT if virtual else None,
+            on_event=None if publisher is None else publisher.visit_event,
         )
         held = {name: HeldInput() for name in PAGE if name in conditions}
         drivers = _page_drivers(held)
@@ -129,7 +138,7 @@ def conduct(
             if arm.view:
                 address = _open_view(stack, subject, shown, simulated=simulated)
             drivers["ikns"] = lambda: arm_driver(
-                arm, subject, session, identity.participant, shown, losses
+                arm, subject, session, identity.participant, shown, losses, publisher
             )
         presses: SimpleQueue[None] = SimpleQueue()
         if "ring" in conditions:
@@ -208,6 +217,10 @@ def _checked(
         )
     subject = arm_subject(arm) if "ikns" in conditions else None
     finger_opener(arm)
+    if arm.publish is not None:
+        from ikns.live.publish import check_publish
+
+        check_publish(arm.publish)
     check_port(pages.host, pages.port)
     _check_session(arm.session)
     simulated = virtual or (subject is not None and arm_is_simulated(subject, arm))
@@ -287,6 +300,28 @@ def _announce(page: str, panel: str, *, browser: bool) -> None:
     if browser:
         webbrowser.open(panel)
         webbrowser.open(page)
+
+
+def _open_publisher(
+    stack: ExitStack,
+    address: str,
+    subject: ikns.Subject | None,
+    rate: float,
+    *,
+    simulated: bool,
+) -> Publisher:
+    """Open a publisher; without an arm it has events only."""
+    from ikns.live.publish import open_publisher
+
+    return stack.enter_context(
+        open_publisher(
+            address,
+            rate=rate,
+            n_dof=0 if subject is None else subject.null_space_map.n_dof,
+            simulated=simulated,
+            on_fault=say,
+        )
+    )
 
 
 def _relative(path: Path, folder: Path) -> str:

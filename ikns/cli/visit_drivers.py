@@ -16,6 +16,7 @@ from ikns.errors import InvalidInput
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Driver
     from ikns.finger import Finger
+    from ikns.live.publish import Publisher
     from ikns.live.runtime import LoopStatus
     from ikns.live.session import RunWriter
     from ikns.live.stream import Source
@@ -51,6 +52,8 @@ class ArmOptions:
         What reads c off the posture.
     names : dict
         Other labels for markers of the source, new by old.
+    publish : str or None
+        Where signals and events are published.
     """
 
     subject: Path | None
@@ -64,6 +67,7 @@ class ArmOptions:
     realtime: bool
     method: Literal["paper", "intent"]
     names: dict[str, str]
+    publish: str | None = None
 
 
 @dataclass(frozen=True)
@@ -111,13 +115,11 @@ def arm_subject(arm: ArmOptions) -> ikns.Subject:
 
 def arm_is_simulated(subject: ikns.Subject, arm: ArmOptions) -> bool:
     """Whether the subject, or the recording that is played, is simulated."""
-    from ikns.calibration.simulated import is_simulated
+    from ikns.calibration.simulated import is_simulated, played_files
 
     assert arm.subject is not None
     assert arm.source is not None
-    scheme, _, rest = arm.source.partition(":")
-    played = [Path(rest.partition("?")[0])] if scheme == "replay" else []
-    return is_simulated(subject, arm.subject, played)
+    return is_simulated(subject, arm.subject, played_files(arm.source))
 
 
 def open_arm_source(
@@ -137,11 +139,12 @@ def arm_driver(
     participant: str,
     shown: Sequence[Callable[[LoopStatus], None]],
     losses: list[str],
+    publisher: Publisher | None = None,
 ) -> AbstractContextManager[Driver]:
     """Run the live loop as driver, with a session of its own.
 
     Every status goes to each callable in `shown`; what is missing on disk in the end is
-    added to `losses`.
+    added to `losses`. A publisher hears of every frame and event.
     """
     from ikns.experiments.conduct.live import live_driver
     from ikns.live.control.settings import ControlSettings
@@ -161,6 +164,7 @@ def arm_driver(
                 "renamed": arm.names,
                 "finger": arm.finger,
                 "safe_state": arm.safe_state,
+                "publish": arm.publish,
                 "settings": dataclasses.asdict(settings),
             },
             rate=source.rate,
@@ -181,6 +185,7 @@ def arm_driver(
         settings=settings,
         smooth=arm.smooth,
         on_status=tell if shown else None,
+        listener=publisher,
         realtime=arm.realtime,
     )
 

@@ -44,6 +44,8 @@ class Conductor:
     auto : float, optional
         Begin each trial after waiting this long, s, and end when all are done. Default:
         wait for commands.
+    on_event : callable, optional
+        Called with name, text and time (s) of every event of the visit; must not wait.
 
     Attributes
     ----------
@@ -87,6 +89,7 @@ class Conductor:
         page_conditions: Collection[str] = (),
         rest: float = 120.0,
         auto: float | None = None,
+        on_event: Callable[[str, str, float], None] | None = None,
     ) -> None:
         self.experiment, self.log = experiment, log
         self.emergency = Event()
@@ -99,6 +102,7 @@ class Conductor:
         self._visit = VisitState(
             experiment, log, page_conditions=page_conditions, rest=rest, auto=auto
         )
+        self._visit.listener = on_event
         self._reconnect = False
         self._planned = -1
         self._renew_plan()

@@ -17,6 +17,7 @@ from ikns.finger import Finger
 from ikns.live.control.controller import Decision
 from ikns.live.control.settings import ControlSettings
 from ikns.live.runtime import LoopStatus, Report, run
+from ikns.live.runtime.listener import LoopListener
 from ikns.live.session import RunWriter
 from ikns.live.stream import Source
 
@@ -79,6 +80,7 @@ class LiveDriver:
         subject: Subject,
         settings: ControlSettings,
         *,
+        listener: LoopListener | None = None,
         realtime: bool = False,
     ) -> None:
         """Start the loop."""
@@ -96,6 +98,7 @@ class LiveDriver:
                     on_status=self._take_status,
                     status_every=_STATUS_EVERY,
                     on_decision=self._take_decision,
+                    listener=listener,
                     realtime=realtime,
                 )
             except (IknsError, OSError) as error:
@@ -211,6 +214,7 @@ def live_driver(
     settings: ControlSettings | None = None,
     smooth: bool = False,
     on_status: Callable[[LoopStatus], None] | None = None,
+    listener: LoopListener | None = None,
     realtime: bool = False,
 ) -> Iterator[LiveDriver]:
     """Run the live loop while the context is open.
@@ -230,6 +234,8 @@ def live_driver(
         See :class:`LiveDriver`.
     on_status : callable, optional
         Called from the loop about 30 times per second; it must not block.
+    listener : LoopListener, optional
+        Hears of every frame and event of the loop.
     realtime : bool
         See :func:`ikns.live.runtime.run`.
     """
@@ -244,6 +250,7 @@ def live_driver(
             source,
             subject,
             ControlSettings() if settings is None else settings,
+            listener=listener,
             realtime=realtime,
         )
         yield driver

@@ -41,7 +41,9 @@ class VisitState:
         Answer to the last command; a refusal disappears when the visit's situation has
         changed, because it may no longer hold.
     on_event : callable or None
-        Called with name, text and time (s) of what happens.
+        Called with name, text and time (s) of what happens; changes with the source.
+    listener : callable or None
+        Likewise, for the whole visit.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class VisitState:
         self.message = ""
         self._refused_in: tuple[Any, ...] | None = None
         self.on_event: Callable[[str, str, float], None] | None = None
+        self.listener: Callable[[str, str, float], None] | None = None
         self._rest, self._auto = rest, auto
         self._break_end = -math.inf
         self._start = self._waiting_since = math.nan
@@ -264,5 +267,6 @@ class VisitState:
     def log_event(self, name: str, text: str, now: float) -> None:
         """Write what happened into the log of the visit, and pass it on."""
         self.log.log_event(name, text, time=now - self._start)
-        if self.on_event:
-            self.on_event(name, text, now)
+        for listener in (self.on_event, self.listener):
+            if listener:
+                listener(name, text, now)

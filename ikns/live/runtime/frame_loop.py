@@ -15,14 +15,10 @@ from ikns.finger import Finger
 from ikns.live.control.controller import Controller, Decision
 from ikns.live.control.safety import Changes
 from ikns.live.runtime.cache_warmer import CacheWarmer
+from ikns.live.runtime.listener import LoopListener
 from ikns.live.runtime.notices import Notices
 from ikns.live.runtime.report import LoopStatus, Report
-from ikns.live.runtime.session_log import (
-    write_frame,
-    write_notice,
-    write_stop,
-    write_transition,
-)
+from ikns.live.runtime.session_log import write_event, write_frame
 from ikns.live.session import RunWriter, micro
 from ikns.live.stream import Frame, Source
 from ikns.motion.marker_ik.rejection_count import RejectionCount
@@ -49,6 +45,8 @@ class FrameLoop:
     session : RunWriter, optional
     on_notice : callable, optional
         See :func:`ikns.live.runtime.run`.
+    listener : LoopListener, optional
+        Hears of frames and events.
 
     Attributes
     ----------
@@ -64,7 +62,9 @@ class FrameLoop:
         finger: Finger | None,
         session: RunWriter | None,
         on_notice: Callable[[str], None] | None = None,
+        listener: LoopListener | None = None,
     ) -> None:
+        self._listener = listener
         self._source, self._controller = source, controller
         self._columns, self._absent = columns, np.flatnonzero(columns < 0)
         self._finger, self._session = finger, session
@@ -86,6 +86,8 @@ class FrameLoop:
     def arm(self) -> None:
         """Start the clock and arm the safety machine."""
         self._start = time.monotonic()
+        if self._listener:
+            self._listener.event(self._start, "start", "time 0 of the run")
         self._apply(self._controller.machine.arm(0.0))
 
     def arm_again(self) -> None:
@@ -153,6 +155,8 @@ class FrameLoop:
                 measured=self._measured,
                 durations=(decided - began, done - received),
             )
+        if self._listener:
+            self._listener.decision(received, decision)
         report.stages["loop"].add(time.monotonic() - began)
         return decision
 
@@ -237,8 +241,8 @@ class FrameLoop:
         state = self._finger.state()
         self._measured, self._alert = state.flexion, state.alert
         if state.mode == "safe" and self._controller.machine.state != "safe":
-            if self._session:
-                write_stop(self._session, now, state.alert)
+            # A replay repeats it.
+            self._event(now, "stop", state.alert)
             self._apply(self._controller.machine.stop(now, f"finger: {state.alert}"))
 
     def _apply(self, changes: Changes) -> None:
@@ -251,13 +255,20 @@ class FrameLoop:
                 if self._finger is not None:
                     self._finger.make_safe(change.reason)
             self._notices.transition(change)
-            if self._session:
-                write_transition(self._session, change)
+            words = f"{change.before} to {change.after}: {change.reason}"
+            self._event(change.time, change.after, words)
 
     def _notice(self, now: float, sentence: str) -> None:
         self.report.notices.append(sentence)
         del self.report.notices[:-1000]
-        if self._session:
-            write_notice(self._session, now, sentence)
+        self._event(now, "notice", " ".join(sentence.split()))
         if self._on_notice:
             self._on_notice(sentence)
+
+    def _event(self, now: float, name: str, text: str) -> None:
+        """Write an event, and pass it on."""
+        onset = max(0.0, now)
+        if self._session:
+            write_event(self._session, onset, name, text)
+        if self._listener:
+            self._listener.event(self._start + onset, name, text)

@@ -21,6 +21,7 @@ from ikns.live.control.controller import Controller, Decision
 from ikns.live.control.frame import FrameSolver
 from ikns.live.control.settings import ControlSettings
 from ikns.live.runtime.frame_loop import FrameLoop
+from ikns.live.runtime.listener import LoopListener
 from ikns.live.runtime.priority import realtime_priority
 from ikns.live.runtime.report import LoopStatus, Report
 from ikns.live.session import RunWriter
@@ -42,6 +43,7 @@ def run(
     status_every: float = 0.2,
     on_decision: Callable[[float, float, Decision], None] | None = None,
     on_notice: Callable[[str], None] | None = None,
+    listener: LoopListener | None = None,
     realtime: bool = False,
 ) -> Report:
     """Drive a finger with a person's null space until the source ends.
@@ -78,6 +80,9 @@ def run(
         Called with a sentence: why the finger does not move yet, half a second after
         the start; that it is in its safe state, and why; and events of the source.
         Also from within the loop.
+    listener : LoopListener, optional
+        Hears of every frame and of every event that the session gets, also from within
+        the loop; :func:`ikns.live.publish.open_publisher` opens one that publishes.
     realtime : bool
         Give the loop priority over ordinary programs, where the system allows it.
 
@@ -134,7 +139,9 @@ def run(
         )
         for _ in range(2)
     )
-    loop = FrameLoop(source, controller, twin, columns, finger, session, on_notice)
+    loop = FrameLoop(
+        source, controller, twin, columns, finger, session, on_notice, listener
+    )
     # Compile or load everything before the finger is connected.
     controller.solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     controller.solver.compile()

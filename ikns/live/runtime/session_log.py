@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.live.control.controller import Decision
-from ikns.live.control.safety import Transition
 from ikns.live.session import RunWriter
 from ikns.live.session.channels import STATES
 
@@ -58,18 +57,6 @@ def write_frame(
     )
 
 
-def write_stop(session: RunWriter, time: float, alert: str) -> None:
-    """Write a stop that the finger asked for, so that a replay repeats it."""
-    session.row("events", [time, 0.0, "stop", alert])
-
-
-def write_transition(session: RunWriter, change: Transition) -> None:
-    """Write a state transition as an event."""
-    words = f"{change.before} to {change.after}: {change.reason}"
-    session.row("events", [max(0.0, change.time), 0.0, change.after, words])
-
-
-def write_notice(session: RunWriter, time: float, sentence: str) -> None:
-    """Write what was told during the run as an event."""
-    words = " ".join(sentence.split())
-    session.row("events", [max(0.0, time), 0.0, "notice", words])
+def write_event(session: RunWriter, time: float, name: str, text: str) -> None:
+    """Write an event at a time since the start, s."""
+    session.row("events", [time, 0.0, name, text])

@@ -17,6 +17,7 @@ from ikns.live.stream.optional import load_client
 
 _once = threading.Lock()
 _library: Any = None
+_this_machine = False
 
 
 def lsl(needed_by: str, *, this_machine: bool = False) -> Any:
@@ -35,15 +36,20 @@ def lsl(needed_by: str, *, this_machine: bool = False) -> Any:
     StreamError
         When pylsl is not installed.
     """
-    global _library
+    global _library, _this_machine
     with _once:
         if _library is None:
             module = load_client(
                 "pylsl", needed_by=needed_by, remedy="pip install 'ikns[lsl]'"
             )
             module.set_config_content(lsl_settings(this_machine=this_machine))
-            _library = module
+            _library, _this_machine = module, this_machine
         return _library
+
+
+def only_this_machine() -> bool:
+    """Whether LSL was started for this machine only."""
+    return _this_machine
 
 
 def lsl_settings(*, this_machine: bool) -> str:

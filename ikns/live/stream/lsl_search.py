@@ -60,7 +60,7 @@ def find_stream(pylsl: Any, wanted: Wanted, *, timeout: float) -> Any:
     StreamError
         When there is none within `timeout` seconds, or more than one.
     """
-    predicate = "name=" + _quoted(wanted.name) if wanted.name else ANY_MOCAP
+    predicate = "name=" + quoted(wanted.name) if wanted.name else ANY_MOCAP
     found = _resolve(pylsl, predicate, timeout, enough=wanted.fits)
     fit = [info for info in found if wanted.fits(info)]
     fit = [info for info in fit if _is_mocap(info)] or fit
@@ -93,7 +93,7 @@ def find_successor(pylsl: Any, lost: Any, *, timeout: float) -> Any | None:
     StreamError
         When there is more than one, or only another stream of that name.
     """
-    found = _resolve(pylsl, "name=" + _quoted(lost.name()), timeout)
+    found = _resolve(pylsl, "name=" + quoted(lost.name()), timeout)
     found = [info for info in found if _is_mocap(info)]
     origin = Wanted(lost.name(), lost.source_id(), lost.hostname())
     fit = [info for info in found if origin.fits(info)]
@@ -168,10 +168,10 @@ def _how_to_choose(found: list[Any], wanted: Wanted) -> str:
     return "no option of the address tells them apart, so end all but one"
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
     """Quote for XPath 1.0, which has no escapes.
 
-    >>> print(_quoted("it's"))
+    >>> print(quoted("it's"))
     "it's"
     """
     mark = '"' if "'" in text else "'"
