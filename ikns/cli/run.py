@@ -25,6 +25,7 @@ from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
+    from ikns.live.publish.publisher import Publisher
     from ikns.live.runtime import LoopStatus, Report
 
 #: Interval of the status line on the terminal, s.
@@ -168,14 +169,7 @@ def run(
         arm = threading.Event()
         shown = [stack.enter_context(_status_line(arm))]
         if view:
-            from ikns.view.scene import body_view
-
-            window, take = stack.enter_context(
-                body_view(calibrated, simulated=simulated)
-            )
-            sys.stderr.write(f"ikns: the view is at {window.url} on this machine.\n")
-            window.open()
-            shown.append(take)
+            shown.append(_body(stack, calibrated, simulated=simulated))
         report = drive(
             stream,
             calibrated,
@@ -197,14 +191,27 @@ def run(
             session = None
             sys.stderr.write("ikns: no frame came, so no session was kept.\n")
     title = f"{source} to {'nothing (dry run)' if dry_run else finger}"
-    published = publisher and {
-        "sent": publisher.sent,
-        "dropped": publisher.dropped,
-        "fault": publisher.fault,
-    }
-    _show_report(report, title, session, losses, published, as_json=as_json)
+    _show_report(report, title, session, losses, _published(publisher), as_json=as_json)
     if code := _exit_code(report, losses):
         raise typer.Exit(code)
+
+
+def _published(publisher: Publisher | None) -> dict[str, Any] | None:
+    if publisher is None:
+        return None
+    return {name: getattr(publisher, name) for name in ("sent", "dropped", "fault")}
+
+
+def _body(
+    stack: ExitStack, calibrated: ikns.Subject, *, simulated: bool
+) -> Callable[[LoopStatus], None]:
+    """Open the window with the body, and return what draws it."""
+    from ikns.view.scene import body_view
+
+    window, take = stack.enter_context(body_view(calibrated, simulated=simulated))
+    sys.stderr.write(f"ikns: the view is at {window.url} on this machine.\n")
+    window.open()
+    return take
 
 
 def _show_report(

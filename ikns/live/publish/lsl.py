@@ -68,7 +68,7 @@ class LslSink:
             "stamps": "time of receipt of the markers, as receive_time of the session",
             "simulated": "yes" if simulated else "no",
         }
-        self._samples = None
+        self._samples: Any = None
         if n_dof:
             self._samples = self._open(
                 name, "MISC", "double64", _channels(n_dof), about, everywhere=everywhere
@@ -86,7 +86,8 @@ class LslSink:
 
     def sample(self, at: float, values: tuple[float, ...]) -> None:
         """Send a sample, stamped with a time of `time.monotonic`."""
-        self._samples.push_sample(values, at + self._lsl_ahead)
+        if self._samples is not None:
+            self._samples.push_sample(values, at + self._lsl_ahead)
 
     def event(self, at: float, words: str) -> None:
         """Send an event."""
