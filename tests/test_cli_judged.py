@@ -103,6 +103,17 @@ def test_natural_movement_reaches_and_recordings_beside_a_static_trial_are_judge
         check_refused(argv, tmp_path, capfd, names=bad)
 
 
+def test_a_wrong_recording_can_be_looked_at(
+    files: Path,
+    wrong: dict[str, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    argv = ["view", str(files / "person"), str(wrong["exchanged"])]
+    assert main([*argv, "--to", "2", "--out", str(tmp_path / "view.html")]) == 0
+    assert "exchange RWRA and RWRB" in capsys.readouterr().err
+
+
 def test_what_spoils_a_moment_is_said_and_the_rest_is_used() -> None:
     person = small_person.subject()
     points = small_person.protocol().points.recording

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
-from ikns.calibration.judge.finding import refused
+from ikns.calibration.judge.finding import Finding, refused
 from ikns.calibration.judge.subjects import other_subject
 from ikns.errors import MarkerMismatch, naming
 from ikns.motion.marker_ik import MarkerIK
@@ -85,16 +85,30 @@ def require_usable(
 
     Arguments and errors as for :func:`judged_motion`.
     """
+    findings = known_findings(skeleton, recording, chain=chain, measured=measured)
+    if static is not None:
+        findings += other_subject(static, recording, skeleton.marker_set)
+    if faults := refused(findings):
+        raise MarkerMismatch(faults[0].sentence)
+    return [finding.sentence for finding in findings if finding.severity == "warn"]
+
+
+def known_findings(
+    skeleton: Skeleton,
+    recording: Recording,
+    *,
+    chain: str = "both_arms",
+    measured: bool = True,
+) -> list[Finding]:
+    """Judge a recording of a known person, the worst first, and refuse nothing.
+
+    Arguments as for :func:`judged_motion`.
+    """
     with naming(recording.source):
-        findings = judge_exploration(
+        return judge_exploration(
             recording,
             skeleton.marker_set,
             skeleton,
             skeleton=skeleton if measured else None,
             chain=chain,
         )
-    if static is not None:
-        findings += other_subject(static, recording, skeleton.marker_set)
-    if faults := refused(findings):
-        raise MarkerMismatch(faults[0].sentence)
-    return [finding.sentence for finding in findings if finding.severity == "warn"]

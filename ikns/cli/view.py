@@ -51,7 +51,7 @@ def view(
     """Show PCA points, volume and null space around the body, in one HTML file.
 
     With a recording the page plays it, together with the map and the c that --method
-    reads.
+    reads; also one that must not be used, and says what is wrong with it.
     """
     inputs = [subject, recording]
     refuse_overwriting(out, force=force, inputs=inputs)
@@ -97,7 +97,9 @@ def view(
     page = scene_html(scene)
     picture = None if png is None else scene_picture(scene)
     write_text(out, page, force=force)
-    remarks = []
+    remarks = [] if frames is None else _faults(person, frames)
+    for fault in remarks:
+        sys.stderr.write(f"ikns: note: {fault}\n")
     if png is not None and picture is not None:
         write_bytes(png, picture.png, force=force)
         if picture.note:
@@ -130,6 +132,16 @@ def view(
         f"Wrote {out}" if png is None else f"Wrote {out} and {png}",
         as_json=as_json,
     )
+
+
+def _faults(person: ikns.Subject, frames: ikns.Recording) -> list[str]:
+    """Say what is wrong with a recording, which is shown all the same."""
+    from ikns.calibration.judged_motion import known_findings
+
+    found = known_findings(
+        person.skeleton, frames, chain=person.chain, measured=person.measured
+    )
+    return [fault.sentence for fault in found if fault.severity != "note"]
 
 
 def _scene(
