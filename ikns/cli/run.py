@@ -197,11 +197,13 @@ def run(
             session = None
             sys.stderr.write("ikns: no frame came, so no session was kept.\n")
     title = f"{source} to {'nothing (dry run)' if dry_run else finger}"
-    published = publisher and {
-        "sent": publisher.sent,
-        "dropped": publisher.dropped,
-        "fault": publisher.fault,
-    }
+    published = None
+    if publisher is not None:
+        published = {
+            "sent": publisher.sent,
+            "dropped": publisher.dropped,
+            "fault": publisher.fault,
+        }
     _show_report(report, title, session, losses, published, as_json=as_json)
     if code := _exit_code(report, losses):
         raise typer.Exit(code)

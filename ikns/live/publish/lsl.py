@@ -68,7 +68,7 @@ class LslSink:
             "stamps": "time of receipt of the markers, as receive_time of the session",
             "simulated": "yes" if simulated else "no",
         }
-        self._samples = None
+        self._samples: Any = None
         if n_dof:
             self._samples = self._open(
                 name, "MISC", "double64", _channels(n_dof), about, everywhere=everywhere
