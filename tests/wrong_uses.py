@@ -53,7 +53,15 @@ READ_FOLDER = ["", "{nowhere}", "{binary}", "{folder}", "{latin}", "{deep}"]
 WRITE_FILE = ["", "{folder}", "{nowhere}/x", "{binary}/x", "{latin}", "{deep}"]
 PICTURE = [*WRITE_FILE, "x.exe", "x", "{binary}"]
 WRITE_FOLDER = ["", "{binary}", "{nowhere}/x", "{binary}/x", "{latin}", "{deep}"]
-SOURCE = ["", "x", "replay:", "replay:{nowhere}", "replay:{binary}", "replay:{folder}"]
+SOURCE = [
+    "",
+    "x",
+    "natnet:",
+    "replay:",
+    "replay:{nowhere}",
+    "replay:{binary}",
+    "replay:{folder}",
+]
 PUBLISH = ["", "x", "lsl:", "lsl: ", "udp:c", "lsl:c?scope=moon", "lsl:c?x=1"]
 FINGER = ["", "x", "sim:?safe=x", "dynamixel:", "dynamixel:{nowhere}?id=-1"]
 TEXT = ["", "a\udcff"]

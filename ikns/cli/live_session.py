@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import ikns
 
 if TYPE_CHECKING:
+    from ikns.live.publish import Publisher
     from ikns.live.session import RunWriter
 
 
@@ -87,6 +88,26 @@ def live_session(
                 discard_run(folder, number, whole=not resume)
             else:
                 losses += writer.losses
+
+
+@contextmanager
+def publishing(
+    address: str | None, subject: ikns.Subject | None, *, rate: float, simulated: bool
+) -> Iterator[Publisher | None]:
+    """Publish at an address, if there is one; without a subject, events only."""
+    if address is None:
+        yield None
+        return
+    from ikns.live.publish import open_publisher
+
+    with open_publisher(
+        address,
+        rate=rate,
+        n_dof=0 if subject is None else subject.null_space_map.n_dof,
+        simulated=simulated,
+        on_fault=say,
+    ) as publisher:
+        yield publisher
 
 
 def say(sentence: str) -> None:

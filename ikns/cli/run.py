@@ -16,7 +16,7 @@ import typer
 
 import ikns
 from ikns.calibration.subject_files import check_subject_folder
-from ikns.cli.live_session import live_session, say, software
+from ikns.cli.live_session import live_session, publishing, say, software
 from ikns.cli.options import AsJson, LabelFile, Publish, Rename, SubjectFolder
 from ikns.cli.output import show, table
 from ikns.cli.reading import label_names
@@ -25,7 +25,6 @@ from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.live.publish.publisher import Publisher
     from ikns.live.runtime import LoopStatus, Report
 
 #: Interval of the status line on the terminal, s.
@@ -109,7 +108,7 @@ def run(
     from ikns.calibration.simulated import is_simulated, played_files
     from ikns.finger import Safety, open_finger
     from ikns.live.control.settings import ControlSettings
-    from ikns.live.publish import check_publish, open_publisher
+    from ikns.live.publish import check_publish
     from ikns.live.runtime import check_realtime
     from ikns.live.runtime import run as drive
     from ikns.live.stream import open_source
@@ -128,17 +127,10 @@ def run(
             open_source(source, subject=calibrated, names=names)
         )
         simulated = is_simulated(calibrated, subject, played_files(source))
-        publisher = None
-        if publish is not None:
-            publisher = stack.enter_context(
-                open_publisher(
-                    publish,
-                    rate=stream.rate * stream.speed,
-                    n_dof=calibrated.null_space_map.n_dof,
-                    simulated=simulated,
-                    on_fault=say,
-                )
-            )
+        pace = stream.rate * stream.speed
+        publisher = stack.enter_context(
+            publishing(publish, calibrated, rate=pace, simulated=simulated)
+        )
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
         losses: list[str] = []
@@ -191,15 +183,10 @@ def run(
             session = None
             sys.stderr.write("ikns: no frame came, so no session was kept.\n")
     title = f"{source} to {'nothing (dry run)' if dry_run else finger}"
-    _show_report(report, title, session, losses, _published(publisher), as_json=as_json)
+    published = None if publisher is None else publisher.counts
+    _show_report(report, title, session, losses, published, as_json=as_json)
     if code := _exit_code(report, losses):
         raise typer.Exit(code)
-
-
-def _published(publisher: Publisher | None) -> dict[str, Any] | None:
-    if publisher is None:
-        return None
-    return {name: getattr(publisher, name) for name in ("sent", "dropped", "fault")}
 
 
 def _body(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import ikns
-from ikns.cli.live_session import say, software
+from ikns.cli.live_session import publishing, software
 from ikns.cli.output import show, table
 from ikns.cli.stop_notice import watch_stops
 from ikns.cli.visit_drivers import (
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
         HeldInput,
         VisitLog,
     )
-    from ikns.live.publish import Publisher
     from ikns.live.runtime import LoopStatus
 
 #: A virtual operator begins after this long, s.
@@ -100,11 +99,9 @@ def conduct(
             with open_arm_source(arm, subject) as source:
                 ikns.warm_up()
                 rate = source.rate * source.speed
-        publisher = None
-        if arm.publish is not None:
-            publisher = _open_publisher(
-                stack, arm.publish, subject, rate, simulated=simulated
-            )
+        publisher = stack.enter_context(
+            publishing(arm.publish, subject, rate=rate, simulated=simulated)
+        )
         common = _about(identity, arm, pages, conditions, simulated=simulated)
         common |= {
             "seed": seed,
@@ -300,28 +297,6 @@ def _announce(page: str, panel: str, *, browser: bool) -> None:
     if browser:
         webbrowser.open(panel)
         webbrowser.open(page)
-
-
-def _open_publisher(
-    stack: ExitStack,
-    address: str,
-    subject: ikns.Subject | None,
-    rate: float,
-    *,
-    simulated: bool,
-) -> Publisher:
-    """Open a publisher; without an arm it has events only."""
-    from ikns.live.publish import open_publisher
-
-    return stack.enter_context(
-        open_publisher(
-            address,
-            rate=rate,
-            n_dof=0 if subject is None else subject.null_space_map.n_dof,
-            simulated=simulated,
-            on_fault=say,
-        )
-    )
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -88,6 +88,11 @@ class Publisher:
         self._thread = threading.Thread(target=self._run, name="publish", daemon=True)
         self._thread.start()
 
+    @property
+    def counts(self) -> dict[str, int | str]:
+        """What was sent and dropped so far, and the fault."""
+        return {"sent": self.sent, "dropped": self.dropped, "fault": self.fault}
+
     def decision(self, received: float, decision: Decision) -> None:
         """Queue the result of a frame: c, flexion, state and residual."""
         values = (
