@@ -21,7 +21,6 @@ import numpy as np
 from forearm_skin import BESIDE, PEOPLE
 
 from ikns.errors import IknsError
-from ikns.numerics.rigid import rigid_transform
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
 
@@ -45,12 +44,20 @@ def places(recording: Recording, labels: list[str]) -> Array:
 def carried(static: Array, moving: Array) -> tuple[Array, Array]:
     """Rotations (T, 3, 3) and translations (T, 3) of a cluster since the static trial.
 
-    NaN where a marker is missing.
+    Least squares by singular values (Kabsch 1976), all frames at once; NaN where a
+    marker is missing.
     """
     rotation = np.full((len(moving), 3, 3), np.nan)
     translation = np.full((len(moving), 3), np.nan)
-    for i in np.flatnonzero(np.isfinite(moving).all(axis=(1, 2))):
-        rotation[i], translation[i] = rigid_transform(static, moving[i])
+    seen = np.isfinite(moving).all(axis=(1, 2))
+    middle = moving[seen].mean(axis=1)
+    spread = np.einsum(
+        "ni,tnj->tij", static - static.mean(axis=0), moving[seen] - middle[:, None]
+    )
+    left, _, right = np.linalg.svd(spread)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    rotation[seen] = np.swapaxes(left @ right, 1, 2)
+    translation[seen] = middle - rotation[seen] @ static.mean(axis=0)
     return rotation, translation
 
 
