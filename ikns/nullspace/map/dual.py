@@ -39,10 +39,10 @@ def dual_rows(components: Array, motions: Array) -> Array:
 
     Examples
     --------
-    >>> rows = dual_rows(np.eye(3)[:2], np.array([[1.0, 0, 0], [1.0, 1.0, 0]]))
-    >>> rows @ np.array([[1.0, 0, 0], [1.0, 1.0, 0]]).T
-    array([[1., 0.],
-           [0., 1.]])
+    >>> motions = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+    >>> rows = dual_rows(np.eye(3)[:2], motions)
+    >>> np.allclose(rows @ motions.T, np.eye(2), atol=1e-15)
+    True
     """
     inside = components @ motions.T
     unit = inside / np.linalg.norm(motions, axis=1)
