@@ -60,7 +60,7 @@ def pack_constants(constants: FrameConstants) -> tuple[Indices, Array]:
         len(gate.group), len(gate.pair), P, d, n,
         len(learned.numbers), len(learned.indices), len(learned.hands),
         len(learned.need), len(segments.speed), len(intent.numbers),
-        len(intent.leverage), segments.count,
+        len(intent.leverage), segments.total,
     ]  # fmt: skip
     whole = [
         np.array(header), paths.ends, paths.joint, intent.paths.ends,

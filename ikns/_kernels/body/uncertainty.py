@@ -60,7 +60,7 @@ class Segments(NamedTuple):
     of_marker: Indices  # (M,) segment, or -1 for a marker that is not the signal's
     of_joint: Indices  # (n, 2) segments on both sides of each, or -1
     speed: Array  # (n,) ordinary rate of each, rad/s or m/s
-    count: int
+    total: int
 
 
 def new_marker_memory(n_markers: int) -> Array:
@@ -138,7 +138,7 @@ def factor_information(
         s.beyond,
     )
     linearize_at(problem, s, 0.0)
-    ages = np.zeros((segments.count, 2))
+    ages = np.zeros((segments.total, 2))
     for m in range(len(memory)):
         k = segments.of_marker[m]
         if k >= 0:
