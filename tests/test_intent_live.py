@@ -60,8 +60,10 @@ def test_frames_of_a_recording_give_what_the_motion_gives():
     live = [solver.solve(frame) for frame in markers[:300]]
     c = np.array([frame.c[0] for frame in live])
     # Poses agree to the tolerance of the marker fit, 1e-6 rad or so.
-    np.testing.assert_allclose(c, offline[:300], rtol=0, atol=1e-4)
-    seen = np.isfinite(c)
+    seen = np.isfinite(c) & np.isfinite(offline[:300])
+    np.testing.assert_allclose(c[seen], offline[:300][seen], rtol=0, atol=1e-4)
+    # Live c goes on while a segment is hidden that it does not need.
+    assert np.isfinite(c).sum() >= seen.sum() > 0.8 * len(c)
     assert (
         np.mean(np.array([f.inside for f in live])[seen] == inside[:300][seen]) > 0.99
     )

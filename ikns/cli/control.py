@@ -31,6 +31,15 @@ def control(
     subject: SubjectFolder,
     out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("control.csv"),
     method: AnyMethod = "paper",
+    max_uncertainty: Annotated[
+        float,
+        typer.Option(
+            help="Leave c out while its standard deviation is larger. It is when "
+            "markers are hidden that c needs.",
+            min=0.0,
+            max=10.0,
+        ),
+    ] = 0.025,
     from_: From = None,
     to: To = None,
     force: Force = False,
@@ -60,7 +69,13 @@ def control(
             measured=calibrated.measured,
             progress=partial(report, recording.name),
         )
-    found = control_table(calibrated, motion, method=method)
+    found = control_table(
+        calibrated,
+        motion,
+        recording=frames,
+        method=method,
+        max_uncertainty=max_uncertainty,
+    )
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
     show(
@@ -79,9 +94,14 @@ def control(
                 ["frames", result["frames"]],
                 ["of these without a signal", result["frames_without_signal"]],
                 ["of these, markers rejected", result["frames_rejected"]],
+                ["of these, c too uncertain", result["frames_uncertain"]],
                 ["% with the hand in the volume", _percent(result["inside_share"])],
                 ["% with c cut off at 0 or 1", _percent(result["clipped_share"])],
                 ["median of c", round(result["c_median"], 3)],
+                [
+                    "median standard deviation of c",
+                    round(result["uncertainty_median"], 4),
+                ],
                 [
                     "median marker residual, mm",
                     round(1000 * result["residual_median_m"], 1),

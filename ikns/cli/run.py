@@ -74,6 +74,15 @@ def run(
             help="Hold the finger while the hand is faster, m/s.", min=0.0, max=100.0
         ),
     ] = None,
+    max_uncertainty: Annotated[
+        float,
+        typer.Option(
+            help="Hold the finger while the standard deviation of c is larger."
+            " It is when markers are hidden that c needs.",
+            min=0.0,
+            max=10.0,
+        ),
+    ] = 0.025,
     method: Annotated[
         Literal["paper", "intent"],
         typer.Option(
@@ -117,7 +126,9 @@ def run(
         check_realtime()
     if publish is not None:
         check_publish(publish)
-    settings = ControlSettings(hold_speed=hold_speed, method=method)
+    settings = ControlSettings(
+        hold_speed=hold_speed, method=method, max_uncertainty=max_uncertainty
+    )
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
     names = label_names(rename, labels)
@@ -296,7 +307,8 @@ def _line(s: LoopStatus) -> str:
     place = "inside" if s.inside else "OUTSIDE"
     return (
         f"{drive} {pace} {place:<7} residual {1e3 * s.residual:4.1f} mm "
-        f"worst {1e3 * s.worst_residual:3.0f} mm misses {s.misses}"
+        f"c +-{s.uncertainty:5.3f} worst {1e3 * s.worst_residual:3.0f} mm "
+        f"misses {s.misses}"
     )
 
 

@@ -19,6 +19,7 @@ from ikns.cli.visit_options import (
     FromStudy,
     Host,
     LiveMethod,
+    MaxUncertainty,
     Number,
     Participant,
     Port,
@@ -121,6 +122,7 @@ def track(
     publish: Publish = None,
     view: View = True,
     method: LiveMethod = "paper",
+    max_uncertainty: MaxUncertainty = 0.025,
     realtime: Realtime = False,
     rate: Annotated[
         float,
@@ -195,6 +197,7 @@ def track(
             method=method,
             names=label_names(rename, labels),
             publish=publish,
+            max_uncertainty=max_uncertainty,
         ),
         PageOptions(host, port, browser, rate, stick),
         conditions=design["conditions"],

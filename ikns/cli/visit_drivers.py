@@ -54,6 +54,8 @@ class ArmOptions:
         Other labels for markers of the source, new by old.
     publish : str or None
         Where signals and events are published.
+    max_uncertainty : float
+        Largest standard deviation of c with which the finger moves.
     """
 
     subject: Path | None
@@ -67,6 +69,7 @@ class ArmOptions:
     realtime: bool
     method: Literal["paper", "intent"]
     names: dict[str, str]
+    max_uncertainty: float
     publish: str | None = None
 
 
@@ -149,7 +152,11 @@ def arm_driver(
     from ikns.experiments.conduct.live import live_driver
     from ikns.live.control.settings import ControlSettings
 
-    settings = ControlSettings(hold_speed=arm.hold_speed, method=arm.method)
+    settings = ControlSettings(
+        hold_speed=arm.hold_speed,
+        method=arm.method,
+        max_uncertainty=arm.max_uncertainty,
+    )
 
     def open_session(source: Source) -> AbstractContextManager[RunWriter]:
         assert arm.subject is not None

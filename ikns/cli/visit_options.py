@@ -53,6 +53,14 @@ LiveMethod = Annotated[
         "from the natural posture."
     ),
 ]
+MaxUncertainty = Annotated[
+    float,
+    typer.Option(
+        help="For ikns: hold the finger while the standard deviation of c is larger.",
+        min=0.0,
+        max=10.0,
+    ),
+]
 View = Annotated[
     bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
 ]

@@ -103,7 +103,7 @@ def descend(
             if iterations > 0:
                 damping = max(damping / 10, 1e-12)
             if not converged and iterations < problem.max_iterations:
-                _linearize(problem, s, pull)
+                linearize_at(problem, s, pull)
             definite = true_hessian = True
         elif true_hessian:
             true_hessian = False
@@ -137,8 +137,11 @@ def descend(
 
 
 @compiled
-def _linearize(problem: MarkerProblem, s: Scratch, pull: float) -> None:
-    """Write gradient, Hessian and curvature where the errors were taken last."""
+def linearize_at(problem: MarkerProblem, s: Scratch, pull: float) -> None:
+    """Write gradient, Hessian and curvature where the errors were taken last.
+
+    Axes of joints are written too; penalties are those of ``s.moved`` and ``s.beyond``.
+    """
     joint_axes(problem.tree, s.rotation, s.translation, s.axes)
     linearize(
         problem.tree,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.descent import copy
+from ikns._kernels.body.descent import copy, errors_at
 from ikns._kernels.body.marker_gate import MarkerGate, fits, gate_figures
 from ikns._kernels.body.marker_ik import far_cost, solve_frame
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
@@ -123,7 +123,8 @@ def follow_frame(
     """Solve one frame from `memory.start`, and from scratch where that is suspicious.
 
     Written are the pose `q` (nq,), the figures of
-    :func:`ikns._kernels.body.marker_gate.gate_figures` and whether each limb `passed`.
+    :func:`ikns._kernels.body.marker_gate.gate_figures` and whether each limb `passed`;
+    `s` is left with the errors at that pose.
     """
     before = memory.numbers[_BEFORE]
     loose = before == _LATELY
@@ -156,6 +157,7 @@ def follow_frame(
             memory.numbers[_WAIT] = 0.0
         else:
             copy(s.kept, q)
+            errors_at(problem, s, q)
     return residual, iterations, converged
 
 

@@ -126,7 +126,7 @@ class Controller:
             dt = math.nan
         else:
             self._device_time, self._markers = device_time, seen
-        solved = self.solver.solve(markers)
+        solved = self.solver.solve(markers, dt)
         error = math.hypot(solved.residual, solved.intermarker_error)
         exchanged = NONE_EXCHANGED
         if new:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ikns._kernels.body import intent_signal as kernel
+from ikns._kernels.body.frame_constants import IntentNumbers
 from ikns.arrays import Array
 from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
@@ -37,7 +38,7 @@ class IntentSignal:
                 "paper or intent."
             )
         (side,) = chain_sides(readout.chain)
-        self._paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))
+        paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))
         natural = learned.natural_
         numbers = np.empty(kernel.SIZE)
         for start, values in (
@@ -51,11 +52,11 @@ class IntentSignal:
             (kernel.FORWARD, [*FORWARD, *DOWN]),
         ):
             numbers[start : start + len(values)] = values
-        self._numbers, self._leverage = numbers, np.array(natural.leverage_, order="C")
+        leverage = np.array(natural.leverage_, order="C")
+        #: What the kernels take.
+        self.constants = IntentNumbers(paths, numbers, leverage)
         self._work = np.empty((1, 2, 3, 3)), np.empty((1, 2, 3)), np.empty(10)
 
     def __call__(self, angles: Array) -> tuple[float, bool]:
         """Return c at joint angles (J,), and whether movement was taught there."""
-        return kernel.intent_signal(
-            self._paths, self._numbers, self._leverage, angles[None], *self._work
-        )
+        return kernel.intent_signal(*self.constants, angles[None], *self._work)

@@ -8,10 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.calibration.subject import Subject
+from ikns.errors import InvalidInput
+from ikns.live.control.frame import MAX_UNCERTAINTY, FrameSolver
 from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
-from ikns.nullspace.readout import Method
+from ikns.nullspace.interpolation import NaturalNeighborInterpolator
+from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.map.interpolator import NearestPoint
+from ikns.nullspace.readout import Method, Readout
 from ikns.numerics.median import finite_median
+from ikns.recording.recording import Recording
 
 
 class ControlTable(NamedTuple):
@@ -21,10 +27,10 @@ class ControlTable(NamedTuple):
     ----------
     columns : list of str
         ``time_s``; ``c``, clipped to 0 to 1 (``c_1``, ``c_2``, ... for several degrees
-        of freedom), NaN while the chain is not in sight or its markers are rejected;
+        of freedom), NaN while it is too uncertain or the chain's markers are rejected;
         ``hand_speed_m_s`` in the thorax frame; ``inside``, 1 within the volume of the
         PCA points, or of intent where natural movement was taught; ``residual_m`` of
-        the markers.
+        the markers; ``c_uncertainty`` (``c_1_uncertainty``, ...), a standard deviation.
     rows : (T, len(columns)) array
     summary : dict
         Counts, shares and medians, ready for JSON.
@@ -39,7 +45,9 @@ def control_table(
     subject: Subject,
     motion: Motion,
     *,
+    recording: Recording | None = None,
     method: Method = "paper",
+    max_uncertainty: float = MAX_UNCERTAINTY,
 ) -> ControlTable:
     """Compute the control signal of a recording.
 
@@ -48,24 +56,47 @@ def control_table(
     subject : Subject
     motion : Motion
         Of that subject.
+    recording : Recording, optional
+        That the motion was tracked from: which markers are hidden says how uncertain c
+        is. Without it, and where :class:`FrameSolver` does not know the map, that is
+        NaN, and c is known while the chain is in sight.
     method : {"paper", "proximal", "intent"}
         What reads c off the posture, see :mod:`ikns.nullspace.readout`.
+    max_uncertainty : float
+        c is NaN where its standard deviation is larger, by the rule of the live loop.
 
     Raises
     ------
     InvalidInput
         When the subject was calibrated without the method.
     """
-    chain = subject.chain
-    readout = subject.readout(method)
-    place = motion.task_position(chain)
-    raw = readout.control_signal(subject.skeleton, motion)
-    raw = raw.reshape(len(place), -1)
-    c = np.clip(raw, 0.0, 1.0)
+    learned, chain = subject.null_space_map, subject.chain
+    if not max_uncertainty > 0:
+        raise InvalidInput(
+            f"expected a positive max_uncertainty, found {max_uncertainty:g}."
+        )
+    readout, n = subject.readout(method), len(motion.time)
     inside = readout.inside(subject.skeleton, motion)
+    uncertainty, uncertain = np.full((n, learned.directions_.shape[1]), np.nan), 0
+    if recording is None or not _knows(readout):
+        raw = readout.control_signal(subject.skeleton, motion)
+    else:
+        uncertainty = _uncertainty(subject, readout, motion, recording)
+        raw, within = readout.of_postures(subject.skeleton, motion.q)
+        if raw.ndim == 1:
+            uncertainty = uncertainty[:, :1]
+        certain = uncertainty.reshape(raw.shape) <= max_uncertainty
+        believed = motion.believed(chain).reshape(n, *[1] * (raw.ndim - 1))
+        uncertain = int((~certain & believed).reshape(n, -1).any(axis=1).sum())
+        raw = np.where(certain & believed, raw, np.nan)
+        inside = within & np.isfinite(raw.reshape(n, -1)[:, 0])
+    raw = raw.reshape(n, -1)
+    c = np.clip(raw, 0.0, 1.0)
     names = ["c"] if c.shape[1] == 1 else [f"c_{k + 1}" for k in range(c.shape[1])]
+    known_worth = uncertainty[:, : c.shape[1]]
+    speed = motion.hand_speed(chain)
     rows = np.column_stack(
-        [motion.time, c, motion.hand_speed(chain), inside, motion.residual]
+        [motion.time, c, speed, inside, motion.residual, known_worth]
     )
     known = np.isfinite(raw).all(axis=1)
     clipped = (raw < 0) | (raw > 1)
@@ -73,12 +104,39 @@ def control_table(
     summary = {
         "frames": len(c),
         "frames_without_signal": int((~known).sum()),
+        "frames_uncertain": uncertain,
         "frames_rejected": sum(rejections.values()),
         "rejections": rejections,
         "inside_share": float((inside & known).sum() / max(known.sum(), 1)),
         "c_median": finite_median(c[:, 0]),
         "clipped_share": float(clipped.any(axis=1).sum() / max(known.sum(), 1)),
         "residual_median_m": finite_median(motion.residual),
+        "uncertainty_median": finite_median(uncertainty[:, 0]),
     }
     columns = ["time_s", *names, "hand_speed_m_s", "inside", "residual_m"]
+    columns += [f"{name}_uncertainty" for name in names]
     return ControlTable(columns, rows, summary)
+
+
+def _knows(readout: Readout) -> bool:
+    """Whether the live kernel knows a readout's map."""
+    if readout.method == "intent":
+        return True
+    known = NaturalNeighborInterpolator, NearestPoint
+    learned = readout.map
+    return (
+        readout.method == "paper"
+        and isinstance(learned, NullSpaceMap)
+        and isinstance(learned.interpolator_, known)
+    )
+
+
+def _uncertainty(
+    subject: Subject, readout: Readout, motion: Motion, recording: Recording
+) -> NDArray[np.float64]:
+    """Return the standard deviation of the signals of a recording, (T, d)."""
+    skeleton, chain = subject.skeleton, subject.chain
+    solver = FrameSolver(skeleton, subject.null_space_map, chain, readout=readout)
+    markers = skeleton.marker_set.pick(recording.labels, recording.markers)
+    believed = motion.believed(chain)
+    return solver.read(motion.q, markers, motion.time, believed)[1]

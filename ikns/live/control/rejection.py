@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.body.skeleton import Skeleton
 from ikns.live.control.frame import ControlFrame, FrameSolver
 from ikns.live.control.settings import ControlSettings
-from ikns.motion.marker_ik.rejection import misfit_reason, say_exchanged
+from ikns.motion.marker_ik.rejection import (
+    chain_columns,
+    misfit_reason,
+    say_exchanged,
+)
 from ikns.motion.marker_ik.visibility import sight_needs
 
 NONE_EXCHANGED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
@@ -48,7 +53,9 @@ def rejection_reason(
     """
     if not new:
         return "the same picture again"
-    if not solved.in_sight:
+    limit = solver.max_uncertainty
+    certain = solved.in_sight if limit is None else solved.uncertainty[0] <= limit
+    if not certain and not solved.in_sight:
         return f"the {_hidden(solver, markers)} is not in sight"
     if len(exchanged):
         labels = solver.skeleton.marker_set.labels
@@ -62,9 +69,24 @@ def rejection_reason(
             solved.residual,
             settings.limits,
         )
+    if not certain and np.isfinite(solved.uncertainty[0]):
+        return uncertain_reason(solver.skeleton, solver.chain, markers)
     if not np.isfinite(solved.c[0]):
         return "the hand is outside the map"
     return ""
+
+
+def uncertain_reason(
+    skeleton: Skeleton, chain: str, markers: NDArray[np.float64]
+) -> str:
+    """Say which hidden markers of a chain leave c uncertain, the first three."""
+    columns = chain_columns(skeleton, chain)
+    hidden = columns[~np.isfinite(markers[columns]).all(axis=1)]
+    if not hidden.size:
+        return "c is uncertain"
+    named = [skeleton.marker_set.labels[column] for column in hidden[:3]]
+    more = " and others" if len(hidden) > 3 else ""
+    return f"c is uncertain without {', '.join(named)}{more}"
 
 
 def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ikns.errors import InvalidInput
+from ikns.live.control.frame import MAX_UNCERTAINTY
 from ikns.motion.marker_ik.gate import GateLimits
 from ikns.nullspace.readout import Method
 
@@ -31,6 +32,9 @@ class ControlSettings:
         While the hand is faster, the flexion is held, m/s. Default: never.
     max_residual, max_worst_residual, max_intermarker_error : float
         See :class:`ikns.motion.marker_ik.gate.GateLimits`, m.
+    max_uncertainty : float or None
+        c moves nothing while its standard deviation is larger; see
+        :class:`ikns.live.control.FrameSolver`.
     method : {"paper", "intent"}
         What reads c off the posture, see :mod:`ikns.nullspace.readout`.
     hold_after, safe_after : float
@@ -44,6 +48,7 @@ class ControlSettings:
     max_residual: float = _LIMITS.residual
     max_worst_residual: float = _LIMITS.worst_residual
     max_intermarker_error: float = _LIMITS.intermarker_error
+    max_uncertainty: float | None = MAX_UNCERTAINTY
     method: Method = "paper"
     hold_after: float = 0.1
     safe_after: float = 0.5
@@ -64,6 +69,7 @@ class ControlSettings:
             "max_residual",
             "max_worst_residual",
             "max_intermarker_error",
+            "max_uncertainty",
         ):
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:

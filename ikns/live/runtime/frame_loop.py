@@ -216,6 +216,7 @@ class FrameLoop:
             c=math.nan if last is None else float(last.solved.c[0]),
             flexion=self._controller.flexion,
             measured=self._measured,
+            uncertainty=math.nan if last is None else float(last.solved.uncertainty[0]),
             state=self._controller.machine.state,
             q=self._unknown_q if last is None else last.solved.q,
             stopped=self._stop_reason(),

@@ -126,14 +126,15 @@ def run(
             f"{', '.join(marker_set.labels[:6])}, found "
             f"{', '.join(source.labels[:6])}."
         )
-    readout = None if settings is None else subject.readout(settings.method)
+    settings = ControlSettings() if settings is None else settings
     controller, twin = (
         Controller(
             FrameSolver(
                 subject.skeleton,
                 subject.null_space_map,
                 subject.chain,
-                readout=readout,
+                readout=subject.readout(settings.method),
+                max_uncertainty=settings.max_uncertainty,
             ),
             settings,
         )
@@ -144,7 +145,6 @@ def run(
     )
     # Compile or load everything before the finger is connected.
     controller.solver.solve(np.full((len(marker_set.labels), 3), np.nan))
-    controller.solver.compile()
     controller.solver.reset()
     stopped = threading.Event() if stop is None else stop
     with realtime_priority(realtime=realtime), connected(finger):

@@ -27,6 +27,8 @@ class Replayed:
     state : (T,) integer array
         State of the safety machine, an index into
         :data:`ikns.live.session.channels.STATES`.
+    uncertainty : (T,) array
+        Standard deviation of c.
     different : dict of str to int
         Number of frames that differ from the recorded values in any bit, by column.
     """
@@ -34,6 +36,7 @@ class Replayed:
     c: NDArray[np.float64]
     flexion: NDArray[np.float64]
     state: NDArray[np.int64]
+    uncertainty: NDArray[np.float64]
     different: dict[str, int]
 
     @property
@@ -75,7 +78,9 @@ def replay_run(run: Run) -> Replayed:
     """
     subject = Subject.load(run.subject_folder)
     try:
-        settings = ControlSettings(**run.configuration["settings"])
+        # Sessions from before this limit keep the rule they were recorded with.
+        given = {"max_uncertainty": None} | run.configuration["settings"]
+        settings = ControlSettings(**given)
     except (LookupError, TypeError) as error:
         raise FileError(
             f"{run.session}: the configuration of run {run.number} has no settings: "
@@ -86,11 +91,13 @@ def replay_run(run: Run) -> Replayed:
         subject.null_space_map,
         subject.chain,
         readout=subject.readout(settings.method),
+        max_uncertainty=settings.max_uncertainty,
     )
     controller = Controller(solver, settings)
     machine = controller.machine
     rows = len(run.frame)
-    c, flexion, state = np.empty(rows), np.empty(rows), np.empty(rows, dtype=np.int64)
+    c, flexion, uncertainty = np.empty((3, rows))
+    state = np.empty(rows, dtype=np.int64)
     # The watchdog's transitions follow from the frames' times; what else stopped the
     # finger, and who armed it again, do not.
     acts = [
@@ -104,6 +111,7 @@ def replay_run(run: Run) -> Replayed:
             run.markers[i], float(run.device_time[i]), float(run.receive_time[i])
         )
         c[i], flexion[i] = made.solved.c[0], made.flexion
+        uncertainty[i] = made.solved.uncertainty[0]
         state[i] = STATES.index(made.state)
         if made.valid and made.state == "armed":
             machine.activate(float(run.receive_time[i]))
@@ -119,8 +127,10 @@ def replay_run(run: Run) -> Replayed:
         "flexion_asked": (flexion, run.model["flexion_asked"]),
         "state": (state.astype(float), run.model["state"]),
     }
+    if first + "_uncertainty" in run.model:
+        recorded["uncertainty"] = uncertainty, run.model[first + "_uncertainty"]
     different = {
         name: int(np.sum(~((ours == theirs) | (np.isnan(ours) & np.isnan(theirs)))))
         for name, (ours, theirs) in recorded.items()
     }
-    return Replayed(c, flexion, state, different)
+    return Replayed(c, flexion, state, uncertainty, different)

@@ -35,6 +35,8 @@ class LoopStatus:
         Whether the hand is inside the hull of the map's points.
     c, flexion, measured : float
         Raw control signal, commanded flexion, measured flexion.
+    uncertainty : float
+        Standard deviation of c.
     state : str
         Of the safety machine.
     q : (nq,) array
@@ -55,6 +57,7 @@ class LoopStatus:
     c: float
     flexion: float
     measured: float
+    uncertainty: float
     state: str
     q: NDArray[np.float64]
     stopped: str = ""

@@ -50,6 +50,7 @@ def write_frame(
             solved.residual,
             solved.worst_residual,
             solved.intermarker_error,
+            *solved.uncertainty.tolist(),
             float(solved.inside),
             float(STATES.index(decision.state)),
             *durations,

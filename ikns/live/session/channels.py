@@ -90,7 +90,8 @@ def model_channels(joint_names: Sequence[str], n_dof: int = 1) -> list[Channel]:
     """Columns of the results.
 
     Thorax pose, joint angles, hand, control signal, flexion commanded, sent and
-    measured, and the quality and timing of the frame.
+    measured, and the quality and timing of the frame: ``c_uncertainty`` is the standard
+    deviation of c.
     """
     body = [
         Channel(f"thorax_{axis}", "POS", "m", axis, "thorax", "world") for axis in "xyz"
@@ -110,6 +111,10 @@ def model_channels(joint_names: Sequence[str], n_dof: int = 1) -> list[Channel]:
         Channel("c" if n_dof == 1 else f"c{k + 1}", "MISC", "n/a", form=_EXACT)
         for k in range(n_dof)
     ]
+    uncertainty = [
+        Channel(f"{channel.name}_uncertainty", "MISC", "n/a", form=_EXACT)
+        for channel in signal
+    ]
     finger = [
         Channel(name, "MISC", "n/a", tracked_point="finger", form=_EXACT)
         for name in ("flexion_asked", "flexion_sent", "flexion_measured")
@@ -118,6 +123,7 @@ def model_channels(joint_names: Sequence[str], n_dof: int = 1) -> list[Channel]:
         Channel("residual", "MISC", "m"),
         Channel("worst_residual", "MISC", "m"),
         Channel("intermarker_error", "MISC", "m"),
+        *uncertainty,
         Channel("inside", "MISC", "n/a", form="%d"),
         Channel("state", "MISC", "n/a", form="%d"),
         Channel("solve_time", "MISC", "s"),

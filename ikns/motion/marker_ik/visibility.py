@@ -51,6 +51,26 @@ def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], in
     }
 
 
+def joint_segments(skeleton: Skeleton) -> tuple[Indices, Indices]:
+    """Segment of each marker, (M,); segments on both sides of each joint, (nv, 2).
+
+    They are numbers, -1 for none: of markers that weigh nothing, and on the far side of
+    the thorax, whose six degrees of freedom are first.
+    """
+    segments = _segments(skeleton)
+    number = {link: k for k, link in enumerate(segments)}
+    of_marker = np.full(len(skeleton.marker_set.markers), -1, dtype=np.int64)
+    of_joint = np.full((skeleton.nv, 2), -1, dtype=np.int64)
+    root = skeleton.nv - len(skeleton.joint_names)
+    of_joint[:root, 0] = number["thorax"]
+    for link, segment in segments.items():
+        of_marker[segment.columns] = number[link]
+        if segment.before:
+            own = [root + joint for joint in segment.joints]
+            of_joint[own] = number[link], number[segment.before]
+    return of_marker, of_joint
+
+
 def visible_segments(skeleton: Skeleton, markers: Array) -> Visibility:
     """Say which segments markers (T, M, 3) show, and which joints are known.
 

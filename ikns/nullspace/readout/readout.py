@@ -13,7 +13,12 @@ from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.natural_posture import NaturalPosture
-from ikns.nullspace.readout.coordinates import METHODS, Method, readout_samples
+from ikns.nullspace.readout.coordinates import (
+    METHODS,
+    Method,
+    posture_samples,
+    readout_samples,
+)
 from ikns.nullspace.readout.intent import IntentMap
 
 
@@ -48,6 +53,14 @@ class Readout:
         """Control signal of a motion, not clipped, (T,) or (T, d)."""
         x, y = self.samples(skeleton, motion)
         return np.asarray(self.map.control_signal(y, x))
+
+    def of_postures(self, skeleton: Skeleton, q: Array) -> tuple[Array, Mask]:
+        """Signal (T,) or (T, d) and :meth:`inside` of postures (T, nq), seen or not."""
+        angles = q[:, -len(skeleton.joint_names) :]
+        x, y = posture_samples(
+            skeleton, angles, self.chain, self.method, reference=self.reference
+        )
+        return np.asarray(self.map.control_signal(y, x)), self.map.inside(x)
 
     def inside(self, skeleton: Skeleton, motion: Motion) -> Mask:
         """Whether the map was taught where the arm is, (T,)."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.live.control.controller import Controller
-from ikns.live.control.frame import FrameSolver
+from ikns.live.control.frame import MAX_UNCERTAINTY, FrameSolver
 from ikns.live.control.settings import ControlSettings
 from ikns.simulation.body_frames import BodyFrames
 from ikns.simulation.grasp.route import Route
@@ -55,7 +55,13 @@ class CarriedArm:
             occluded=float(run.settings["occluded"]),  # type: ignore[arg-type]
             skin=run.skin,
         )
-        solver = FrameSolver(subject.skeleton, subject.null_space_map, subject.chain)
+        limit = MAX_UNCERTAINTY if settings is None else settings.max_uncertainty
+        solver = FrameSolver(
+            subject.skeleton,
+            subject.null_space_map,
+            subject.chain,
+            max_uncertainty=limit,
+        )
         self._controller = Controller(solver, settings)
         self._delay = Delay(latency, rate=rate)
 

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.live.control.controller import Controller
-from ikns.live.control.frame import ControlFrame, FrameSolver
+from ikns.live.control.frame import MAX_UNCERTAINTY, ControlFrame, FrameSolver
 from ikns.live.control.settings import ControlSettings
 from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.artifacts import SoftTissue
@@ -96,8 +96,12 @@ class ArmLoop:
         )
         self._row = CubicSpline(place.motion.swivel, rows)
         self._low, self._high = place.motion.swivel[[0, -1]]
+        limit = MAX_UNCERTAINTY if settings is None else settings.max_uncertainty
         self._solver = FrameSolver(
-            subject.skeleton, subject.null_space_map, subject.chain
+            subject.skeleton,
+            subject.null_space_map,
+            subject.chain,
+            max_uncertainty=limit,
         )
         self._controller = (
             None if settings is None else Controller(self._solver, settings)
