@@ -16,6 +16,7 @@ from test_files_xdf import chunk, xdf
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.subject import Subject
 from ikns.cli import main
+from ikns.errors import StreamError
 from ikns.finger import SimulatedFinger
 from ikns.live.publish import Publisher, open_publisher
 from ikns.live.runtime import run
@@ -268,7 +269,7 @@ def test_a_visit_publishes_its_trials(tmp_path, name):
     from ikns.experiments.tracking import schedule
 
     about = {"experiment": "tracking", "participant": "01", "simulated": True}
-    steps = schedule(0, conditions=["keyboard"], training=0)
+    steps = schedule(0, conditions=["keyboard"], training=0, seconds=12.0)
     with open_publisher(f"lsl:{name}", rate=0.0, n_dof=0) as publisher:
         recorder = Recorder(f"{name}-events")
         log = VisitLog(tmp_path / "visit", about)
@@ -278,7 +279,7 @@ def test_a_visit_publishes_its_trials(tmp_path, name):
         start = time.monotonic()
         conductor.add_sample(start, 0.5)
         conductor.submit(Command("begin"))
-        for k in range(3010):
+        for k in range(1710):
             conductor.add_sample(start + k / 100, 0.5)
             conductor.update(start + k / 100)
     recorder.stop()
@@ -292,3 +293,10 @@ def test_a_visit_publishes_its_trials(tmp_path, name):
     lines = (tmp_path / "visit" / "log.jsonl").read_text().splitlines()
     logged = [json.loads(line)["time"] for line in lines]
     assert ended - begun == pytest.approx(logged[1] - logged[0], abs=1e-3)
+
+
+def test_a_scope_that_cannot_be_had_is_refused(name, monkeypatch):
+    lsl("a test", this_machine=True)
+    monkeypatch.setattr("ikns.live.stream.lsl_library._this_machine", True)
+    with pytest.raises(StreamError, match="was started for this machine only, by a so"):
+        open_publisher(f"lsl:{name}?scope=network", rate=100.0)

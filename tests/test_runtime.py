@@ -109,6 +109,23 @@ class Stuttering(Replay):
         return super().poll(timeout)
 
 
+class Backlog(Replay):
+    """Received its first frames long before they are asked for."""
+
+    def poll(self, timeout):
+        frame = super().poll(timeout)
+        if frame is not None and frame.number < 10:
+            return dataclasses.replace(frame, receive_time=frame.receive_time - 5)
+        return frame
+
+
+def test_frames_that_came_before_the_start_do_not_move_the_finger(subject, exploring):
+    with Source(Backlog(exploring, speed=0)) as source:
+        report = run(source, subject, SimulatedFinger())
+    assert report.frames == len(exploring.time) - 10
+    assert report.stages["total"].percentile(100) < 5
+
+
 def states(report):
     return [change.after for change in report.transitions]
 

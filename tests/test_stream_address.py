@@ -60,6 +60,8 @@ Frame#\tTime\tA\t\t
         ("lsl:x?scope=moon", "scope=machine or network, found scope=moon"),
         ("qualisys:host:zero", "port from 1 to 65535, found 'zero'"),
         ("vicon:host:70000", "port from 1 to 65535, found '70000'"),
+        ("natnet:host:0", "port from 1 to 65535, found '0'"),
+        ("natnet:host?scope=machine", "unknown option 'scope', expected timeout or"),
     ],
 )
 def test_an_address_that_cannot_be_opened(

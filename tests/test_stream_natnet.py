@@ -5,6 +5,7 @@ import threading
 import time
 from typing import Any
 
+import natnet
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,7 +14,7 @@ from natnet_server import FILLED, OCCLUDED, POINT_CLOUD, NatNetServer
 
 from ikns.errors import StreamError
 from ikns.live.stream import Frame, Source, open_source
-from ikns.live.stream.natnet_packets import split_message
+from ikns.live.stream.natnet_packets import Models, ServerFacts, split_message
 
 LABELS = ["RSHO", "RELB", "RWRA"]
 ARM = {"Ann": LABELS}
@@ -209,6 +210,42 @@ def test_no_server_and_two_servers_are_refused() -> None:
 def test_noise_is_no_message_or_is_all_there(noise: bytes) -> None:
     number, content = split_message(noise)
     assert number == -1 or len(noise) == 4 + len(content)
+
+
+PARTS = NatNetServer(ARM, bodies=["Wand"], port=0)
+WHOLE = {
+    "frame": PARTS.frame(1, 5.0, MARKERS[0], [], 0.004, changed=False),
+    "models": PARTS._models(),
+    "info": PARTS._info(),
+}
+PARTS._listening.close()
+
+
+@given(st.data(), st.sampled_from(sorted(WHOLE)))
+def test_damage_ends_in_a_sentence_or_in_numbers(data: Any, part: str) -> None:
+    whole = bytearray(WHOLE[part])
+    for _ in range(data.draw(st.integers(1, 4))):
+        place = data.draw(st.integers(0, len(whole) - 4))
+        whole[place : place + 4] = data.draw(st.binary(min_size=4, max_size=4))
+    damaged = bytes(whole[: data.draw(st.integers(0, len(whole)))])
+    four = natnet.Version(4, 1, 0, 0)
+    try:
+        if part == "info":
+            ServerFacts(natnet, damaged, "natnet:x")
+        elif part == "models":
+            assert Models(natnet, damaged, four, "natnet:x").labels
+        else:
+            models = Models(natnet, WHOLE["models"], four, "natnet:x")
+            assert models.frame(damaged)[1].shape == (3, 3)
+    except StreamError as error:
+        refused = "models and info", str(error)
+    except ValueError as error:
+        refused = "frame", f"natnet:x: {error}."
+    else:
+        return
+    assert part in refused[0]
+    assert refused[1].startswith("natnet:x: ")
+    assert refused[1].endswith(".")
 
 
 def test_damaged_frames_are_told_and_left_out() -> None:

@@ -85,7 +85,8 @@ class FrameLoop:
 
     def arm(self) -> None:
         """Start the clock and arm the safety machine."""
-        self._start = time.monotonic()
+        # What a source received before, while others were being opened, is outdated.
+        self._start = self._armed_at = time.monotonic()
         if self._listener:
             self._listener.event(self._start, "start", "time 0 of the run")
         self._apply(self._controller.machine.arm(0.0))

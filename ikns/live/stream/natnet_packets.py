@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -195,4 +196,27 @@ class Models:
 
 
 def _buffer(natnet: Any, content: bytes) -> Any:
-    return natnet.nat_net_client.PacketBuffer(content)
+    return _bounded(natnet.packet_buffer.PacketBuffer)(content)
+
+
+@cache
+def _bounded(buffer: Any) -> Any:
+    """Return the library's buffer, which here ends where the packet ends.
+
+    It reads texts beyond it, as many as a damaged count says.
+    """
+
+    class Bounded(buffer):
+        def read_string(
+            self, max_length: int | None = None, static_length: bool = False
+        ) -> str:
+            if self.pointer >= len(self.data):
+                raise struct.error("it ends within a text")
+            return str(super().read_string(max_length, static_length))
+
+        def read_float32_array(self, count: int) -> tuple[float, ...]:
+            if self.pointer + 4 * count > len(self.data):
+                raise struct.error("it ends within numbers")
+            return tuple(super().read_float32_array(count))
+
+    return Bounded
