@@ -86,7 +86,11 @@ def timed(arguments: list[str], code: int, version: Path, cache: str) -> Process
     }
     before, began = os.times(), time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", *script], env=environment, capture_output=True, text=True
+        # -P: the folder that this runs in may hold another version.
+        [sys.executable, "-P", "-c", *script],
+        env=environment,
+        capture_output=True,
+        text=True,
     )
     seconds, after = time.perf_counter() - began, os.times()
     if done.returncode != code:
