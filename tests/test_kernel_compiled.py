@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from ikns._kernels import compiled as module
-from ikns.live.warm_up import warm_up
+from ikns.live.warm_up import compiled_before, warm_up
 
 KERNELS = Path(module.__file__).parent
 
@@ -67,6 +67,8 @@ def test_without_any_place_code_is_compiled_and_not_kept(copy, monkeypatch):
     forget()
     assert module._cache_folder("body.step") is None
     assert not module.on_disk("body.step")
+    assert not module.can_keep("body.step")
+    assert compiled_before()  # nothing is gained by compiling ahead
 
 
 def test_numba_is_asked_to_keep_code_where_the_user_wants_it(copy, monkeypatch):

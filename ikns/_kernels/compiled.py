@@ -55,6 +55,11 @@ def on_disk(module: str) -> bool:
     return folder is not None and any(folder.glob(f"*{SUFFIX}"))
 
 
+def can_keep(module: str) -> bool:
+    """Whether there is a folder for machine code of a kernel file."""
+    return _cache_folder(module) is not None
+
+
 @functools.cache
 def _source(path: Path) -> tuple[str, set[str]]:
     """Return a kernel file's text and which kernel files it imports."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ikns._kernels.compiled import on_disk
+from ikns._kernels.compiled import can_keep, on_disk
 from ikns.body.skeleton import Skeleton
 from ikns.live.control import FrameSolver
 from ikns.motion.marker_ik import MarkerIK
@@ -23,8 +23,11 @@ _CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)
 
 
 def compiled_before() -> bool:
-    """Whether the kernels are compiled already and only have to be loaded."""
-    return on_disk("body.control_frame")
+    """Whether the kernels are compiled already and only have to be loaded.
+
+    Also where no folder keeps machine code: each process then compiles what it needs.
+    """
+    return on_disk("body.control_frame") or not can_keep("body.control_frame")
 
 
 def warm_up(progress: Callable[[str, int, int], None] | None = None) -> float:
