@@ -76,9 +76,30 @@ def test_a_session_of_the_loop_replays_bit_for_bit(
     recorded = read_run(folder)
     assert len(recorded.frame) == len(exploring.time)
     again = replay_run(recorded)
-    assert again.different == {"c": 0, "flexion_asked": 0, "state": 0}
+    kinds = ("c", "flexion_asked", "state", "uncertainty")
+    assert again.different == dict.fromkeys(kinds, 0)
     assert np.isfinite(again.c).mean() > 0.5
     assert check_session(folder) == []
+
+
+def test_a_session_from_before_there_was_an_uncertainty_replays(
+    subject, exploring, tmp_path
+):
+    folder, chosen = tmp_path / "session", ControlSettings(max_uncertainty=None)
+    with session_for(subject, folder, tmp_path, chosen) as session:
+        with source(exploring, speed=0) as stream:
+            run(stream, subject, settings=chosen, session=session)
+    recorded = read_run(folder)
+    old = {**recorded.configuration["settings"]}
+    del old["max_uncertainty"]
+    model = {name: v for name, v in recorded.model.items() if "uncertainty" not in name}
+    before = dataclasses.replace(
+        recorded,
+        configuration={**recorded.configuration, "settings": old},
+        model=model,
+    )
+    again = replay_run(before)
+    assert again.different == {"c": 0, "flexion_asked": 0, "state": 0}
 
 
 def test_a_replay_notices_a_changed_marker(subject, exploring, tmp_path):
