@@ -6,6 +6,7 @@ who follows prompts; the rest is the same.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -175,14 +176,12 @@ def calibrate(
     from ikns.calibration.subject_files import FILES
 
     chain = _chain(side, clavicle=clavicle)
-    _check_person({"--stature": stature, "--mass": mass, "--sex": sex})
+    generic = _body_of(stature, mass, sex)
     given_names = check_options(context, live=live, rewear=rewear, short=short)
-    inputs = [static, *(exploration or []), *(natural or []), marker_set, recordings]
-    inputs += [subject]
-    check_output_folder(out, FILES, force=force, inputs=inputs)
+    inputs = [static, *(exploration or []), *(natural or []), marker_set, subject]
+    check_output_folder(out, FILES, force=force, inputs=[*inputs, recordings])
     if rewear:
-        assert subject is not None
-        assert static is not None
+        assert subject is not None and static is not None  # noqa: PT018
         _rewear(
             read,
             subject,
@@ -195,18 +194,19 @@ def calibrate(
             as_json=as_json,
         )
         return
-    if short:
-        points = points if "points" in given_names else 2
-        static_seconds = static_seconds if "static_seconds" in given_names else 3.0
-        free_seconds = free_seconds if "free_seconds" in given_names else 0.0
-    elif live and not free_seconds > 0:
-        raise InvalidInput(
-            f"expected --free-seconds above 0 s, found {free_seconds:g} s; only "
-            "--short goes without free exploration."
-        )
-    generic = None
-    if stature is not None and mass is not None and sex is not None:
-        generic = ikns.Skeleton.from_anthropometry(stature, mass, sex)
+    points, static_seconds, free_seconds = _lengths(
+        (points, static_seconds, free_seconds), given_names, live=live, short=short
+    )
+    common: dict[str, Any] = {
+        "generic": generic,
+        "marker_set": marker_set,
+        "chain": chain,
+        "n_dof": n_dof,
+        "max_hand_speed": max_hand_speed,
+        "min_static": min_static,
+        "min_still": min_still,
+        "min_rest": min_rest,
+    }
     takes: list[dict[str, Any]] = []
     if live:
         if radius is not None and not radius > 0:
@@ -224,19 +224,11 @@ def calibrate(
                 resume=resume,
                 auto=auto,
             ),
-            generic=generic,
-            marker_set=marker_set,
-            chain=chain,
-            n_dof=n_dof,
-            max_hand_speed=max_hand_speed,
-            min_static=min_static,
-            min_still=min_still,
-            min_rest=min_rest,
+            **common,
         )
         natural = [*(natural or []), *movement]
     assert exploration is not None
     check_inputs([static, *exploration, *(natural or [])])
-
     from ikns.motion.unseen import warn_unseen
 
     explorations = [read(path, start=from_, end=to) for path in exploration]
@@ -245,20 +237,12 @@ def calibrate(
             None if static is None else read(static),
             explorations,
             natural=[read(path) for path in natural or []],
-            generic=generic,
-            marker_set=marker_set,
-            chain=chain,
-            # Also when points were skipped live: the clustering starts from the box of
-            # all samples, and clusters that stay empty are left out.
+            # Also when points were skipped live: clusters that stay empty are left out.
             n_points=points,
-            n_dof=n_dof,
-            max_hand_speed=max_hand_speed,
             radius=radius,
             outside=outside,
-            min_static=min_static,
-            min_still=min_still,
-            min_rest=min_rest,
             progress=report,
+            **common,
         )
     for frames in explorations:
         warn_unseen(person.skeleton, frames, chain)
@@ -279,13 +263,39 @@ def _chain(side: str, *, clavicle: bool) -> str:
     return "both_arms"
 
 
-def _check_person(options: dict[str, object]) -> None:
+def _lengths(
+    values: tuple[int, float, float], given: Container[str], *, live: bool, short: bool
+) -> tuple[int, float, float]:
+    """Points, and seconds of the static trial and of free exploration."""
+    points, static, free = values
+    if short:
+        return (
+            points if "points" in given else 2,
+            static if "static_seconds" in given else 3.0,
+            free if "free_seconds" in given else 0.0,
+        )
+    if live and not free > 0:
+        raise InvalidInput(
+            f"expected --free-seconds above 0 s, found {free:g} s; only --short goes "
+            "without free exploration."
+        )
+    return values
+
+
+def _body_of(
+    stature: float | None, mass: float | None, sex: str | None
+) -> ikns.Skeleton | None:
+    """Return a body from anthropometry; None without any of the three."""
+    if stature is not None and mass is not None and sex is not None:
+        return ikns.Skeleton.from_anthropometry(stature, mass, sex)
+    options = {"--stature": stature, "--mass": mass, "--sex": sex}
     given = [name for name, value in options.items() if value is not None]
-    if len(given) in (1, 2):
+    if given:
         raise InvalidInput(
             "expected --stature, --mass and --sex together or none of them, found "
             f"only {' and '.join(given)}."
         )
+    return None
 
 
 def _rewear(

@@ -25,6 +25,7 @@ from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
+    from ikns.live.publish.publisher import Publisher
     from ikns.live.runtime import LoopStatus, Report
 
 #: Interval of the status line on the terminal, s.
@@ -108,10 +109,7 @@ def run(
 
     Research software, not a medical device.
     """
-    if duration is not None and not 0 < duration < math.inf:
-        raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
-    if resume and session is None:
-        raise InvalidInput("--resume needs the --session to continue.")
+    _check_options(duration, session, resume=resume)
     check_subject_folder(subject)
 
     from ikns.calibration.simulated import is_simulated, played_files
@@ -134,41 +132,36 @@ def run(
     names = label_names(rename, labels)
     device = open_finger(finger, safety=Safety(safe_state=safe_state))
     with ExitStack() as stack:
-        stream = stack.enter_context(
-            open_source(source, subject=calibrated, names=names)
-        )
+        opened = open_source(source, subject=calibrated, names=names)
+        stream = stack.enter_context(opened)
         simulated = is_simulated(calibrated, subject, played_files(source))
         pace = stream.rate * stream.speed
-        publisher = stack.enter_context(
-            publishing(publish, calibrated, rate=pace, simulated=simulated)
-        )
+        shared = publishing(publish, calibrated, rate=pace, simulated=simulated)
+        publisher = stack.enter_context(shared)
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
         losses: list[str] = []
         writer = None
         if session is not None:
-            configuration = {
-                **software(),
+            started = {
                 "source": source,
                 "source_labels": list(stream.labels),
                 "renamed": names,
                 "finger": None if dry_run else finger,
                 "safe_state": safe_state,
                 "publish": publish,
-                "settings": dataclasses.asdict(settings),
             }
-            writer = stack.enter_context(
-                live_session(
-                    session,
-                    calibrated,
-                    subject,
-                    configuration,
-                    rate=stream.rate,
-                    participant=participant,
-                    resume=resume,
-                    losses=losses,
-                )
+            log = live_session(
+                session,
+                calibrated,
+                subject,
+                software() | started | {"settings": dataclasses.asdict(settings)},
+                rate=stream.rate,
+                participant=participant,
+                resume=resume,
+                losses=losses,
             )
+            writer = stack.enter_context(log)
         arm = threading.Event()
         shown = [stack.enter_context(_status_line(arm))]
         if view:
@@ -190,14 +183,21 @@ def run(
         )
     if writer is not None:
         report.lost_rows = writer.lost  # counted on disk once it is closed
-        if not report.frames:
-            session = None
-            sys.stderr.write("ikns: no frame came, so no session was kept.\n")
+    if writer is not None and not report.frames:
+        session = None
+        sys.stderr.write("ikns: no frame came, so no session was kept.\n")
     title = f"{source} to {'nothing (dry run)' if dry_run else finger}"
-    published = None if publisher is None else publisher.counts
-    _show_report(report, title, session, losses, published, as_json=as_json)
-    if code := _exit_code(report, losses):
-        raise typer.Exit(code)
+    _show_report(report, title, session, losses, publisher, as_json=as_json)
+    _exit(report, losses)
+
+
+def _check_options(
+    duration: float | None, session: Path | None, *, resume: bool
+) -> None:
+    if duration is not None and not 0 < duration < math.inf:
+        raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
+    if resume and session is None:
+        raise InvalidInput("--resume needs the --session to continue.")
 
 
 def _body(
@@ -217,11 +217,12 @@ def _show_report(
     title: str,
     session: Path | None,
     losses: list[str],
-    published: dict[str, Any] | None,
+    publisher: Publisher | None,
     *,
     as_json: bool,
 ) -> None:
     """Print how a run went."""
+    published = None if publisher is None else publisher.counts
     result = _result(report) | {
         "session": session,
         "losses": losses,
@@ -245,14 +246,15 @@ def _show_report(
     )
 
 
-def _exit_code(report: Report, losses: list[str]) -> int:
-    """Say what must not be missed, and return the exit code."""
+def _exit(report: Report, losses: list[str]) -> None:
+    """Say what must not be missed, and exit with its code."""
     if losses:
         raise DataLoss("; ".join(losses))
     if report.stopped or report.problem:
         say(stop_line(report.stopped) if report.stopped else report.problem)
-        return STOPPED
-    return signal_exit_code()
+        raise typer.Exit(STOPPED)
+    if code := signal_exit_code():
+        raise typer.Exit(code)
 
 
 def _most(rejections: dict[str, int]) -> list[tuple[str, int]]:

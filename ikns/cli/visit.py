@@ -79,12 +79,7 @@ def conduct(
     as_json : bool
     """
     from ikns.experiments.cockpit import Cockpit
-    from ikns.experiments.conduct import (
-        Command,
-        Conductor,
-        HeldInput,
-        run_visit,
-    )
+    from ikns.experiments.conduct import Command, Conductor, HeldInput, run_visit
     from ikns.experiments.visits import visit_lock
 
     session = arm.session or identity.folder / "session"
@@ -99,9 +94,8 @@ def conduct(
             with open_arm_source(arm, subject) as source:
                 ikns.warm_up()
                 rate = source.rate * source.speed
-        publisher = stack.enter_context(
-            publishing(arm.publish, subject, rate=rate, simulated=simulated)
-        )
+        shared = publishing(arm.publish, subject, rate=rate, simulated=simulated)
+        publisher = stack.enter_context(shared)
         common = _about(identity, arm, pages, conditions, simulated=simulated)
         common |= {
             "seed": seed,
@@ -142,21 +136,21 @@ def conduct(
             from ikns.experiments.conduct.ring import ring_driver
 
             drivers["ring"] = lambda: ring_driver(presses, finger_opener(arm))
-        cockpit = stack.enter_context(
-            Cockpit(
-                conductor,
-                held,
-                on_press=lambda: presses.put(None),
-                host=pages.host,
-                port=pages.port,
-                about={
-                    "participant": identity.participant,
-                    "simulated": simulated,
-                    "stick": pages.stick,
-                    "view": address,
-                },
-            )
+        shown_about = {
+            "participant": identity.participant,
+            "simulated": simulated,
+            "stick": pages.stick,
+            "view": address,
+        }
+        panel = Cockpit(
+            conductor,
+            held,
+            on_press=lambda: presses.put(None),
+            host=pages.host,
+            port=pages.port,
+            about=shown_about,
         )
+        cockpit = stack.enter_context(panel)
         _announce(cockpit.url, cockpit.panel_url, browser=pages.browser)
         run_visit(conductor, drivers, stop=stop, rate=pages.rate)
     _show_attempts(identity, conductor, losses, as_json=as_json)

@@ -135,7 +135,7 @@ def simulate_protocol(
     """
     if quick:
         free_seconds, point_seconds = min(free_seconds, 5.0), min(point_seconds, 3.0)
-    unsteadiness = Unsteadiness() if unsteadiness is None else unsteadiness
+    unsteadiness = unsteadiness or Unsteadiness()
     settings: dict[str, object] = {
         "seed": seed,
         "side": side,
@@ -190,23 +190,10 @@ def simulate_protocol(
         "free": person.seated(free, unsteadiness, rate, of_free),
         "points": person.seated(points, unsteadiness, rate, of_points),
     }
-    point = {"free": free[0].point, "points": points[0].point}
     skin = _skin(subject, soft_tissue, q, rng=of_skin)
-    trials = {
-        name: record_trial(
-            arms,
-            q[name],
-            name=name,
-            point=point.get(name, np.full(n_static, -1)),
-            with_static_only=name == "static",
-            noise=marker_noise,
-            skin=skin,
-            occluded=occluded,
-            rate=rate,
-            rng=rng,
-        )
-        for name, rng in zip(q, of_cameras.spawn(3), strict=True)
-    }
+    point = [np.full(n_static, -1), free[0].point, points[0].point]
+    cameras = {"noise": marker_noise, "occluded": occluded, "rate": rate}
+    trials = _recorded(arms, q, point, skin, cameras, of_cameras)
     return Protocol(
         subject=subject,
         side=side,
@@ -238,3 +225,28 @@ def _skin(
         angles=joints["points"],
         rng=rng,
     )
+
+
+def _recorded(
+    arms: list[ArmKinematics],
+    q: dict[str, Array],
+    point: list[NDArray[np.int64]],
+    skin: SoftTissue | None,
+    cameras: dict[str, float],
+    rng: np.random.Generator,
+) -> dict[str, Trial]:
+    """Return what the cameras see of each trial, in a stream of its own."""
+    streams = rng.spawn(len(q))
+    return {
+        name: record_trial(
+            arms,
+            q[name],
+            name=name,
+            point=at,
+            with_static_only=name == "static",
+            skin=skin,
+            rng=stream,
+            **cameras,
+        )
+        for name, at, stream in zip(q, point, streams, strict=True)
+    }
