@@ -179,7 +179,8 @@ def test_control_writes_what_the_live_loop_would_send(
     assert main([*argv, "--out", str(out)]) == 0
     assert capsys.readouterr().err == ""
     rows = read_csv(out)
-    assert list(rows) == ["time_s", "c", "hand_speed_m_s", "inside", "residual_m"]
+    measured = ["time_s", "c", "hand_speed_m_s", "inside", "residual_m"]
+    assert list(rows) == [*measured, "c_uncertainty"]
     known = np.isfinite(rows["c"])
     assert known.mean() > 0.8
     assert ((rows["c"][known] >= 0) & (rows["c"][known] <= 1)).all()

@@ -96,6 +96,7 @@ WRONG = {
     "frame": [*TEXT, "nowhere"],
     "free_seconds": POSITIVE,
     "hold_speed": FROM_ZERO,
+    "max_uncertainty": FROM_ZERO,
     "host": [*TEXT, "no.such.host.invalid", "999.1.1.1"],
     "id": [*NOT_WHOLE, "-1", "255"],
     "from_": ["", "nan", "1e999", "1e300", "no-such-event"],

@@ -55,12 +55,15 @@ def rejection_reason(
         return "the same picture again"
     limit = solver.max_uncertainty
     certain = solved.in_sight if limit is None else solved.uncertainty[0] <= limit
-    if not certain and not solved.in_sight:
+    fits = fits_markers(solved, settings)
+    # A marker that is wrong matters more than one that is hidden.
+    hides = fits or not np.isfinite(solved.residual)
+    if not certain and not solved.in_sight and hides:
         return f"the {_hidden(solver, markers)} is not in sight"
     if len(exchanged):
         labels = solver.skeleton.marker_set.labels
         return say_exchanged(tuple(labels[column] for column in exchanged))
-    if not fits_markers(solved, settings):
+    if not fits:
         return misfit_reason(
             solver.skeleton,
             solver.chain,

@@ -95,7 +95,7 @@ def read_run(session: str | Path, number: int | None = None) -> Run:
     ...     about = {"labels": ["C7"], "joint_names": [], "rate": 100.0}
     ...     with open_run(session, configuration={}, **about) as writer:
     ...         writer.row("markers", [0, 0.0, 0.0, 0.1, 0.2, 0.3])
-    ...         writer.row("model", [math.nan] * 21)
+    ...         writer.row("model", [math.nan] * 22)
     ...     run = read_run(session)
     >>> run.rate, run.markers.tolist()
     (100.0, [[[0.1, 0.2, 0.3]]])
