@@ -137,7 +137,7 @@ def main() -> None:
         "source": SOURCE.format(people=len({arm.person for arm in arms})),
         "license": LICENSE,
         "arms": len(arms),
-        # From rest to rest of one place; measured on the same people.
+        # From rest to rest at one place, an assumption: root mean square 1.9 deg.
         "rest_rad": round(float(np.radians(1.9)), 6),
     }
     table |= fields(arms) | poses(arms)

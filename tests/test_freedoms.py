@@ -137,3 +137,17 @@ def test_motions_outside_the_span_or_of_another_shape_are_refused() -> None:
     q = np.random.default_rng(2).normal(size=(len(x), 7)) * (np.arange(7) < 2)
     with pytest.raises(InvalidInput, match=r"motions \(2, 7\), found \(1, 7\)"):
         NullSpaceMap(8, n_dof=2).fit(x, q, motions=lambda q: np.eye(7)[:1])
+
+
+def test_the_score_is_the_share_in_the_span_however_the_rows_lie() -> None:
+    """Rows that are not orthogonal span the same plane, and explain the same."""
+    rng = np.random.default_rng(3)
+    x = np.repeat(0.3 * np.array(list(np.ndindex(2, 2, 2))), 60, axis=0)
+    q = rng.normal(size=(len(x), 7)) * [1, 1, 0, 0, 0, 0, 0]
+    skewed = np.array([np.eye(7)[0], (np.eye(7)[0] + np.eye(7)[1]) / np.sqrt(2)])
+    learned = NullSpaceMap(8, n_dof=2).fit(x, q, motions=lambda q: skewed)
+    assert (
+        abs(float((learned.directions_[0, 0] * learned.directions_[0, 1]).sum())) > 0.5
+    )
+    # Everything moves in that plane: rounding.
+    assert learned.score(x, q) == pytest.approx(1.0, abs=1e-12)

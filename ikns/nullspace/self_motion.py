@@ -103,7 +103,7 @@ def postures_along(
     lower, upper = learned.lower_[point, 0], learned.upper_[point, 0]
     s = lower + np.asarray(c) * (upper - lower) - z @ q[columns]
     postures = np.tile(q, (len(s), 1))
-    # Rows of Z are orthonormal, so Z @ q rises by s.
+    # A row of Z has unit length, so its own output rises by s.
     postures[:, columns] += s[:, None] * z
     return postures
 
