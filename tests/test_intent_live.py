@@ -8,11 +8,12 @@ import small_person
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ikns._kernels.body.intent_signal import intent_signal
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.live.control import FrameSolver
 from ikns.live.control.controller import Controller
-from ikns.live.control.intent import IntentSignal
+from ikns.live.control.intent import intent_numbers
 from ikns.live.control.settings import ControlSettings
 from ikns.nullspace.hinge_swivel import arm_swivel
 from ikns.nullspace.natural_posture import NaturalPosture
@@ -35,7 +36,8 @@ def test_the_kernel_is_the_formula(seed, side, guard):
     rng, body = np.random.default_rng(seed), Skeleton.load()
     one = readout(side, guard=guard)
     angles = rng.uniform(body.lower, body.upper)
-    c, taught = IntentSignal(body, one)(angles)
+    work = np.empty((1, 2, 3, 3)), np.empty((1, 2, 3)), np.empty(10)
+    c, taught = intent_signal(*intent_numbers(body, one), angles[None], *work)
     wrist, swivel = arm_swivel(body, angles, one.chain)
     expected = one.map.control_signal(swivel[..., None], wrist)
     # Some 100 terms of order 1 to 10; near a full turn both may differ by one.
@@ -94,7 +96,7 @@ def test_proximal_and_other_chains_are_refused_live():
     with pytest.raises(InvalidInput, match="reads recordings only"):
         ControlSettings(method="proximal")
     with pytest.raises(InvalidInput, match="reads recordings only"):
-        IntentSignal(subject.skeleton, subject.readout("proximal"))
+        intent_numbers(subject.skeleton, subject.readout("proximal"))
     other = dataclasses.replace(subject.readout("intent"), chain="left_arm")
     with pytest.raises(InvalidInput, match="expected a readout of right_arm"):
         FrameSolver(

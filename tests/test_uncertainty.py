@@ -18,7 +18,7 @@ from ikns.errors import InvalidInput
 from ikns.live.control import FrameSolver
 from ikns.live.control.controller import Controller
 from ikns.live.control.frame import MAX_UNCERTAINTY
-from ikns.live.control.intent import IntentSignal
+from ikns.live.control.intent import intent_numbers
 from ikns.live.control.recorded import control_table
 from ikns.live.control.settings import ControlSettings
 from ikns.motion.marker_ik import PRIOR, MarkerIK
@@ -37,7 +37,7 @@ def test_the_gradient_of_intent_is_its_finite_difference(seed, side, guard):
     one = readout(side, guard=guard)
     angles = 0.8 * rng.uniform(body.lower, body.upper)
     gradient = np.empty(len(angles))
-    intent_gradient(*IntentSignal(body, one).constants, angles, gradient)
+    intent_gradient(*intent_numbers(body, one), angles, gradient)
     step, differences = 1e-6, np.empty(len(angles))
     for j in range(len(angles)):
         ends = np.stack([angles, angles])

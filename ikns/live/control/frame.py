@@ -20,7 +20,7 @@ from ikns.arrays import Array, Mask
 from ikns.body.chains import SIDES, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.live.control.intent import IntentSignal
+from ikns.live.control.intent import intent_numbers
 from ikns.motion.marker_ik.joint_speed import joint_speeds
 from ikns.motion.marker_ik.kernel import KernelSolver
 from ikns.motion.marker_ik.visibility import joint_segments, sight_needs
@@ -154,7 +154,7 @@ class FrameSolver:
         self._ik = KernelSolver(skeleton)
         intent = IntentNumbers(skeleton.hand_paths, np.empty(0), np.empty((0, 0)))
         if readout is not None and readout.method != "paper":
-            intent = IntentSignal(skeleton, readout).constants
+            intent = intent_numbers(skeleton, readout)
         of_marker, of_joint = joint_segments(skeleton)
         control_map = _control_map(skeleton, null_space_map, chain)
         of_marker[control_map.link < 0] = -1

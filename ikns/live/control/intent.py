@@ -1,4 +1,4 @@
-"""The method intent in a live frame: its constants, and one compiled call."""
+"""The method intent in a live frame: its constants for the compiled calls."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from ikns._kernels.body import intent_signal as kernel
 from ikns._kernels.body.frame_constants import IntentNumbers
-from ikns.arrays import Array
 from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
@@ -15,8 +14,8 @@ from ikns.nullspace.natural_posture import MIDDLE, UNIT
 from ikns.nullspace.readout import IntentMap, Readout
 
 
-class IntentSignal:
-    """Control signal of solved poses, as the readout's own to rounding.
+def intent_numbers(skeleton: Skeleton, readout: Readout) -> IntentNumbers:
+    """Return what the kernels take to read c of intent off joint angles (J,), rad.
 
     Parameters
     ----------
@@ -29,34 +28,25 @@ class IntentSignal:
     InvalidInput
         For another method, which the live kernel does not know.
     """
-
-    def __init__(self, skeleton: Skeleton, readout: Readout) -> None:
-        learned = readout.map
-        if not isinstance(learned, IntentMap):
-            raise InvalidInput(
-                f"the method '{readout.method}' reads recordings only; live, choose "
-                "paper or intent."
-            )
-        (side,) = chain_sides(readout.chain)
-        paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))
-        natural = learned.natural_
-        numbers = np.empty(kernel.SIZE)
-        for start, values in (
-            (kernel.OWN, natural.coefficients_ - natural.people_),
-            (kernel.PEOPLE, natural.people_),
-            (kernel.OFFSET, [natural.offset_, natural.taught_leverage_]),
-            (kernel.GUARD, [float(natural.guard)]),
-            (kernel.LOWER, learned.ends_),
-            (kernel.MIRROR, [-1.0 if side == "left" else 1.0]),
-            (kernel.MIDDLE, [*MIDDLE, UNIT]),
-            (kernel.FORWARD, [*FORWARD, *DOWN]),
-        ):
-            numbers[start : start + len(values)] = values
-        leverage = np.array(natural.leverage_, order="C")
-        #: What the kernels take.
-        self.constants = IntentNumbers(paths, numbers, leverage)
-        self._work = np.empty((1, 2, 3, 3)), np.empty((1, 2, 3)), np.empty(10)
-
-    def __call__(self, angles: Array) -> tuple[float, bool]:
-        """Return c at joint angles (J,), and whether movement was taught there."""
-        return kernel.intent_signal(*self.constants, angles[None], *self._work)
+    learned = readout.map
+    if not isinstance(learned, IntentMap):
+        raise InvalidInput(
+            f"the method '{readout.method}' reads recordings only; live, choose "
+            "paper or intent."
+        )
+    (side,) = chain_sides(readout.chain)
+    paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))
+    natural = learned.natural_
+    numbers = np.empty(kernel.SIZE)
+    for start, values in (
+        (kernel.OWN, natural.coefficients_ - natural.people_),
+        (kernel.PEOPLE, natural.people_),
+        (kernel.OFFSET, [natural.offset_, natural.taught_leverage_]),
+        (kernel.GUARD, [float(natural.guard)]),
+        (kernel.LOWER, learned.ends_),
+        (kernel.MIRROR, [-1.0 if side == "left" else 1.0]),
+        (kernel.MIDDLE, [*MIDDLE, UNIT]),
+        (kernel.FORWARD, [*FORWARD, *DOWN]),
+    ):
+        numbers[start : start + len(values)] = values
+    return IntentNumbers(paths, numbers, np.array(natural.leverage_, order="C"))
