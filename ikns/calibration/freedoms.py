@@ -19,7 +19,7 @@ LEAST_SPAN = np.radians(15.0)
 #: An output of whose variance this much is a quadratic of those before it follows them
 #: (a self-motion is bent, so that one freedom alone also moves the second output).
 _FOLLOWS = 0.8
-#: Outputs whose correlation over the still samples is above this are told.
+#: Outputs with more than this correlation over the still samples are reported.
 _CORRELATED = 0.5
 #: The freedoms are there when so many of the places show each of them.
 _MOST = 2 / 3

@@ -1,4 +1,4 @@
-"""What does not change between frames, beside the body, as two arrays.
+"""What does not change between frames, besides the body, as two arrays.
 
 As with :mod:`ikns._kernels.body.marker_problem`: handing over an array from Python
 takes a quarter of a microsecond, a frame some forty, and these are thirty arrays.
@@ -41,7 +41,7 @@ class IntentNumbers(NamedTuple):
 
 
 class FrameConstants(NamedTuple):
-    """What a frame takes beside the packed marker problem."""
+    """What a frame takes besides the packed marker problem."""
 
     paths: Paths  # to both hands
     gate: MarkerGate

@@ -118,7 +118,7 @@ def exchanged_by_distance(
 def _gone_round(
     found: Distances, pairs: Indices, worn: Array | None, changes: Array
 ) -> tuple[list[tuple[int, int]], Array]:
-    """Find a segment whose names went round, which no single exchange makes better.
+    """Find a segment whose names were permuted in a cycle; no single exchange helps.
 
     Returns exchanges that mend it one after the other, and the changes left.
     """

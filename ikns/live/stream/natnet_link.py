@@ -184,6 +184,6 @@ def _read(ready: socket.socket) -> tuple[int, bytes, tuple[str, int]]:
     """Read one message: number, content and sender."""
     try:
         packet, sender = ready.recvfrom(_LARGEST)
-    except OSError:  # such as "refused": nobody listens at the port at present
+    except OSError:  # such as "refused": no one listens at the port at present
         return -1, b"", ("", 0)
     return *split_message(packet), sender
