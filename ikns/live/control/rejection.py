@@ -14,6 +14,7 @@ from ikns.motion.marker_ik.rejection import (
     say_exchanged,
 )
 from ikns.motion.marker_ik.visibility import sight_needs
+from ikns.nullspace.signal_names import signal_names
 
 NONE_EXCHANGED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
@@ -53,8 +54,14 @@ def rejection_reason(
     """
     if not new:
         return "the same picture again"
-    limit = solver.max_uncertainty
-    certain = solved.in_sight if limit is None else solved.uncertainty[0] <= limit
+    limit, worth = solver.max_uncertainty, solved.uncertainty
+    doubtful = 0
+    for dof in settings.dofs:
+        # A deviation that is NaN is not certain either.
+        if not (solved.in_sight if limit is None else worth[dof - 1] <= limit):
+            doubtful = dof
+            break
+    certain = not doubtful
     fits = fits_markers(solved, settings)
     # A marker that is wrong matters more than one that is hidden.
     hides = fits or not np.isfinite(solved.residual)
@@ -72,24 +79,27 @@ def rejection_reason(
             solved.residual,
             settings.limits,
         )
-    if not certain and np.isfinite(solved.uncertainty[0]):
-        return uncertain_reason(solver.skeleton, solver.chain, markers)
-    if not np.isfinite(solved.c[0]):
+    if doubtful and np.isfinite(worth[doubtful - 1]):
+        names = signal_names(len(worth))
+        return uncertain_reason(
+            solver.skeleton, solver.chain, markers, names[doubtful - 1]
+        )
+    if not all(np.isfinite(solved.c[dof - 1]) for dof in settings.dofs):
         return "the hand is outside the map"
     return ""
 
 
 def uncertain_reason(
-    skeleton: Skeleton, chain: str, markers: NDArray[np.float64]
+    skeleton: Skeleton, chain: str, markers: NDArray[np.float64], signal: str = "c"
 ) -> str:
-    """Say which hidden markers of a chain leave c uncertain, the first three."""
+    """Say which hidden markers of a chain leave a signal uncertain, the first three."""
     columns = chain_columns(skeleton, chain)
     hidden = columns[~np.isfinite(markers[columns]).all(axis=1)]
     if not hidden.size:
-        return "c is uncertain"
+        return f"{signal} is uncertain"
     named = [skeleton.marker_set.labels[column] for column in hidden[:3]]
     more = " and others" if len(hidden) > 3 else ""
-    return f"c is uncertain without {', '.join(named)}{more}"
+    return f"{signal} is uncertain without {', '.join(named)}{more}"
 
 
 def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
