@@ -61,7 +61,10 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
 
 
 def open_fingers(
-    addresses: Sequence[str], *, n_dof: int = 1, safety: Safety | None = None
+    addresses: Sequence[str],
+    *,
+    n_dof: int | None = None,
+    safety: Safety | None = None,
 ) -> FingerGroup:
     """Make fingers that each follow a freedom of a map, not connected yet.
 
@@ -70,8 +73,8 @@ def open_fingers(
     addresses : sequence of str
         As for :func:`open_finger`. ``dof=2`` is what drives a finger: the second
         freedom of the map; without it, the first.
-    n_dof : int
-        Freedoms of the map.
+    n_dof : int, optional
+        Freedoms of the map, where one is known.
     safety : Safety, optional
         Of each finger.
 
@@ -98,11 +101,10 @@ def open_fingers(
     fingers: list[Finger] = []
     for address in addresses:
         finger, dof = _opened(address, safety)
-        if not 1 <= dof <= n_dof:
-            most = f"1 to {n_dof}" if n_dof > 1 else "1"
+        if n_dof is not None and dof > n_dof:
             raise InvalidInput(
-                f"'{address}' wants dof={dof}, expected {most}: the map has "
-                f"{n_dof} freedom{'s' * (n_dof > 1)}."
+                f"'{address}' wants dof={dof}, but the map has {n_dof} "
+                f"freedom{'s' * (n_dof > 1)}."
             )
         if dof in taken:
             raise InvalidInput(
@@ -142,7 +144,7 @@ def _opened(address: str, safety: Safety) -> tuple[Finger, int]:
     if scheme == "sim" and colon:
         values = _options(address, rest.removeprefix("?"), _SIMULATED)
         safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
-        dof = values.pop("dof", 1)
+        dof = _dof(address, values.pop("dof", 1))
         if "width" in values:
             values["object_width"] = values.pop("width") / 1000
         return SimulatedFinger(safety=safety, **values), dof
@@ -154,12 +156,18 @@ def _opened(address: str, safety: Safety) -> tuple[Finger, int]:
             )
         values = _options(address, query, _DYNAMIXEL)
         safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
-        dof = values.pop("dof", 1)
+        dof = _dof(address, values.pop("dof", 1))
         for end in ("open", "closed"):
             if end in values:
                 values[f"{end}_ticks"] = values.pop(end)
         return DynamixelFinger(port, safety=safety, **values), dof
     raise InvalidInput(f"unknown finger '{address}', expected sim: or dynamixel:PORT.")
+
+
+def _dof(address: str, dof: int) -> int:
+    if dof < 1:
+        raise InvalidInput(f"'{address}' has dof={dof}, expected a number from 1 on.")
+    return dof
 
 
 def _options(
