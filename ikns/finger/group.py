@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Self
 
-from ikns.endings import exit_on_signals
+from ikns.endings import ending_requested, exit_on_signals
 from ikns.errors import InvalidInput
 from ikns.finger.state import Finger, FingerState
 
@@ -107,7 +107,7 @@ class FingerGroup:
         Never blocks, never raises.
         """
         states = [finger.state() for finger in self.fingers]
-        if len(states) == 1:
+        if len(states) == 1 or ending_requested():  # then each relaxes by itself
             return states
         still = [k for k, state in enumerate(states) if state.mode != "active"]
         if len(still) in (0, len(states)):
