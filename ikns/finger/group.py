@@ -93,12 +93,13 @@ class FingerGroup:
 
     def command(self, flexions: Sequence[float]) -> list[float]:
         """Request a flexion of each; return those sent. See :meth:`Finger.command`."""
+        if len(self.fingers) == 1:
+            return [self.fingers[0].command(*flexions)]
         sent = [
             finger.command(flexion)
             for finger, flexion in zip(self.fingers, flexions, strict=True)
         ]
-        if len(sent) > 1:
-            self.states()
+        self.states()
         return sent
 
     def states(self) -> list[FingerState]:
@@ -106,8 +107,10 @@ class FingerGroup:
 
         Never blocks, never raises.
         """
+        if len(self.fingers) == 1:
+            return [self.fingers[0].state()]
         states = [finger.state() for finger in self.fingers]
-        if len(states) == 1 or ending_requested():  # then each relaxes by itself
+        if ending_requested():  # then each relaxes by itself
             return states
         still = [k for k, state in enumerate(states) if state.mode != "active"]
         if len(still) in (0, len(states)):
@@ -141,6 +144,8 @@ class FingerGroup:
         states : sequence of FingerState
             Of each finger.
         """
+        if len(states) == 1:
+            return states[0].alert
         alerts = [state.alert for state in states]
         if len(set(alerts)) == 1:
             return alerts[0]

@@ -105,6 +105,7 @@ class Controller:
                 f"expected dofs up to the map's {n_dof}, found {max(s.dofs)}."
             )
         self.flexions = [math.nan] * n_dof
+        self._first = s.dofs[0] - 1
         self._axes = [
             (dof - 1, OneEuro(cutoff=s.cutoff, beta=s.beta)) for dof in s.dofs
         ]
@@ -120,7 +121,7 @@ class Controller:
     @property
     def flexion(self) -> float:
         """Commanded flexion of the first finger."""
-        return self.flexions[self._axes[0][0]]
+        return self.flexions[self._first]
 
     @property
     def smoothing_delay(self) -> float:
@@ -173,12 +174,12 @@ class Controller:
             changes = machine.pose(receive_time, self._why)
             self._why = _SILENCE
             self._counted = receive_time, solved.q
-            self._follow(solved.c, solved.hand_in_thorax, dt)
+            self._follow(solved.c.tolist(), solved.hand_in_thorax, dt)
         flexions = tuple(self.flexions)
         return Decision(
             solved,
             rejection,
-            flexions[self._axes[0][0]],
+            flexions[self._first],
             machine.state,
             changes,
             flexions,
@@ -188,9 +189,7 @@ class Controller:
         """Check the watchdog while no frame comes."""
         return self.machine.check(now, self._why)
 
-    def _follow(
-        self, c: NDArray[np.float64], hand: NDArray[np.float64], dt: float
-    ) -> None:
+    def _follow(self, c: list[float], hand: NDArray[np.float64], dt: float) -> None:
         place = tuple(hand.tolist())
         step = math.dist(place, self._hand)
         speed = self._speed.step(step / dt if math.isfinite(dt) else math.nan, dt)
@@ -199,7 +198,7 @@ class Controller:
         limit = settings.hold_speed
         held = self.machine.state in ("holding", "safe") or (limit and speed > limit)
         for k, smooth in self._axes:
-            wanted = min(max(smooth.step(float(c[k]), dt), 0.0), 1.0)
+            wanted = min(max(smooth.step(c[k], dt), 0.0), 1.0)
             now = flexions[k]
             if math.isnan(now) or (
                 not held

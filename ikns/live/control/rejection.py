@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,18 +56,17 @@ def rejection_reason(
     """
     if not new:
         return "the same picture again"
-    limit, worth = solver.max_uncertainty, solved.uncertainty
+    limit, worth = solver.max_uncertainty, solved.uncertainty.tolist()
     doubtful = 0
     for dof in settings.dofs:
         # A deviation that is NaN is not certain either.
         if not (solved.in_sight if limit is None else worth[dof - 1] <= limit):
             doubtful = dof
             break
-    certain = not doubtful
     fits = fits_markers(solved, settings)
     # A marker that is wrong matters more than one that is hidden.
-    hides = fits or not np.isfinite(solved.residual)
-    if not certain and not solved.in_sight and hides:
+    hides = fits or not math.isfinite(solved.residual)
+    if doubtful and not solved.in_sight and hides:
         return f"the {_hidden(solver, markers)} is not in sight"
     if len(exchanged):
         labels = solver.skeleton.marker_set.labels
@@ -79,13 +80,15 @@ def rejection_reason(
             solved.residual,
             settings.limits,
         )
-    if doubtful and np.isfinite(worth[doubtful - 1]):
+    if doubtful and math.isfinite(worth[doubtful - 1]):
         names = signal_names(len(worth))
         return uncertain_reason(
             solver.skeleton, solver.chain, markers, names[doubtful - 1]
         )
-    if not all(np.isfinite(solved.c[dof - 1]) for dof in settings.dofs):
-        return "the hand is outside the map"
+    c = solved.c.tolist()
+    for dof in settings.dofs:
+        if not math.isfinite(c[dof - 1]):
+            return "the hand is outside the map"
     return ""
 
 

@@ -25,8 +25,6 @@ from ikns.motion.marker_ik.rejection_count import RejectionCount
 
 #: Longest time between two commands to the finger and checks of the watchdog, s.
 _KEEP_ALIVE = 0.02
-#: Command with which the finger brakes and stays where it is.
-_HOLD = math.nan
 
 
 class FrameLoop:
@@ -74,6 +72,7 @@ class FrameLoop:
         self._period = 1 / pace if pace else math.inf
         self._warmer = CacheWarmer(twin, self._period)
         self._unknown_q = np.full(len(controller.solver.skeleton.neutral()), np.nan)
+        self._in_order = self._driven == [*range(len(controller.flexions))]
         self._unknown = [math.nan] * len(controller.flexions)
         self._measured = self._unknown
         self._first_device_time = math.nan
@@ -254,28 +253,29 @@ class FrameLoop:
         """Command the fingers, which limit what they do; return what was sent."""
         if self._fingers is None:
             return self._unknown
-        moving = self._controller.machine.state in ("active", "holding")
         wanted = self._controller.flexions
-        return self._by_dof(
-            self._fingers.command(
-                [wanted[k] if moving else _HOLD for k in self._driven]
-            )
-        )
+        if self._controller.machine.state not in ("active", "holding"):
+            wanted = self._unknown  # NaN: brake and stay
+        if self._in_order:
+            return self._fingers.command(wanted)
+        return self._by_dof(self._fingers.command([wanted[k] for k in self._driven]))
 
     def _check_fingers(self, now: float) -> None:
         """Stop when a finger has gone to its safe state by itself."""
         if self._fingers is None:
             return
         states = self._fingers.states()
-        self._measured = self._by_dof([state.flexion for state in states])
+        measured = []
+        for state in states:
+            measured.append(state.flexion)
+        self._measured = measured if self._in_order else self._by_dof(measured)
         self._alert = self._fingers.alert(states)
-        if self._controller.machine.state != "safe" and any(
-            state.mode == "safe" for state in states
-        ):
-            # A replay repeats it.
-            self._event(now, "stop", self._alert)
-            reason = f"finger: {self._alert}" if len(states) == 1 else self._alert
-            self._apply(self._controller.machine.stop(now, reason))
+        for state in states:
+            if state.mode == "safe" and self._controller.machine.state != "safe":
+                # A replay repeats it.
+                self._event(now, "stop", self._alert)
+                reason = f"finger: {self._alert}" if len(states) == 1 else self._alert
+                self._apply(self._controller.machine.stop(now, reason))
 
     def _by_dof(self, values: list[float]) -> list[float]:
         """Return the values of the fingers by freedom; NaN without a finger."""
