@@ -336,6 +336,20 @@ def test_a_servo_without_answers_does_not_keep_the_other_waiting(tmp_path):
             servos[0].request(do="mute", on=False)
 
 
+def test_a_thread_that_hangs_silences_the_port_so_that_both_watchdogs_stop(
+    tmp_path, monkeypatch
+):
+    hang = threading.Event()
+    monkeypatch.setattr("ikns.finger.group.FingerGroup.states", lambda self: [])
+    with servos_at("one port", tmp_path) as (servos, texts):
+        with open_fingers(texts, n_dof=2) as group:
+            drive(group, lambda: all(len(s.events("goal")) > 5 for s in servos))
+            inner = group.fingers[1]._drive
+            monkeypatch.setattr(inner, "cycle", lambda: hang.wait(PATIENCE))
+            drive(group, lambda: all(s["bus_watchdog"] == -1 for s in servos))
+            hang.set()
+
+
 def test_a_servo_is_had_by_one_finger_and_a_port_has_one_rate(tmp_path):
     with servos_at("one port", tmp_path) as (_, texts):
         with open_fingers(texts[:1]):

@@ -75,7 +75,7 @@ class Bus:
         ------
         PortLost
         """
-        return self._opened().restore_settings()
+        return self._opened().restore_settings(self.id)
 
     def close(self) -> None:
         """Close the port, unless others share it; harmless when repeated."""
@@ -179,7 +179,7 @@ class Bus:
         """Say what responds instead."""
         start = f"{self.port}: servo {self.id} does not answer at {self.baud} baud"
         line = self._opened()
-        with line.turn() as port:
+        with line.turn(self.id) as port:
             for number in _IDS:
                 if number not in line.servos and self._responds(port, number):
                     return f"{start}, but servo {number} does."
@@ -223,7 +223,7 @@ class Bus:
             f"{self.port}: servo {self.id} did not respond when {doing}."
         )
         line = self._opened()
-        with line.turn() as port:
+        with line.turn(self.id) as port:
             try:
                 response, result, error = self._packets.txRxPacket(port, packet)
             except port_errors() as lost:

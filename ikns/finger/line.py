@@ -6,12 +6,19 @@ import contextlib
 import os
 import termios
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ikns.finger.errors import FingerError, PortLost
+from ikns.finger.errors import FingerError, NoResponse, PortLost
 from ikns.finger.serial_port import load_sdk, port_error_text, port_errors
+
+#: A finger's thread that has asked for nothing for so long hangs, s; while it connects
+#: it may wait a third of this between two attempts.
+_HUNG = 1.0
+#: Who is refused waits before it tries again, s.
+_PAUSE = 0.01
 
 
 class Line:
@@ -32,13 +39,18 @@ class Line:
     def __init__(self, name: str, *, baud: int, protocol: int) -> None:
         self.name, self.baud, self.protocol = name, baud, protocol
         self.port: Any = None
-        self.servos: list[int] = []
+        self._asked: dict[int, float] = {}
         self._settings: list[Any] = []
         self._transfer, self._next = threading.Lock(), threading.Lock()
 
+    @property
+    def servos(self) -> tuple[int, ...]:
+        """Ids of the servos that have a finger."""
+        return tuple(self._asked)
+
     @contextmanager
-    def turn(self) -> Iterator[Any]:
-        """Have the port for one transfer, in turn with the other servos.
+    def turn(self, servo: int) -> Iterator[Any]:
+        """Have the port for one transfer of a servo, in turn with the others.
 
         A thread that gives the port back and wants it again stands behind who waits, so
         a servo without answers does not keep the others waiting for more than one read.
@@ -47,7 +59,11 @@ class Line:
         ------
         PortLost
             When the port is closed.
+        NoResponse
+            When the thread of another servo hangs: its watchdog would count what is
+            sent here, so the line stays silent until it has stopped the servo.
         """
+        self._check_others(servo)
         with self._next:
             self._transfer.acquire()
         try:
@@ -68,14 +84,14 @@ class Line:
         self._close()
         return PortLost(f"{self.name}: {port_error_text(error, self.name)}.")
 
-    def restore_settings(self) -> bool:
+    def restore_settings(self, servo: int) -> bool:
         """Undo what another program changed of rate and format; return whether it had.
 
         Raises
         ------
         PortLost
         """
-        with self.turn() as port:
+        with self.turn(servo) as port:
             try:
                 if termios.tcgetattr(port.ser.fileno()) == self._settings:
                     return False
@@ -85,17 +101,27 @@ class Line:
                 raise self.lost(error) from None
         return True
 
+    def add(self, servo: int) -> None:
+        """Take a servo in."""
+        self._asked[servo] = time.monotonic()
+
     def leave(self, servo: int) -> None:
         """Give up a servo; the last one closes the port."""
         with _lock:
-            with contextlib.suppress(ValueError):
-                self.servos.remove(servo)
-            if self.servos:
+            self._asked.pop(servo, None)
+            if self._asked:
                 return
             for path in [path for path, line in _lines.items() if line is self]:
                 del _lines[path]
             with self._next, self._transfer:
                 self._close()
+
+    def _check_others(self, servo: int) -> None:
+        now = self._asked[servo] = time.monotonic()
+        for other, asked in tuple(self._asked.items()):
+            if now - asked > _HUNG:
+                time.sleep(_PAUSE)
+                raise NoResponse(f"{self.name}: nothing looks after servo {other}.")
 
     def _opened(self) -> Any:
         _, port_type = load_sdk()
@@ -148,6 +174,6 @@ def join_line(path: str, servo: int, *, baud: int, protocol: int) -> Line:
                 f"servo {line.servos[0]}, {baud} and {protocol}.0 for servo {servo}."
             )
         line.open()
-        line.servos.append(servo)
+        line.add(servo)
         _lines[real] = line
     return line
