@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import time
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from ikns.calibration.subject import Subject
 from ikns.calibration.subject_files import FILES
 from ikns.cli import main
 from ikns.errors import FileError, InvalidInput
+from ikns.experiments.conduct.live import live_driver
 from ikns.finger import FingerGroup, SimulatedFinger, open_fingers
 from ikns.finger.emulator import Servo, Wire
 from ikns.live.control.controller import Controller
@@ -256,6 +258,29 @@ def test_what_is_published_has_each_signal_and_flexion():
     assert [values[:4] for values in sent] == [
         (*made.solved.c.tolist(), *made.flexions) for made in decided
     ]
+
+
+def test_an_experiment_reads_the_first_finger_and_the_panel_shows_all():
+    person, fingers = subject("right_arm"), ["sim:dof=2", "sim:"]
+    settings = ControlSettings(dofs=(2, 1))
+    known: dict[str, object] = {}
+    samples = []
+    with live_driver(
+        lambda: Source(Replay(moving("right_arm", 30))),
+        person,
+        finger=lambda: open_fingers(fingers, n_dof=2),
+        settings=settings,
+    ) as driver:
+        while not driver.fault:
+            known = {k: v for k, v in driver.status().items() if v is not None} | known
+            samples += driver.take(time.monotonic())
+            time.sleep(0.01)
+    assert {"c_1", "flexion_1", "measured_1"} <= set(known)
+    assert not {"c_2", "flexion_2"} & set(known)  # those of the trial: c, flexion
+    read = [sample.c for sample in samples if np.isfinite(sample.c)]
+    # The second joint begins at 0.4 rad, the first at 0, of 1.2 rad.
+    assert read[0] == pytest.approx(0.5 + 0.4 / 1.2, abs=0.01)
+    assert "finger 2" not in str(known["finger"])
 
 
 def test_a_session_from_before_several_fingers_replays(tmp_path):
