@@ -116,8 +116,8 @@ def run(
 ) -> None:
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
 
-    Without --finger it is a simulated one; of several, what stops one stops all. Exits
-    with 3 when it ran but the finger never moved, or ended in its safe state.
+    Exits with 3 when it ran but the finger never moved, or ended in its safe state.
+    Without --finger it is a simulated one; of several, what stops one stops all.
 
     Research software, not a medical device.
     """
