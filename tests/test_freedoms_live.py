@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 from command_line import check_refused
-from test_several_fingers import servos_at
+from test_two_servos import servos_at
 
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
