@@ -166,7 +166,7 @@ def test_what_a_recorder_keeps_is_what_the_session_has(subject, name, tmp_path):
 
 DECISION = SimpleNamespace(
     solved=SimpleNamespace(c=np.array([0.5]), residual=0.001),
-    flexion=0.5,
+    flexions=(0.5,),
     state="active",
 )
 

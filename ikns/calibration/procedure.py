@@ -246,7 +246,7 @@ def _fit(
         try:
             check_places(x, n_points=learned.n_points)
             learned.fit(x, q, groups=places, motions=motions)
-            together = [] if motions is None else check_freedoms(learned, q, motions)
+            together = [] if motions is None else check_freedoms(learned, q)
         except NotEnoughData as error:
             if not side:
                 raise

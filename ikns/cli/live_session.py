@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
@@ -108,6 +108,28 @@ def publishing(
         on_fault=say,
     ) as publisher:
         yield publisher
+
+
+def say_undriven(n_dof: int, dofs: Sequence[int]) -> None:
+    """Say which freedoms of a map drive no finger, if there are any."""
+    from ikns.nullspace.signal_names import signal_names
+
+    names = signal_names(n_dof)
+    idle = [k for k in range(1, n_dof + 1) if k not in dofs]
+    if idle:
+        which = ", ".join(names[k - 1] for k in idle)
+        verb = "drives" if len(idle) == 1 else "drive"
+        sys.stderr.write(
+            f"ikns: {which} {verb} nothing; a finger follows with --finger "
+            f"'sim:dof={idle[0]}' or 'dynamixel:PORT?dof={idle[0]}'.\n"
+        )
+
+
+def written(addresses: Sequence[str]) -> str | list[str] | None:
+    """Return addresses of fingers as a session keeps them: one as it is, or a list."""
+    if len(addresses) > 1:
+        return list(addresses)
+    return addresses[0] if addresses else None
 
 
 def say(sentence: str) -> None:

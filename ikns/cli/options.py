@@ -52,6 +52,15 @@ MarkerSetName = Annotated[
         "of a .toml file."
     ),
 ]
+Fingers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--finger",
+        metavar="ADDRESS",
+        help="sim: or dynamixel:/dev/ttyUSB0; again with ?dof=2 for the second freedom "
+        "of the map.",
+    ),
+]
 Publish = Annotated[
     str | None,
     typer.Option(

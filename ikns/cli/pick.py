@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ikns.cli.options import AsJson, LabelFile, Publish, Rename
+from ikns.cli.options import AsJson, Fingers, LabelFile, Publish, Rename
 from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
@@ -92,9 +92,7 @@ def pick(
     source: SourceAddress = None,
     rename: Rename = None,
     labels: LabelFile = None,
-    finger: Annotated[
-        str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
-    ] = "sim:",
+    finger: Fingers = None,
     session: SessionFolder = None,
     safe_state: SafeState = "limp",
     hold_speed: Annotated[
@@ -156,7 +154,7 @@ def pick(
         ArmOptions(
             subject,
             source,
-            finger,
+            tuple(finger or ("sim:",)),
             session,
             smooth=False,
             safe_state=safe_state,

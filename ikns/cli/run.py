@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import shutil
 import sys
@@ -16,8 +15,22 @@ import typer
 
 import ikns
 from ikns.calibration.subject_files import check_subject_folder
-from ikns.cli.live_session import live_session, publishing, say, software
-from ikns.cli.options import AsJson, LabelFile, Publish, Rename, SubjectFolder
+from ikns.cli.live_session import (
+    live_session,
+    publishing,
+    say,
+    say_undriven,
+    software,
+    written,
+)
+from ikns.cli.options import (
+    AsJson,
+    Fingers,
+    LabelFile,
+    Publish,
+    Rename,
+    SubjectFolder,
+)
 from ikns.cli.output import show, table
 from ikns.cli.reading import label_names
 from ikns.cli.stop_notice import STOPPED, stop_line, watch_stops
@@ -26,7 +39,7 @@ from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
     from ikns.live.publish.publisher import Publisher
-    from ikns.live.runtime import LoopStatus, Report
+    from ikns.live.runtime import AxisStatus, LoopStatus, Report
 
 #: Interval of the status line on the terminal, s.
 _LINE_EVERY = 0.2
@@ -43,9 +56,7 @@ def run(
     ],
     rename: Rename = None,
     labels: LabelFile = None,
-    finger: Annotated[
-        str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
-    ] = "sim:",
+    finger: Fingers = None,
     session: Annotated[
         Path | None, typer.Option(help="Folder to record everything in.")
     ] = None,
@@ -106,6 +117,7 @@ def run(
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
 
     Exits with 3 when it ran but the finger never moved, or ended in its safe state.
+    Without --finger it is a simulated one; of several, what stops one stops all.
 
     Research software, not a medical device.
     """
@@ -113,7 +125,7 @@ def run(
     check_subject_folder(subject)
 
     from ikns.calibration.simulated import is_simulated, played_files
-    from ikns.finger import Safety, open_finger
+    from ikns.finger import Safety, open_fingers
     from ikns.live.control.settings import ControlSettings
     from ikns.live.publish import check_publish
     from ikns.live.runtime import check_realtime
@@ -124,13 +136,18 @@ def run(
         check_realtime()
     if publish is not None:
         check_publish(publish)
-    settings = ControlSettings(
-        hold_speed=hold_speed, method=method, max_uncertainty=max_uncertainty
-    )
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
     names = label_names(rename, labels)
-    device = open_finger(finger, safety=Safety(safe_state=safe_state))
+    n_dof, addresses = calibrated.null_space_map.n_dof, finger or ["sim:"]
+    group = open_fingers(addresses, n_dof=n_dof, safety=Safety(safe_state=safe_state))
+    settings = ControlSettings(
+        hold_speed=hold_speed,
+        method=method,
+        max_uncertainty=max_uncertainty,
+        dofs=group.dofs,
+    )
+    say_undriven(n_dof, group.dofs)
     with ExitStack() as stack:
         opened = open_source(source, subject=calibrated, names=names)
         stream = stack.enter_context(opened)
@@ -147,7 +164,7 @@ def run(
                 "source": source,
                 "source_labels": list(stream.labels),
                 "renamed": names,
-                "finger": None if dry_run else finger,
+                "finger": None if dry_run else written(addresses),
                 "safe_state": safe_state,
                 "publish": publish,
             }
@@ -155,7 +172,7 @@ def run(
                 session,
                 calibrated,
                 subject,
-                software() | started | {"settings": dataclasses.asdict(settings)},
+                software() | started | {"settings": settings.table()},
                 rate=stream.rate,
                 participant=participant,
                 resume=resume,
@@ -169,7 +186,7 @@ def run(
         report = drive(
             stream,
             calibrated,
-            None if dry_run else device,
+            None if dry_run else group,
             settings=settings,
             session=writer,
             duration=math.inf if duration is None else duration,
@@ -186,7 +203,8 @@ def run(
     if writer is not None and not report.frames:
         session = None
         sys.stderr.write("ikns: no frame came, so no session was kept.\n")
-    title = f"{source} to {'nothing (dry run)' if dry_run else finger}"
+    driven = "nothing (dry run)" if dry_run else " and ".join(addresses)
+    title = f"{source} to {driven}"
     _show_report(report, title, session, losses, publisher, as_json=as_json)
     _exit(report, losses)
 
@@ -300,7 +318,7 @@ def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], N
 
 def _line(s: LoopStatus) -> str:
     """Return the status, most important first: a narrow terminal cuts the rest."""
-    drive = f"{s.state:<7} c {s.c:5.2f} flexion {s.flexion:4.2f} ({s.measured:4.2f})"
+    drive = f"{s.state:<7} {' '.join(_axis(axis, s.axes) for axis in s.axes)}"
     late = 1e3 * s.latency
     # Never wider, so that 80 columns hold the residual too.
     pace = f"{s.rate:4.0f}/s p99 {late:4.{2 if late < 9.995 else 0}f} ms"
@@ -312,6 +330,13 @@ def _line(s: LoopStatus) -> str:
         f"c +-{s.uncertainty:5.3f} worst {1e3 * s.worst_residual:3.0f} mm "
         f"misses {s.misses}"
     )
+
+
+def _axis(axis: AxisStatus, axes: tuple[AxisStatus, ...]) -> str:
+    if len(axes) == 1 and axis.dof == 1:
+        return f"c {axis.c:5.2f} flexion {axis.flexion:4.2f} ({axis.measured:4.2f})"
+    # Two fit into 80 columns: c, flexion, measured.
+    return f"c_{axis.dof} {axis.c:5.2f} {axis.flexion:4.2f} ({axis.measured:4.2f})"
 
 
 def _result(report: Report) -> dict[str, Any]:

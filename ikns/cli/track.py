@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from ikns.cli.options import AsJson, LabelFile, Publish, Rename
+from ikns.cli.options import AsJson, Fingers, LabelFile, Publish, Rename
 from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
@@ -104,9 +104,7 @@ def track(
     source: SourceAddress = None,
     rename: Rename = None,
     labels: LabelFile = None,
-    finger: Annotated[
-        str | None, typer.Option(help="For ikns: sim: or dynamixel:/dev/ttyUSB0.")
-    ] = None,
+    finger: Fingers = None,
     session: SessionFolder = None,
     smooth: Annotated[
         bool,
@@ -187,7 +185,7 @@ def track(
         ArmOptions(
             subject,
             source,
-            finger,
+            tuple(finger or ()),
             session,
             smooth=smooth,
             safe_state=safe_state,

@@ -97,7 +97,7 @@ class Publisher:
         """Queue the result of a frame: c, flexion, state and residual."""
         values = (
             *decision.solved.c.tolist(),
-            decision.flexion,
+            *decision.flexions,
             float(STATES.index(decision.state)),
             decision.solved.residual,
         )
