@@ -88,6 +88,9 @@ def inside(task: int) -> tuple[int, bool]:
 _BUSY = threading.Lock()
 
 
+async def _nobody() -> None: ...
+
+
 def test_two_workers_of_which_one_is_killed_make_the_bits_of_one_process(
     tmp_path: Path,
 ) -> None:
@@ -141,7 +144,7 @@ def test_a_worker_killed_at_any_instant_is_replaced_and_the_last_one_is_missed(
         again = workers.compute(inside, range(8), scheduler=made.scheduler_address)
         assert sorted(again) == [(k, True) for k in range(8)]
         (last,) = made.workers.values()
-        last.auto_restart = False
+        last.instantiate = _nobody  # its nanny starts no other one
         os.kill(last.pid, signal.SIGKILL)
         lost = workers.compute(
             abs, [1], scheduler=made.scheduler_address, worker_timeout=0.5

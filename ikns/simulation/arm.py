@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
-from scipy.linalg.lapack import dposv
 
+from ikns._kernels.body.reach import reach_poses
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
@@ -53,7 +53,9 @@ class ArmKinematics:
         self.columns = [names.index(j) for j in chain_joints(f"{side}_arm_clavicle")]
         self.lower = skeleton.lower[self.columns]
         self.upper = skeleton.upper[self.columns]
-        self._seven = self.columns[2:]
+        self._seven = np.array(self.columns[2:])
+        joints = chain_joints(self.chain)
+        self._path = skeleton.paths((f"{side}_knuckle",), joints)
         self.outward = 1.0 if side == "right" else -1.0
 
     def put(self, angles: Array, posture: ArrayLike) -> Array:
@@ -85,24 +87,26 @@ class ArmKinematics:
         move along the self-motion and leave the clavicle as it is. The pose is in the
         thorax frame.
         """
-        angles = np.array(angles)
-        for _ in range(50):
-            p, R = self.hand(angles)
-            D = rotation @ R.T
-            turn = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
-            error = np.concatenate([position - p, turn / 2])
-            if np.abs(error).max() < POSE_TOLERANCE:
-                return angles
-            J = self.skeleton.chain_jacobian(angles, self.chain)
-            # Cholesky without the checks of SciPy's solvers, for speed.
-            _, weights, failed = dposv(J @ J.T, error)
-            if failed:
-                break
-            step = J.T @ weights
-            angles[self._seven] += step * min(1.0, _LONGEST_STEP / np.abs(step).max())
+        return self.to_poses(angles[None], position[None], rotation[None])[0]
+
+    def to_poses(self, angles: Array, position: Array, rotation: Array) -> Array:
+        """Do so for T postures (T, 18), and poses (T, 3) m and (T, 3, 3)."""
+        found = np.array(angles, dtype=np.float64, order="C")
+        missed = reach_poses(
+            self._path,
+            self._seven,
+            np.array(position, dtype=np.float64),
+            np.array(rotation, dtype=np.float64),
+            POSE_TOLERANCE,
+            _LONGEST_STEP,
+            found,
+        )
+        if missed < 0:
+            return found
+        place = np.round(position[missed], 3)
         raise InvalidInput(
-            f"the {self.side} hand cannot be brought to {np.round(position, 3)} m "
-            "(thorax frame) in the orientation asked for; choose a nearer point."
+            f"the {self.side} hand cannot be brought to {place} m (thorax frame) in "
+            "the orientation asked for; choose a nearer point."
         )
 
 

@@ -126,7 +126,12 @@ def simulate(task: Task) -> list[SimulatedVisit]:
     check_libraries(study)  # a worker on another machine may lack one
     person, fault, began = None, "", time.perf_counter()
     try:
-        person = study_participant(task.number, seed=study.seed, parameters=parameters)
+        person = study_participant(
+            task.number,
+            seed=study.seed,
+            parameters=parameters,
+            other_methods=task.number == 0,  # whose subject is saved
+        )
     except _FAULTS as error:
         fault = str(error)
     visits = []

@@ -15,8 +15,8 @@ from itertools import islice
 from typing import Any, TypeVar
 
 from ikns.errors import InvalidInput, StreamError
+from ikns.experiments.study.single_thread import RESUMES, single_threaded
 from ikns.experiments.study.versions import check_versions, library_versions
-from ikns.experiments.study.workers import RESUMES, single_threaded
 
 T = TypeVar("T")
 R = TypeVar("R")

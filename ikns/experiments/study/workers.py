@@ -16,13 +16,14 @@ from typing import TypeVar
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from ikns.errors import InvalidInput, StreamError
+from ikns.experiments.study.cluster import compute_on_cluster
+from ikns.experiments.study.single_thread import RESUMES, single_threaded
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 #: How often a worker checks that the run is alive, s.
 _POLL_INTERVAL = 0.5
-RESUMES = "finished visits are kept, and the same command continues from there"
 
 
 def compute(
@@ -61,8 +62,6 @@ def compute(
         workers do with one task.
     """
     if scheduler is not None:
-        from ikns.experiments.study.cluster import compute_on_cluster
-
         return compute_on_cluster(
             work,
             tasks,
@@ -129,9 +128,3 @@ def _exit_with_parent(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def single_threaded(work: Callable[[T], R], task: T) -> R:
-    """Run a task in a worker; the thread limit may stay, as the worker is ours."""
-    threadpool_limits(limits=1)
-    return work(task)
