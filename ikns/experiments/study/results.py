@@ -100,11 +100,22 @@ def visit_names(study: Study, *, participants: int) -> Iterator[str]:
 
 
 def missing_tasks(folder: Path, study: Study, *, participants: int) -> Iterator[Task]:
-    """Yield the missing visits, participant by participant.
+    """Yield the missing visits: the first task of each kind, then the others.
 
-    Lazily: each visit is looked for when its turn comes. So the first results are of
-    every kind, and tell how long the rest takes.
+    Tasks of one kind have the same variation and experiments. So the first results tell
+    what everything costs. Lazily: a visit is looked for when its turn comes.
     """
+    first: dict[tuple[str, tuple[str, ...]], Task] = {}
+    for task in _missing(folder, study, participants):
+        first.setdefault((task.variation, task.experiments), task)
+    yield from first.values()
+    begun = {(task.number, task.variation) for task in first.values()}
+    for task in _missing(folder, study, participants):
+        if (task.number, task.variation) not in begun:
+            yield task
+
+
+def _missing(folder: Path, study: Study, participants: int) -> Iterator[Task]:
     for number in range(participants):
         for variation in ("", *study.variations):
             missing = tuple(

@@ -11,11 +11,15 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
+from heapq import heapify, heapreplace
+from itertools import islice
 
 #: Kind of a task: variation, and parts such as "person", "tracking", "picking".
 Kind = tuple[str, tuple[str, ...]]
 #: What a task still takes that takes longer than its like, as a share of their time.
 _OVERDUE = 0.05
+#: So many tasks, before the last one, are given to workers one by one.
+_FEW = 200
 
 
 class TimeLeft:
@@ -69,6 +73,8 @@ class TimeLeft:
         """Take note of how many tasks are computed at a time."""
         with self._lock:
             self.workers = n
+            while len(self._running) > max(n, 1):  # back to those that wait
+                self._waiting.appendleft(self._running.pop()[0])
             self._begin_tasks()
 
     def done(self, kind: Kind, seconds: Mapping[str, float]) -> None:
@@ -90,39 +96,54 @@ class TimeLeft:
         with self._lock:
             if not self._costs:
                 return None
-            running = self._running_left()
-            waiting = self._whole() - sum(self._cost(kind) for kind, _ in self._running)
-            if not running:
+            cost = self._costs_now()
+            free = self._running_left(cost)
+            if not free:
                 return 0.0
-            # The longest of the running tasks ends no sooner, whoever is idle.
-            return max((waiting + sum(running)) / len(running), *running)
+            few = list(islice(self._waiting, _FEW))
+            many = sum(n * cost[kind] for kind, n in self._left.items())
+            for kind in [*few, *(kind for kind, _ in self._running)]:
+                many -= cost[kind]
+            # The first ones are of no matter but for their sum; then each task goes to
+            # the worker that is free first.
+            free = [each + max(many, 0.0) / len(free) for each in free]
+            heapify(free)
+            for kind in few:
+                heapreplace(free, free[0] + cost[kind])
+            return max(free)
 
     def share(self) -> float:
         """Return what share of the work of this run is done, 0 to 1."""
         with self._lock:
             if not self._costs:
                 return 0.0
-            running = sum(self._cost(kind) for kind, _ in self._running)
-            done = self._spent + running - sum(self._running_left())
-            return done / max(self._spent + self._whole(), 1e-9)
+            cost = self._costs_now()
+            whole = sum(n * cost[kind] for kind, n in self._left.items())
+            running = sum(cost[kind] for kind, _ in self._running)
+            done = self._spent + running - sum(self._running_left(cost))
+            return done / max(self._spent + whole, 1e-9)
 
     def _begin_tasks(self) -> None:
         while self._waiting and len(self._running) < max(self.workers, 1):
             self._running.append((self._waiting.popleft(), self._clock()))
 
-    def _running_left(self) -> list[float]:
+    def _running_left(self, cost: Mapping[Kind, float]) -> list[float]:
         """Return how long each running task takes from now, s; none ends unreported."""
-        self._begin_tasks()  # by workers that came
         now = self._clock()
-        costs = [(self._cost(kind), now - began) for kind, began in self._running]
-        return [max(cost - since, _OVERDUE * cost) for cost, since in costs]
+        tasks = [(cost[kind], now - began) for kind, began in self._running]
+        return [max(each - since, _OVERDUE * each) for each, since in tasks]
 
-    def _whole(self) -> float:
-        """Return what all tasks cost that are not done, s."""
-        return sum(n * self._cost(kind) for kind, n in self._left.items())
-
-    def _cost(self, kind: Kind) -> float:
-        return sum(self._costs.mean((kind[0], part)) for part in kind[1])
+    def _costs_now(self) -> dict[Kind, float]:
+        """Return what a task of each kind costs, s."""
+        self._begin_tasks()  # of workers that came
+        now, since = self._clock(), dict[Kind, float]()
+        for kind, began in self._running:
+            since[kind] = max(since.get(kind, 0.0), now - began)
+        # A kind of which none is done takes no less than its running tasks already did.
+        return {
+            kind: max(self._costs.of(kind), 0.0 if known else since.get(kind, 0.0))
+            for kind, known in ((k, self._costs.know(k)) for k in self._left)
+        }
 
 
 class _Costs:
@@ -138,7 +159,15 @@ class _Costs:
         total, n = self._seen.get(key, (0.0, 0))
         self._seen[key] = total + seconds, n + 1
 
-    def mean(self, key: tuple[str, str]) -> float:
+    def know(self, kind: Kind) -> bool:
+        """Whether every part of a kind was seen."""
+        return all((kind[0], part) in self._seen for part in kind[1])
+
+    def of(self, kind: Kind) -> float:
+        """Return the sum of a kind's parts."""
+        return sum(self._mean((kind[0], part)) for part in kind[1])
+
+    def _mean(self, key: tuple[str, str]) -> float:
         """Return the mean of a part, else of its like, else of all."""
         like = [key] if key in self._seen else [k for k in self._seen if k[1] == key[1]]
         seen = [self._seen[k] for k in like or self._seen]
