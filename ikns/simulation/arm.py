@@ -8,16 +8,18 @@ used.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
+from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.reach import reach_poses
+from ikns._kernels.body.self_motion import follow_self_motion
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.numerics.subspace import null_space
 
 Array = NDArray[np.float64]
 
@@ -29,6 +31,9 @@ _LONGEST_STEP = 0.3
 #: Step along the self-motion, rad of joint-space length. A cubic spline through the
 #: steps is then accurate to about stride^4 / 384 = 1e-8 rad.
 _STRIDE = 0.04
+#: A step that changes the swivel by less is the last one, rad; so there are no more.
+_LEAST_STEP = 0.1 * _STRIDE
+_MOST_STEPS = int(2 * np.pi / _LEAST_STEP) + 2
 #: Clavicle angle with the upper arm forward, rad. Sternoclavicular elevation of 6 to
 #: 10 deg and a protraction of the same order go with raising the arm to the front
 #: (recalled from Ludewig et al. 2009, J Bone Joint Surg Am 91:378; rounded).
@@ -57,6 +62,11 @@ class ArmKinematics:
         joints = chain_joints(self.chain)
         self._path = skeleton.paths((f"{side}_knuckle",), joints)
         self.outward = 1.0 if side == "right" else -1.0
+
+    @cached_property
+    def swivel_paths(self) -> tuple[Paths, Paths, int]:
+        """Paths to the hand and to both elbows, and which of these is this arm's."""
+        return self._path, self.skeleton.elbow_paths, SIDES.index(self.side)
 
     def put(self, angles: Array, posture: ArrayLike) -> Array:
         """Return joint angles of the body with this arm in a posture."""
@@ -149,32 +159,31 @@ def self_motion(
     to the hand pose of the start. It ends before a joint comes near its limit, or at
     the swivels `lowest` and `highest`, rad; `girdle_follow` as in :func:`girdle`.
     """
-    position, rotation = arm.hand(angles)
+    angles = np.array(angles, dtype=np.float64)
     start = angles[arm.columns]
     rest = start[:2] - girdle(start, np.zeros(2), follow=girdle_follow)
-    swivels, postures = [arm.swivel(angles)], [start]
-    for sign in (1.0, -1.0):
-        current, swivel = angles, swivels[0 if sign < 0 else -1]
-        ahead: Array | None = None
-        while lowest < swivel < highest:
-            null = np.append(
-                np.zeros(2),
-                null_space(arm.skeleton.chain_jacobian(current, arm.chain))[0],
+    swivels, postures = [np.array([arm.swivel(angles)])], [start[None]]
+    for sign in (-1.0, 1.0):
+        found = np.empty(_MOST_STEPS), np.empty((_MOST_STEPS, len(arm.columns)))
+        count = follow_self_motion(
+            *arm.swivel_paths,
+            np.array(arm.columns),
+            np.array([arm.lower + _MARGIN, arm.upper - _MARGIN]),
+            arm.hand(angles),
+            sign,
+            (float(lowest), float(highest)),
+            (float(rest[0]), float(rest[1]), float(girdle_follow)),
+            (_STRIDE, POSE_TOLERANCE, _LONGEST_STEP, _LEAST_STEP),
+            angles,
+            *found,
+        )
+        if count < 0:
+            raise InvalidInput(
+                f"the {arm.side} hand cannot be kept where it is while the elbow "
+                "swivels; choose a nearer point."
             )
-            if ahead is None:
-                posture = current[arm.columns]
-                turned = arm.swivel(arm.put(current, posture + 1e-4 * null)) - swivel
-                ahead = null * np.sign(turned) * sign
-            ahead = null * np.sign(null @ ahead)
-            posture = current[arm.columns] + _STRIDE * ahead
-            posture[:2] = girdle(posture, rest, follow=girdle_follow)
-            current = arm.to_pose(arm.put(current, posture), position, rotation)
-            before, swivel = swivel, arm.swivel(current)
-            posture = current[arm.columns]
-            stopped = np.minimum(posture - arm.lower, arm.upper - posture) < _MARGIN
-            if stopped[2:].any() or sign * (swivel - before) < 0.1 * _STRIDE:
-                break
-            end = len(swivels) if sign > 0 else 0
-            swivels.insert(end, swivel)
-            postures.insert(end, posture)
-    return SelfMotion(np.array(swivels), np.array(postures))
+        at = len(swivels) if sign > 0 else 0
+        order = slice(None, None, int(sign))
+        swivels.insert(at, found[0][:count][order])
+        postures.insert(at, found[1][:count][order])
+    return SelfMotion(np.concatenate(swivels), np.concatenate(postures))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -69,16 +70,17 @@ class LinkFrames:
         write_jacobians(self.paths(links, joints), angles, rows, jacobian)
         return jacobian.reshape(*batch, *jacobian.shape[1:])
 
+    @cached_property
+    def elbow_paths(self) -> Paths:
+        """Paths to the right and left shoulder, then the elbows, then the wrists."""
+        ends = ("upper_arm", "forearm", "hand")
+        return self.paths(tuple(f"{side}_{end}" for end in ends for side in SIDES))
+
     def swivel(self, q: ArrayLike) -> Array:
         """Elbow angle about the line from shoulder to wrist, (..., 2) rad."""
-        links = tuple(
-            f"{side}_{link}"
-            for link in ("upper_arm", "forearm", "hand")
-            for side in SIDES
-        )
         angles, batch = self._angles(q)
         swivels = np.empty((len(angles), len(SIDES)))
-        write_swivels(self.paths(links), angles, swivels)
+        write_swivels(self.elbow_paths, angles, swivels)
         return swivels.reshape(*batch, len(SIDES))
 
     def _angles(self, q: ArrayLike) -> tuple[Array, tuple[int, ...]]:
