@@ -159,12 +159,17 @@ class Estimate(Protocol):
 
 
 def _time_left(bars: Any, estimates: Mapping[str, Estimate]) -> Any:
-    """Return a column of rich with the time left."""
+    """Return a column of rich with the time left, or since when without an end."""
     from rich.text import Text
 
     class TimeLeft(bars.ProgressColumn):
         def render(self, task: Any) -> Any:
             fields, done = task.fields, int(task.completed)
+            if task.total is None:
+                so_far = timedelta(seconds=int(time.monotonic() - fields["began"]))
+                return Text(f"{so_far} so far", style="progress.elapsed")
+            if task.finished:
+                return Text("")
             if task.description in estimates:
                 left = estimates[task.description].seconds()
             else:
@@ -190,15 +195,20 @@ def _display(bars: Any, estimates: Mapping[str, Estimate]) -> Any:
             for task in self.tasks:
                 if task.description in estimates:
                     task.completed = estimates[task.description].share() * task.total
+                task.fields["share"] = "" if task.total is None else _percent(task)
             yield from super().get_renderables()
 
     columns = (
         bars.TextColumn("{task.description}"),
         bars.BarColumn(),
-        bars.TaskProgressColumn(),
+        bars.TextColumn("{task.fields[share]}"),
         _time_left(bars, estimates),
     )
     return Display(*columns, console=Console(stderr=True), transient=True)
+
+
+def _percent(task: Any) -> str:
+    return f"{task.percentage:>3.0f}%"
 
 
 @contextmanager
@@ -207,6 +217,7 @@ def progress(
 ) -> Iterator[Callable[[str, int, int], None]]:
     """Show bars on stderr if it is a terminal; call with (step, done, total).
 
+    One that only moves says that the command works, and for how long it has.
     Kernels that are not compiled yet are compiled here, on two cores. Steps in
     `estimates`, to which they may be added while the bars are shown, go by these
     instead of by their count.
@@ -221,11 +232,15 @@ def progress(
 
     with _display(bars, {} if estimates is None else estimates) as display:
         tasks: dict[str, bars.TaskID] = {}
+        # Moves also where no step says how far it is.
+        display.add_task("working", total=None, began=time.monotonic(), share="")
 
         def report(step: str, done: int, total: int) -> None:
             now = time.monotonic()
             if step not in tasks:
-                tasks[step] = display.add_task(step, began=now, first=done, last=now)
+                tasks[step] = display.add_task(
+                    step, began=now, first=done, last=now, share=""
+                )
             display.update(tasks[step], completed=done, total=total, last=now)
 
         if kernels:

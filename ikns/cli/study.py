@@ -34,6 +34,8 @@ StudyFolder = Annotated[Path, typer.Argument(help="Folder of the study.")]
 
 def init(folder: StudyFolder, force: Force = False, as_json: AsJson = False) -> None:
     """Write a study folder with a commented example: both experiments, 10 people."""
+    loading()
+
     from ikns.experiments.study import init_study, read_study
 
     path = init_study(folder, force=force)
