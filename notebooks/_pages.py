@@ -1,0 +1,120 @@
+"""Pages that are made when the documentation is built, so that nothing is copied."""
+
+import re
+from pathlib import Path
+
+import typer
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+MADE = HERE / "generated"
+#: Files of the repository that are pages too.
+INCLUDED = {
+    "CONTRIBUTING.md": "contributing",
+    "SAFETY.md": "safety",
+    "CHANGELOG.md": "changelog",
+    "benchmarks/README.md": "benchmarks",
+    "urdf/README.md": "body",
+}
+LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?://|#)([^)#\s]*)(#[^)\s]*)?\)")
+
+
+def make_pages() -> None:
+    """Write all of them."""
+    MADE.mkdir(exist_ok=True)
+    for source, name in INCLUDED.items():
+        text = (ROOT / source).read_text(encoding="utf-8")
+        folder = (ROOT / source).parent
+        text = LINK.sub(lambda found: _link(found, folder), text)
+        _write(MADE / f"{name}.md", text)
+    _write(MADE / "commands.md", commands())
+    _write(MADE / "api.md", api())
+
+
+def _write(path: Path, text: str) -> None:
+    """Leave a file that is right alone: Sphinx reads again what is newer."""
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def _link(found: re.Match[str], folder: Path) -> str:
+    """Lead to the page of a file, or only name a file that is no page."""
+    words, target, part = found[1], found[2], found[3] or ""
+    path = (folder / target).resolve()
+    inside = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else target
+    if not target:
+        return found[0]
+    if inside in INCLUDED:
+        return f"[{words}]({INCLUDED[inside]}.md{part})"
+    if inside.startswith("notebooks/") and path.is_file():
+        return f"[{words}](../{inside.removeprefix('notebooks/')}{part})"
+    if inside == "README.md":
+        return f"[{words}](../index.md)"
+    return f"{words} (`{inside}`)"
+
+
+def commands() -> str:
+    """Make a page of every command with its arguments and options, from the program."""
+    from ikns.cli.app import make_app
+
+    app = typer.main.get_command(make_app())
+    context = typer.Context(app, info_name="ikns")
+    parts = [
+        "# Commands\n",
+        "Exit codes: 0 done, 1 something recorded is not on disk, 2 bad input, 3 the "
+        "finger never moved or ended in its safe state, 128 + n signal n.\n",
+    ]
+    for name in app.list_commands(context):
+        parts += _command(app.get_command(context, name), f"ikns {name}", 2)
+    return "\n".join(parts)
+
+
+def _command(command: object, name: str, level: int) -> list[str]:
+    own = [f"{'#' * level} {name}\n", _plain(command.help or ""), ""]
+    options = [p for p in command.params if p.name != "help"]
+    if options:
+        own += ["| | takes | default | |", "|---|---|---|---|"]
+        own += [_row(option) for option in options] + [""]
+    for inner, sub in getattr(command, "commands", {}).items():
+        own += _command(sub, f"{name} {inner}", level + 1)
+    return own
+
+
+def _row(option: object) -> str:
+    shown = (
+        ", ".join(f"`{n}`" for n in (*option.opts, *option.secondary_opts))
+        if option.param_type_name == "option"
+        else f"`{option.name.upper()}`"
+    )
+    choices = getattr(option.type, "choices", None)
+    kind = " or ".join(map(str, choices)) if choices else option.type.name
+    if getattr(option, "is_flag", False):
+        kind = ""
+    default = "" if option.default in (None, False, ()) else f"`{option.default}`"
+    if option.required:
+        default = "needed"
+    words = _plain(getattr(option, "help", None) or "").replace("|", "\\|")
+    return f"| {shown} | {kind} | {default} | {words} |"
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"[ \t]*\n(?!\n)", " ", text.strip()).replace("<", "\\<")
+
+
+def api() -> str:
+    """Make a page of every public name, by the sections of the package's help."""
+    import ikns
+
+    stub = Path(ikns.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    parts = ["# Python\n", "Everything here is `from ikns import ...`.\n"]
+    for title, body in re.findall(
+        r"^# (\w+)\n((?:(?!^# ).*\n)*)", stub, flags=re.MULTILINE
+    ):
+        names = re.findall(r" as (\w+)", body)
+        parts += [f"## {title}\n", "```{eval-rst}", ".. currentmodule:: ikns\n"]
+        for name in names:
+            kind = "autoclass" if isinstance(getattr(ikns, name), type) else "autofunction"
+            parts += [f".. {kind}:: {name}"]
+            parts += ["   :members:\n" if kind == "autoclass" else ""]
+        parts += ["```\n"]
+    return "\n".join(parts)

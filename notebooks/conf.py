@@ -1,0 +1,41 @@
+"""Sphinx: pages and notebooks. Build with ``sphinx-build -W notebooks build/docs``."""
+
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+
+from _pages import make_pages  # noqa: E402
+
+import ikns  # noqa: E402
+
+make_pages()
+
+project = "ikns"
+author = "The ikns developers"
+release = ikns.__version__
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+]
+exclude_patterns = ["recordings/**", "**.ipynb_checkpoints"]
+root_doc = "index"
+
+# Notebooks hold their outputs, and the tests execute them.
+nb_execution_mode = "off"
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "dollarmath"]
+myst_heading_anchors = 4
+
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_validation_checks: set[str] = set()
+
+html_theme = "furo"
+html_title = f"ikns {release}"
+html_theme_options = {"navigation_with_keys": True}
+html_show_sphinx = False
+# Formulas are drawn in the page by MathJax, which the browser loads; everything else
+# is in the folder.
