@@ -1,7 +1,9 @@
 """Pages that are made when the documentation is built, so that nothing is copied."""
 
 import re
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -25,7 +27,7 @@ def make_pages() -> None:
     for source, name in INCLUDED.items():
         text = (ROOT / source).read_text(encoding="utf-8")
         folder = (ROOT / source).parent
-        text = LINK.sub(lambda found: _link(found, folder), text)
+        text = LINK.sub(partial(_link, folder=folder), text)
         _write(MADE / f"{name}.md", text)
     _write(MADE / "commands.md", commands())
     _write(MADE / "api.md", api())
@@ -37,7 +39,7 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def _link(found: re.Match[str], folder: Path) -> str:
+def _link(found: re.Match[str], *, folder: Path) -> str:
     """Lead to the page of a file, or only name a file that is no page."""
     words, target, part = found[1], found[2], found[3] or ""
     path = (folder / target).resolve()
@@ -58,47 +60,39 @@ def commands() -> str:
     from ikns.cli.app import make_app
 
     app = typer.main.get_command(make_app())
-    context = typer.Context(app, info_name="ikns")
     parts = [
         "# Commands\n",
         "Exit codes: 0 done, 1 something recorded is not on disk, 2 bad input, 3 the "
         "finger never moved or ended in its safe state, 128 + n signal n.\n",
     ]
-    for name in app.list_commands(context):
-        parts += _command(app.get_command(context, name), f"ikns {name}", 2)
+    for name in app.commands:
+        parts += _command(app.commands[name], f"ikns {name}", 2)
     return "\n".join(parts)
 
 
-def _command(command: object, name: str, level: int) -> list[str]:
+def _command(command: Any, name: str, level: int) -> list[str]:
     own = [f"{'#' * level} {name}\n", _plain(command.help or ""), ""]
-    options = [p for p in command.params if p.name != "help"]
-    if options:
-        own += ["| | takes | default | |", "|---|---|---|---|"]
-        own += [_row(option) for option in options] + [""]
+    context = command.make_context(name, [], resilient_parsing=True)
+    rows = [_row(p, context) for p in command.params if p.name != "help"]
+    if rows:
+        own += ["| | |", "|---|---|", *rows, ""]
     for inner, sub in getattr(command, "commands", {}).items():
         own += _command(sub, f"{name} {inner}", level + 1)
     return own
 
 
-def _row(option: object) -> str:
-    shown = (
-        ", ".join(f"`{n}`" for n in (*option.opts, *option.secondary_opts))
-        if option.param_type_name == "option"
-        else f"`{option.name.upper()}`"
-    )
-    choices = getattr(option.type, "choices", None)
-    kind = " or ".join(map(str, choices)) if choices else option.type.name
-    if getattr(option, "is_flag", False):
-        kind = ""
-    default = "" if option.default in (None, False, ()) else f"`{option.default}`"
-    if option.required:
-        default = "needed"
-    words = _plain(getattr(option, "help", None) or "").replace("|", "\\|")
-    return f"| {shown} | {kind} | {default} | {words} |"
+def _row(option: Any, context: Any) -> str:
+    taken, words = option.get_help_record(context)
+    shown = taken.strip().replace("|", "\\|")
+    return f"| `{shown}` | {_plain(words)} |".replace("\n", " ")
 
 
 def _plain(text: str) -> str:
-    return re.sub(r"[ \t]*\n(?!\n)", " ", text.strip()).replace("<", "\\<")
+    return (
+        re.sub(r"(?<!\n)[ \t]*\n(?!\n)", " ", text.strip())
+        .replace("<", "\\<")
+        .replace("|", "\\|")
+    )
 
 
 def api() -> str:
@@ -113,7 +107,9 @@ def api() -> str:
         names = re.findall(r" as (\w+)", body)
         parts += [f"## {title}\n", "```{eval-rst}", ".. currentmodule:: ikns\n"]
         for name in names:
-            kind = "autoclass" if isinstance(getattr(ikns, name), type) else "autofunction"
+            kind = (
+                "autoclass" if isinstance(getattr(ikns, name), type) else "autofunction"
+            )
             parts += [f".. {kind}:: {name}"]
             parts += ["   :members:\n" if kind == "autoclass" else ""]
         parts += ["```\n"]

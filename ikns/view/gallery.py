@@ -10,6 +10,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from PIL import Image
 
+from ikns.arrays import Array
 from ikns.body.chains import chain_joints
 from ikns.calibration.subject import Subject
 from ikns.experiments.demo import Demo, run_demo
@@ -89,20 +90,20 @@ def places_figure(subject: Subject, *, simulated: bool) -> Figure:
     Postures are not kept in a subject folder; drawn is one with the hand there in the
     middle of the range.
     """
-    learned = subject.null_space_map
-    arms = [
-        arm_points(
-            subject.skeleton,
-            posture_at_point(subject.skeleton, learned, subject.chain, point),
-        )
-        for point in range(len(learned.centers_))
-    ]
+    centers = subject.null_space_map.centers_
+    arms = [_arms(subject, point) for point in range(len(centers))]
     return hand_places_figure(
         arms,
-        learned.centers_,
+        centers,
         simulated=simulated,
         title=f"The {len(arms)} places of the hand",
     )
+
+
+def _arms(subject: Subject, point: int) -> Array:
+    """Both arms with the hand at a PCA point, (2, 4, 3) m."""
+    body, learned, chain = subject.skeleton, subject.null_space_map, subject.chain
+    return arm_points(body, posture_at_point(body, learned, chain, point))
 
 
 def _figures(demo: Demo) -> dict[str, Figure]:
@@ -117,7 +118,7 @@ def _figures(demo: Demo) -> dict[str, Figure]:
             still.labels,
             learned.centers_,
             facets=getattr(learned.interpolator_, "hull_facets", None),
-            arms=arm_points(subject.skeleton, motion.q[len(motion.q) // 2]),
+            arms=_arms(subject, 0),
             simulated=True,
         ),
         "directions": directions_figure(

@@ -75,9 +75,7 @@ def _draw(axes: Any, posture: Array, places: Array, k: int) -> None:
         )
     drawn = places.T[_TO_DRAWING]
     axes.scatter(*drawn, s=8, color=GREY, depthshade=False, zorder=5)
-    axes.scatter(
-        *drawn[:, [k]], s=70, color=[point_color(k)], edgecolors=INK, zorder=6
-    )
+    axes.scatter(*drawn[:, [k]], s=70, color=[point_color(k)], edgecolors=INK, zorder=6)
     extent = np.concatenate([posture.reshape(-1, 3), places]).T[_TO_DRAWING]
     middle = (extent.min(axis=1) + extent.max(axis=1)) / 2
     middle[2] += 0.06  # the head is above the shoulders

@@ -1,0 +1,187 @@
+"""What the pages show runs as it stands, or says what it needs."""
+
+import importlib.util
+import re
+import shutil
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+import small_person
+from documentation import PAGES, ROOT, Block, blocks
+
+import ikns
+from ikns.cli import main
+from ikns.cli.app import make_app
+
+CONSOLE = blocks("console")
+RUNNING = [block for block in CONSOLE if not block.needs]
+#: Commands with commands of their own.
+GROUPS = ("markers", "study")
+#: Half a minute of drawing; test_gallery.py tests what it draws.
+SLOW = ("ikns docs --pictures", "ikns demo")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """``ikns-demo`` as the demo leaves it, of a short protocol."""
+    folder = tmp_path_factory.mktemp("desk") / "ikns-demo"
+    (folder / "recordings").mkdir(parents=True)
+    run = small_person.protocol()
+    for trial in run.trials:
+        small_person.write(folder / "recordings", trial.name, trial.recording)
+    # Long enough to teach a natural posture, and short enough to be played.
+    free = small_person.on_another_day(run.subject).free.recording
+    (folder / "recordings" / "free.c3d").unlink()
+    small_person.write(folder / "recordings", "free", free)
+    small_person.subject().save(folder / "subject")
+    return folder
+
+
+def name(block: Block) -> str:
+    return f"{block.page.stem}: {block.lines[-1][:60]}"
+
+
+@pytest.mark.parametrize(
+    "page", dict.fromkeys(block.page for block in RUNNING), ids=lambda page: page.stem
+)
+def test_the_blocks_of_a_page_run_one_after_the_other(
+    page: Path,
+    recorded: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    shutil.copytree(recorded, tmp_path / "ikns-demo")
+    monkeypatch.chdir(tmp_path)
+    for block in RUNNING:
+        for line in block.lines if block.page == page else ():
+            program, *words = line.split()
+            assert program == "ikns"
+            if not line.startswith(SLOW):
+                assert main(words) == 0, (line, capfd.readouterr().err)
+
+
+@pytest.mark.parametrize("block", CONSOLE, ids=name)
+def test_every_command_and_option_shown_is_known(
+    block: Block, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    for line in block.lines:
+        program, *words = line.split()
+        if program != "ikns":
+            assert program == "python", line
+            assert (ROOT / words[0]).is_file(), line
+            continue
+        command = words[:2] if words[0] in GROUPS else words[:1]
+        assert main([*command, "--help"]) == 0, line
+        text = capsys.readouterr().out
+        for option in re.findall(r"(?<!\S)--[a-z-]+", line):
+            assert option in text, line
+
+
+def test_most_blocks_run_and_every_command_is_shown_somewhere() -> None:
+    assert len(RUNNING) >= 10
+    shown = {
+        line.split()[1]
+        for block in CONSOLE
+        for line in block.lines
+        if line.startswith("ikns ")
+    }
+    commands = set(make_app().registered_commands and _commands())
+    # Printed in a table or a sentence, not in a block.
+    assert commands - shown <= {"demo", "scale", "robot"}
+
+
+def _commands() -> list[str]:
+    import typer
+
+    return list(typer.main.get_command(make_app()).commands)
+
+
+@pytest.mark.parametrize("block", blocks("python"), ids=lambda b: b.page.stem)
+def test_python_on_a_page_runs(
+    block: Block,
+    recorded: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shutil.copytree(recorded, tmp_path / "ikns-demo")
+    monkeypatch.chdir(tmp_path)
+    if "read_run" in "".join(block.lines):
+        source = "replay:ikns-demo/recordings/points.c3d?speed=max"
+        with ikns.open_source(source) as frames:
+            subject = ikns.Subject.load("ikns-demo/subject")
+            ikns.run(frames, subject, ikns.SimulatedFinger(), session="session")
+    exec(compile("\n".join(block.lines), str(block.page), "exec"), {})
+    assert capsys.readouterr().out
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_link_leads_to_a_file_and_pictures_are_small(page: Path) -> None:
+    made = {f"{page}.md" for page in (*_pages().INCLUDED.values(), "commands", "api")}
+    text = page.read_text(encoding="utf-8")
+    for link in re.findall(r"\]\((?!https?://|#)([^)#]+)", text):
+        target = (page.parent / link).resolve()
+        if target.parent.name == "generated":
+            assert target.name in made, link
+            continue
+        assert target.exists(), link
+        if target.suffix in (".png", ".gif"):
+            assert target.stat().st_size < 2_000_000
+
+
+def test_pictures_of_the_pages_take_a_megabyte_at_most() -> None:
+    sizes = [p.stat().st_size for p in (ROOT / "notebooks" / "figures").iterdir()]
+    assert sum(sizes) < 1_000_000
+
+
+def _pages() -> ModuleType:
+    """The module that makes pages when the documentation is built."""
+    spec = importlib.util.spec_from_file_location(
+        "_pages", ROOT / "notebooks" / "_pages.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_page_of_commands_has_every_option_of_the_program(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    page = _pages().commands()
+    for command in _commands():
+        (section,) = re.findall(
+            rf"^## ikns {command}\n(.*?)(?=^## |\Z)", page, re.MULTILINE | re.DOTALL
+        )
+        main([command, "--help"])
+        options = set(re.findall(r"--[a-z][a-z-]+", capsys.readouterr().out))
+        assert options - {"--help"} <= set(re.findall(r"--[a-z][a-z-]+", section))
+
+
+def test_the_page_of_python_has_every_public_name() -> None:
+    page = _pages().api()
+    listed = re.findall(r"^\.\. auto(?:class|function):: (\w+)$", page, re.MULTILINE)
+    assert sorted(listed) == sorted(ikns.__all__)
+
+
+def test_docs_opens_what_is_built_or_says_how(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    built = tmp_path / "build" / "docs" / "index.html"
+    monkeypatch.setattr("ikns.cli.docs.__file__", str(tmp_path / "a" / "b" / "c.py"))
+    assert main(["docs", "--no-open"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "sphinx-build" in said
+    built.parent.mkdir(parents=True)
+    built.write_text("<p>pages</p>")
+    assert main(["docs", "--no-open"]) == 0
+    assert str(built.resolve()) in capsys.readouterr().out.replace("\n", "")
