@@ -18,7 +18,7 @@ extensions = [
     "myst_nb",
     "numpydoc",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
+    "_mathml",
 ]
 exclude_patterns = ["recordings/**", "**.ipynb_checkpoints"]
 root_doc = "index"
@@ -36,6 +36,7 @@ numpydoc_validation_checks: set[str] = set()
 html_theme = "furo"
 html_title = f"ikns {release}"
 html_theme_options = {"navigation_with_keys": True}
+html_math_renderer = "mathml"
+html_show_copyright = False
 html_show_sphinx = False
-# Formulas are drawn in the page by MathJax, which the browser loads; everything else
-# is in the folder.
+smartquotes = False  # two hyphens are an option

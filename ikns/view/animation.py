@@ -122,7 +122,7 @@ def _frame(scene: Scene, times: Array, c: Array, k: int) -> Image.Image:
     with figure_style():
         figure = Figure(figsize=(_WIDTH / 100, _HEIGHT / 100), dpi=dpi)
         canvas = FigureCanvasAgg(figure)
-        body: Any = figure.add_axes((-0.2, 0.0, 1.4, 1.0), projection="3d")
+        body: Any = figure.add_axes((-0.15, 0.1, 1.3, 0.92), projection="3d")
         draw_scene(body, scene)
         curve = figure.add_axes((0.09, 0.06, 0.88, 0.15))
         curve.axhspan(0, 1, color=PALE, alpha=0.5, lw=0)

@@ -31,6 +31,8 @@ from ikns.view.style import figure_style
 
 #: Dots per inch of a figure: 810 pixels for a page of 9 inches.
 _DPI = 90
+#: The place in the middle of the upper face, before the chest: the arm hides nothing.
+_SEEN_WELL = 8
 #: Names of the pictures, in the order of the line of data.
 PICTURES = (
     *("elbow.gif", "scene.png", "places.png", "workspace.png", "directions.png"),
@@ -63,16 +65,20 @@ def gallery(
     with tempfile.TemporaryDirectory() as folder:
         demo = run_demo(Path(folder), seed=seed, quick=quick, progress=progress)
     person = demo.subject
-    scene = map_scene(
-        person.skeleton,
-        person.null_space_map,
-        person.chain,
-        simulated=True,
-        title="Null-space map",
+    scene, moving = (
+        map_scene(
+            person.skeleton,
+            person.null_space_map,
+            person.chain,
+            simulated=True,
+            title="Null-space map",
+            point=point,
+        )
+        for point in (None, _SEEN_WELL)
     )
     drawn = {
         "elbow.gif": animation_bytes(
-            scene,
+            moving,
             person.skeleton,
             person.chain,
             caption="The elbow swivels with the hand held; the finger bends with c.",
