@@ -1,6 +1,7 @@
 """The pages: README and those of the documentation, and the blocks in them."""
 
 import re
+import shlex
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,12 +26,18 @@ class Block(NamedTuple):
     page: Path
     language: str
     needs: str  # what running it takes beyond the package and its demo; or empty
-    lines: tuple[str, ...]
+    text: str
+
+    @property
+    def commands(self) -> list[list[str]]:
+        """The words of each line, as a shell has them."""
+        lines = self.text.replace("\\\n", " ").splitlines()
+        return [shlex.split(line) for line in lines if line]
 
 
 def blocks(*languages: str, pages: tuple[Path, ...] = PAGES) -> list[Block]:
     return [
-        Block(page, language, needs, tuple(text.splitlines()))
+        Block(page, language, needs, text)
         for page in pages
         for needs, language, text in BLOCK.findall(page.read_text(encoding="utf-8"))
         if language in languages

@@ -2,7 +2,7 @@
 
 import importlib.util
 import re
-import shutil
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
@@ -15,11 +15,14 @@ from ikns.cli import main
 from ikns.cli.app import make_app
 
 CONSOLE = blocks("console")
-RUNNING = [block for block in CONSOLE if not block.needs]
+RUNNING = [block for block in blocks("console", "python") if not block.needs]
+EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
+    "optional-dependencies"
+]
 #: Commands with commands of their own.
 GROUPS = ("markers", "study")
-#: Half a minute of drawing; test_gallery.py tests what it draws.
-SLOW = ("ikns docs --pictures", "ikns demo")
+#: Half a minute each; they have tests of their own.
+SLOW = (["docs", "--pictures"], ["demo"])
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +42,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def name(block: Block) -> str:
-    return f"{block.page.stem}: {block.lines[-1][:60]}"
+    return f"{block.page.stem}: {' '.join(block.commands[-1])[:60]}"
 
 
 def test_every_block_runs_as_printed(
@@ -47,11 +50,26 @@ def test_every_block_runs_as_printed(
 ) -> None:
     """All pages after another in one folder; what several pages print runs once."""
     monkeypatch.chdir(recorded.parent)
-    for line in dict.fromkeys(line for block in RUNNING for line in block.lines):
-        program, *words = line.split()
-        assert program == "ikns"
-        if not line.startswith(SLOW):
+    done: list[list[str]] = []
+    for block in RUNNING:
+        if block.language == "python":
+            exec(compile(block.text, str(block.page), "exec"), {})
+            continue
+        for line in block.commands:
+            if line not in done:
+                run(line, capfd)
+                done.append(line)
+
+
+def run(line: list[str], capfd: pytest.CaptureFixture[str]) -> None:
+    program, *words = line
+    if program == "ikns":
+        if not any(words[: len(slow)] == slow for slow in SLOW):
             assert main(words) == 0, (line, capfd.readouterr().err)
+    elif program == "python":
+        option, code = words
+        assert option == "-c", line
+        exec(compile(code, "<page>", "exec"), {})
 
 
 @pytest.mark.parametrize("block", CONSOLE, ids=name)
@@ -59,27 +77,26 @@ def test_every_command_and_option_shown_is_known(
     block: Block, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "200")
-    for line in block.lines:
-        program, *words = line.split()
-        if program != "ikns":
-            assert program == "python", line
-            assert (ROOT / words[0]).is_file(), line
-            continue
-        command = words[:2] if words[0] in GROUPS else words[:1]
-        assert main([*command, "--help"]) == 0, line
-        text = capsys.readouterr().out
-        for option in re.findall(r"(?<!\S)--[a-z-]+", line):
-            assert option in text, line
+    for line in block.commands:
+        program, *words = line
+        if program == "pip":
+            extras = re.findall(r"\[(.*)\]", line[-1])
+            assert all(extra in EXTRAS for extra in ",".join(extras).split(",")), line
+        elif program == "python":
+            assert words[0] == "-c" or (ROOT / words[0]).is_file(), line
+        else:
+            assert program == "ikns", line
+            command = words[:2] if words[0] in GROUPS else words[:1]
+            assert main([*command, "--help"]) == 0, line
+            text = capsys.readouterr().out
+            for option in (word for word in words if word.startswith("--")):
+                assert option.partition("=")[0] in text, line
 
 
 def test_most_blocks_run_and_every_command_is_shown_somewhere() -> None:
     assert len(RUNNING) >= 10
-    shown = {
-        line.split()[1]
-        for block in CONSOLE
-        for line in block.lines
-        if line.startswith("ikns ")
-    }
+    lines = [line for block in CONSOLE for line in block.commands]
+    shown = {line[1] for line in lines if line[0] == "ikns"}
     commands = set(_commands())
     assert commands - shown == {"demo"}  # which README's first block runs
 
@@ -88,25 +105,6 @@ def _commands() -> list[str]:
     import typer
 
     return list(typer.main.get_command(make_app()).commands)
-
-
-@pytest.mark.parametrize("block", blocks("python"), ids=lambda b: b.page.stem)
-def test_python_on_a_page_runs(
-    block: Block,
-    recorded: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    shutil.copytree(recorded, tmp_path / "ikns-demo")
-    monkeypatch.chdir(tmp_path)
-    if "read_run" in "".join(block.lines):
-        argv = "run --subject ikns-demo/subject --session session --source"
-        source = "replay:ikns-demo/recordings/points.c3d?speed=max"
-        assert main([*argv.split(), source]) == 0
-        capsys.readouterr()
-    exec(compile("\n".join(block.lines), str(block.page), "exec"), {})
-    assert capsys.readouterr().out
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

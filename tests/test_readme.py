@@ -7,7 +7,9 @@ README = ROOT / "README.md"
 
 def test_set_up_is_two_commands() -> None:
     commands = [
-        line for block in blocks("bash", pages=(README,)) for line in block.lines
+        line
+        for block in blocks("bash", pages=(README,))
+        for line in block.text.splitlines()
     ]
     assert len(commands) == 2
     assert all(command.startswith("python3 -m venv .venv &&") for command in commands)
@@ -18,4 +20,4 @@ def test_it_takes_five_minutes() -> None:
     assert len(lines) <= 120
     assert max(map(len, lines)) <= 120
     (block,) = blocks("python", pages=(README,))
-    assert len([line for line in block.lines if line]) <= 10
+    assert len([line for line in block.text.splitlines() if line]) <= 10
