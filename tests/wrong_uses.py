@@ -38,6 +38,7 @@ RIGHT = {
     "study init": "new",
     "study run": "{study}",
     "study plan": "--margin 5",
+    "docs": "--no-open",
 }
 
 NOT_A_NUMBER = ["x", ""]
@@ -130,6 +131,7 @@ WRONG = {
     "outside": ["", "no-such-choice"],
     "participant": [*TEXT, "a/b", "..", "a b"],
     "participants": COUNT,
+    "pictures": WRITE_FOLDER,
     "pilot": READ_FOLDER,
     "png": PICTURE,
     "animation": PICTURE,
