@@ -17,8 +17,10 @@ def visit_block(writer: Any, node: nodes.math_block) -> None:
     if node["number"]:
         number = get_node_equation_number(writer, node)
         writer.body.append(f'<span class="eqno">({number})</span>')
+    # A phone scrolls what is too wide; the number keeps its place.
+    writer.body.append('<div style="overflow-x: auto; margin-right: 3rem">')
     writer.body.append(tex2mathml(node.astext(), as_block=True))
-    writer.body.append("</div>")
+    writer.body.append("</div></div>")
     raise nodes.SkipNode
 
 

@@ -1,5 +1,6 @@
 """Pages that are made when the documentation is built, so that nothing is copied."""
 
+import os
 import re
 from functools import partial
 from pathlib import Path
@@ -26,8 +27,7 @@ def make_pages() -> None:
     MADE.mkdir(exist_ok=True)
     for source, name in INCLUDED.items():
         text = (ROOT / source).read_text(encoding="utf-8")
-        folder = (ROOT / source).parent
-        text = LINK.sub(partial(_link, folder=folder), text)
+        text = lead_to_pages(text, (ROOT / source).parent, MADE)
         _write(MADE / f"{name}.md", text)
     _write(MADE / "commands.md", commands())
     _write(MADE / "api.md", api())
@@ -39,20 +39,28 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def _link(found: re.Match[str], *, folder: Path) -> str:
-    """Lead to the page of a file, or only name a file that is no page."""
+def lead_to_pages(text: str, source: Path, page: Path) -> str:
+    """Make links to files of the repository lead to the pages that are made of them.
+
+    Links in the text are from the folder `source`; the page is in the folder `page`.
+    What is no page is only named.
+    """
+    return LINK.sub(partial(_link, source=source, page=page), text)
+
+
+def _link(found: re.Match[str], *, source: Path, page: Path) -> str:
     words, target, part = found[1], found[2], found[3] or ""
-    path = (folder / target).resolve()
-    inside = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else target
-    if not target:
+    path = (source / target).resolve()
+    if not target or not path.is_relative_to(ROOT):
         return found[0]
+    inside = path.relative_to(ROOT).as_posix()
     if inside in INCLUDED:
-        return f"[{words}]({INCLUDED[inside]}.md{part})"
-    if inside.startswith("notebooks/") and path.is_file():
-        return f"[{words}](../{inside.removeprefix('notebooks/')}{part})"
-    if inside == "README.md":
-        return f"[{words}](../index.md)"
-    return f"{words} (`{inside}`)"
+        path = MADE / f"{INCLUDED[inside]}.md"
+    elif inside == "README.md":
+        path = HERE / "index.md"
+    elif not path.is_relative_to(HERE) or path.is_dir():
+        return f"{words} (`{inside}`)"
+    return f"[{words}]({os.path.relpath(path, page)}{part})"
 
 
 def commands() -> str:

@@ -2,10 +2,11 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
-from _pages import make_pages  # noqa: E402
+from _pages import HERE, lead_to_pages, make_pages  # noqa: E402
 
 import ikns  # noqa: E402
 
@@ -40,3 +41,14 @@ html_math_renderer = "mathml"
 html_show_copyright = False
 html_show_sphinx = False
 smartquotes = False  # two hyphens are an option
+
+
+def _lead_to_pages(app: Any, name: str, text: list[str]) -> None:
+    path = Path(app.env.doc2path(name))
+    if path.suffix == ".md" and path.parent != HERE / "generated":
+        text[0] = lead_to_pages(text[0], path.parent, path.parent)
+
+
+def setup(app: Any) -> None:
+    """Links in pages lead to files, as a reader of the repository needs them."""
+    app.connect("source-read", _lead_to_pages)
