@@ -24,7 +24,7 @@ from ikns.errors import DataLoss, InvalidInput
 _COMMANDS = (
     *("demo", "check", "scale", "calibrate", "ik", "control", "convert", "compare"),
     *("robot", "ucm", "view", "run", "replay", "stream", "servo", "track", "pick"),
-    *("report", "study", "markers"),
+    *("report", "study", "markers", "docs"),
 )
 #: Files of commands that are not called like them.
 _FILES = {"report": "study_report"}

@@ -32,6 +32,10 @@ def view(
     ] = None,
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("view.html"),
     png: Annotated[Path | None, typer.Option(help="Picture to write too.")] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option(help="Moving picture to write too, .gif or .png, up to 20 s."),
+    ] = None,
     point: Annotated[
         int | None,
         typer.Option(
@@ -55,14 +59,23 @@ def view(
     """
     inputs = [subject, recording]
     refuse_overwriting(out, force=force, inputs=inputs)
-    if png is not None:
-        refuse_overwriting(png, force=force, inputs=inputs)
-        if png.resolve() == out.resolve():
-            raise InvalidInput(f"{png}: expected two files, found one for both.")
-        if png.suffix.lower() != ".png":
-            raise InvalidInput(
-                f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
-            )
+    pictures = [path for path in (png, animation) if path is not None]
+    for path in pictures:
+        refuse_overwriting(path, force=force, inputs=inputs)
+    if len({path.resolve() for path in (out, *pictures)}) <= len(pictures):
+        raise InvalidInput(
+            f"{pictures[-1]}: expected a file for each picture and for the page, found "
+            "one for two of them."
+        )
+    if png is not None and png.suffix.lower() != ".png":
+        raise InvalidInput(
+            f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
+        )
+    if animation is not None and animation.suffix.lower() not in (".gif", ".png"):
+        raise InvalidInput(
+            f"{animation}: expected a moving picture with the ending .gif or .png, "
+            f"found '{animation.suffix}'."
+        )
     if recording is None and (from_, to) != (None, None):
         raise InvalidInput("expected a recording for --from and --to, found none.")
     if recording is None and method != "paper":
@@ -96,6 +109,11 @@ def view(
     )
     page = scene_html(scene)
     picture = None if png is None else scene_picture(scene)
+    moving = (
+        None
+        if animation is None
+        else _animation(scene, person, animation, held=recording is None)
+    )
     write_text(out, page, force=force)
     remarks = [] if frames is None else _faults(person, frames)
     for fault in remarks:
@@ -105,6 +123,8 @@ def view(
         if picture.note:
             remarks.append(picture.note)
             sys.stderr.write(f"ikns: {picture.note}.\n")
+    if animation is not None and moving is not None:
+        write_bytes(animation, moving, force=force)
     if open_page:
         webbrowser.open(out.resolve().as_uri())
     given = 0 if frames is None else len(frames.time)
@@ -117,6 +137,7 @@ def view(
             "method": method,
             "html": out,
             "png": png,
+            "animation": animation,
             "points": len(learned.centers_),
             "frames_of_the_recording": given,
             "frames_played": len(scene.times),
@@ -129,8 +150,23 @@ def view(
             {"quantity": "s", "value": "s"},
             _rows(scene, points=len(learned.centers_), given=given, size=size),
         ),
-        f"Wrote {out}" if png is None else f"Wrote {out} and {png}",
+        f"Wrote {' and '.join(map(str, (out, *pictures)))}",
         as_json=as_json,
+    )
+
+
+def _animation(scene: Scene, person: ikns.Subject, path: Path, *, held: bool) -> bytes:
+    """Draw the moving picture of a map's self-motion, or of a recording."""
+    from ikns.view.animation import FORMATS, animation_bytes
+
+    return animation_bytes(
+        scene,
+        person.skeleton,
+        person.chain,
+        caption="The elbow swivels with the hand held; the finger bends with c."
+        if held
+        else "The finger bends with c.",
+        format=FORMATS[path.suffix.lower()],
     )
 
 

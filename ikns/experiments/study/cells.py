@@ -105,15 +105,11 @@ def check_libraries(study: Study) -> None:
     InvalidInput
         When one is missing.
     """
-    needed = {"pyarrow": "visits are written"}
-    if study.picking is not None:
-        needed["mujoco"] = "picking is simulated"
-    for name, what in needed.items():
-        if find_spec(name) is None:
-            raise InvalidInput(
-                f"{what} with {name}, found none; install it with pip install "
-                "'ikns[study]'."
-            )
+    if study.picking is not None and find_spec("mujoco") is None:
+        raise InvalidInput(
+            "picking is simulated with mujoco, found none; install it with pip install "
+            "'ikns[study]'."
+        )
 
 
 def simulate(task: Task) -> list[SimulatedVisit]:
