@@ -194,6 +194,7 @@ WRONG = {
     "view subject": READ_FOLDER,
     "visit": WRITE_FOLDER,
     "wait": FROM_ZERO,
+    "worker_timeout": POSITIVE,
 }
 FLAGS = {
     *("as_json", "auto", "browser", "clavicle", "dry_run", "everywhere", "force"),

@@ -94,10 +94,11 @@ def servo(
             f"expected different ids, found {', '.join(map(str, numbers))}."
         )
     servos = [Servo(model, id=number, baud=baud) for number in numbers]
-    for made in servos if obstacle is not None else ():
-        middle = made.motor.position
-        ends = (-math.inf, obstacle) if obstacle > middle else (obstacle, math.inf)
-        made.motor.obstacles = ends
+    if obstacle is not None:
+        for made in servos:
+            beyond = obstacle > made.motor.position
+            ends = (-math.inf, obstacle) if beyond else (obstacle, math.inf)
+            made.motor.obstacles = ends
     with (
         contextlib.suppress(KeyboardInterrupt),  # the usual way to stop it
         Wire(*servos, link=link, faults=faults, answer_delay=answer_delay) as wire,

@@ -16,7 +16,8 @@ def write_cubic(knots: Array, coefficients: Array, x: float, values: Array) -> N
     `coefficients` (4, K - 1, C) as in :class:`scipy.interpolate.PPoly`, highest power
     first.
     """
-    piece = min(max(np.searchsorted(knots, x, side="right") - 1, 0), len(knots) - 2)
+    at = int(np.searchsorted(knots, x, side="right")) - 1
+    piece = min(max(at, 0), len(knots) - 2)
     t = x - knots[piece]
     for c in range(len(values)):
         a, b = coefficients[0, piece, c], coefficients[1, piece, c]

@@ -28,6 +28,9 @@ from ikns.experiments.study.workers import compute, processes
 from ikns.experiments.visits import write_visit
 from ikns.live.warm_up import compiled_before, warm_up
 
+#: Longest time to wait for workers, s.
+_DAY = 86400.0
+
 
 @dataclass(frozen=True)
 class StudyRun:
@@ -114,6 +117,10 @@ def run_study(
     most = study.participants
     if participants is not None and not 1 <= participants <= most:
         raise InvalidInput(f"expected 1 to {most} participants, found {participants}.")
+    if not 1.0 <= worker_timeout <= _DAY:
+        raise InvalidInput(
+            f"expected a worker timeout of 1 to {_DAY:g} s, found {worker_timeout:g}."
+        )
     processes(n_jobs)  # checked before anything is written
     people = participants or most
     cells = people * len(study.designs) * (1 + len(study.variations))
