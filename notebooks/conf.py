@@ -21,7 +21,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "_mathml",
 ]
-exclude_patterns = ["recordings/**", "**.ipynb_checkpoints"]
+exclude_patterns = ["paper/**", "recordings/**", "**.ipynb_checkpoints"]
 root_doc = "index"
 
 # Notebooks hold their outputs, and the tests execute them.
