@@ -148,6 +148,8 @@ def _name_values(command: Any) -> None:
         kind = get_args(kind)[0] if get_origin(kind) is list else kind
         if option.param_type_name == "option" and option.metavar is None:
             option.metavar = _VALUES.get(kind)
+        # Ranges leave no room for words; who is beyond one is told it.
+        option._get_number_range_help_str = lambda: None
 
 
 def _refuse_empty(argv: Sequence[str]) -> None:

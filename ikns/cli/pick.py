@@ -57,13 +57,14 @@ def pick(
     objects: Annotated[
         str | None,
         typer.Option(
-            help="Codes of the paper's table, such as A,B, or all.", show_default="all"
+            help="Codes of objects in the paper's table, such as A,B, or all.",
+            show_default="all",
         ),
     ] = None,
     repeats: Annotated[
         int | None,
         typer.Option(
-            help="Repeats of each object in each condition.",
+            help="Repetitions of each object in each condition.",
             show_default="1",
             min=1,
             max=1000,
@@ -72,7 +73,10 @@ def pick(
     training: Annotated[
         int | None,
         typer.Option(
-            help="Objects before each condition.", show_default="10", min=0, max=1000
+            help="Training objects before each condition.",
+            show_default="10",
+            min=0,
+            max=1000,
         ),
     ] = None,
     limit: Annotated[
@@ -85,7 +89,7 @@ def pick(
     seed: Annotated[
         int | None,
         typer.Option(
-            help="Seed of the orders.", show_default="0", min=0, max=2**32 - 1
+            help="Seed of the order of objects.", show_default="0", min=0, max=2**32 - 1
         ),
     ] = None,
     subject: ForIkns = None,
@@ -98,7 +102,7 @@ def pick(
     hold_speed: Annotated[
         float | None,
         typer.Option(
-            help="For ikns: hold the finger while the hand is faster, m/s.",
+            help="For ikns: hold the finger while the hand is faster than this, m/s.",
             min=0.0,
             max=100.0,
         ),

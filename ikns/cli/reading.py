@@ -32,7 +32,8 @@ _OPTIONS = {
         Annotated[
             float | None,
             typer.Option(
-                help="Low-pass the positions at so many Hz; for keypoints, 4 to 8.",
+                help="Cutoff of a low-pass filter on positions, Hz; 4 to 8 for "
+                "keypoints.",
                 min=0.0,
                 max=1000.0,
             ),

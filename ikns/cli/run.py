@@ -64,11 +64,13 @@ def run(
         bool, typer.Option("--resume", help="Add a run to a session that exists.")
     ] = False,
     participant: Annotated[
-        str, typer.Option(help="Pseudonym: letters and digits.")
+        str, typer.Option(help="Participant's code: letters and digits.")
     ] = "01",
     duration: Annotated[
         float | None,
-        typer.Option(help="Seconds; until Ctrl-C without it.", min=0.0, max=86400.0),
+        typer.Option(
+            help="Length of the run, s. Default: until Ctrl-C.", min=0.0, max=86400.0
+        ),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Do everything but move the finger.")
@@ -76,21 +78,23 @@ def run(
     safe_state: Annotated[
         Literal["limp", "hold", "open"],
         typer.Option(
-            help="State of the finger when poses stop coming; releasing a held object "
-            "may itself be the hazard."
+            help="State of the finger when poses stop arriving. Releasing a held "
+            "object may itself be a hazard."
         ),
     ] = "limp",
     hold_speed: Annotated[
         float | None,
         typer.Option(
-            help="Hold the finger while the hand is faster, m/s.", min=0.0, max=100.0
+            help="Hold the finger while the hand is faster than this, m/s.",
+            min=0.0,
+            max=100.0,
         ),
     ] = None,
     max_uncertainty: Annotated[
         float,
         typer.Option(
-            help="Hold the finger while the standard deviation of c is larger."
-            " It is when markers are hidden that c needs.",
+            help="Hold the finger while the standard deviation of c is larger, "
+            "as it is when markers that c needs are hidden.",
             min=0.0,
             max=10.0,
         ),
@@ -98,8 +102,8 @@ def run(
     method: Annotated[
         Literal["paper", "intent"],
         typer.Option(
-            help="What reads c off the posture: the paper's map, or the departure from "
-            "the natural posture."
+            help="How c is read from the posture: the paper's map, or the "
+            "departure from the natural posture."
         ),
     ] = "paper",
     publish: Publish = None,
@@ -109,7 +113,7 @@ def run(
     realtime: Annotated[
         bool,
         typer.Option(
-            "--realtime", help="Real-time priority for the control loop, if allowed."
+            "--realtime", help="Run the control loop at real-time priority, if allowed."
         ),
     ] = False,
     as_json: AsJson = False,

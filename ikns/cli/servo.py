@@ -39,25 +39,27 @@ def servo(
     id: Annotated[
         list[int] | None,
         typer.Option(
-            help="ID on the bus; again for more servos on the port.",
+            help="ID on the bus. Repeat for more servos on the port.",
             show_default="1",
             min=0,
             max=252,
         ),
     ] = None,
-    baud: Annotated[int, typer.Option(help="Bits per second.")] = 57600,
+    baud: Annotated[int, typer.Option(help="Baud rate, bit/s.")] = 57600,
     link: Annotated[
-        Path | None, typer.Option(help="Symbolic link to create to its port.")
+        Path | None, typer.Option(help="Symbolic link to create to the serial port.")
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="KIND[=VALUE]@START[+DURATION], s; may be repeated."),
+        typer.Option(
+            help="Fault to inject, KIND[=VALUE]@START[+DURATION], s. Repeat for more."
+        ),
     ] = None,
     answer_delay: Annotated[
         float,
         typer.Option(
-            help="Seconds between an instruction and its answer, beyond the time that "
-            "their bytes take on the line.",
+            help="Delay between an instruction and its answer, s, in addition to "
+            "the transmission time.",
             min=0,
             max=1,
         ),
@@ -65,13 +67,15 @@ def servo(
     obstacle: Annotated[
         float | None,
         typer.Option(
-            help="Position that it cannot pass, ticks.", min=-1000000.0, max=1000000.0
+            help="Position that the servo cannot pass, ticks.",
+            min=-1000000.0,
+            max=1000000.0,
         ),
     ] = None,
     duration: Annotated[
         float | None,
         typer.Option(
-            help="Seconds to run; default: until q or Ctrl-C.", min=0.0, max=86400.0
+            help="Time to run, s. Default: until q or Ctrl-C.", min=0.0, max=86400.0
         ),
     ] = None,
     as_json: AsJson = False,

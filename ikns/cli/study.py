@@ -52,11 +52,14 @@ def init(folder: StudyFolder, force: Force = False, as_json: AsJson = False) -> 
 def run(
     folder: StudyFolder,
     jobs: Annotated[
-        int, typer.Option(help="Processes; -1: one for each core.", min=-1, max=1024)
+        int,
+        typer.Option(help="Number of processes; -1: one per core.", min=-1, max=1024),
     ] = -1,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Dask scheduler to compute on, tcp://HOST:PORT."),
+        typer.Option(
+            help="Address of a Dask scheduler to compute on, tcp://HOST:PORT."
+        ),
     ] = None,
     worker_timeout: Annotated[
         float,
@@ -65,7 +68,8 @@ def run(
         ),
     ] = 60.0,
     participants: Annotated[
-        int | None, typer.Option(help="Only the first N.", min=1, max=5000)
+        int | None,
+        typer.Option(help="Simulate only the first N participants.", min=1, max=5000),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -66,7 +66,7 @@ def track(
     repeats: Annotated[
         int | None,
         typer.Option(
-            help="Repeats of each trajectory in each condition.",
+            help="Repetitions of each trajectory in each condition.",
             show_default="3",
             min=1,
             max=1000,
@@ -75,19 +75,22 @@ def track(
     training: Annotated[
         int | None,
         typer.Option(
-            help="Trials before each condition.", show_default="10", min=0, max=1000
+            help="Training trials before each condition.",
+            show_default="10",
+            min=0,
+            max=1000,
         ),
     ] = None,
     seconds: Annotated[
         float | None,
         typer.Option(
-            help="Duration of a trajectory, s.", show_default="25", min=0.0, max=3600.0
+            help="Length of each trajectory, s.", show_default="25", min=0.0, max=3600.0
         ),
     ] = None,
     align: Annotated[
         float | None,
         typer.Option(
-            help="Time to align before a trajectory, s.",
+            help="Time to reach the start of each trajectory, s.",
             show_default="5",
             min=0.0,
             max=3600.0,
@@ -108,9 +111,7 @@ def track(
     session: SessionFolder = None,
     smooth: Annotated[
         bool,
-        typer.Option(
-            "--smooth", help="The pointer shows the smoothed flexion instead of c."
-        ),
+        typer.Option("--smooth", help="Show the smoothed flexion instead of c."),
     ] = False,
     safe_state: SafeState = "limp",
     stick: Annotated[

@@ -31,16 +31,18 @@ def view(
         typer.Argument(help=f"Recording to play: {MARKER_FILES}."),
     ] = None,
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("view.html"),
-    png: Annotated[Path | None, typer.Option(help="Picture to write too.")] = None,
+    png: Annotated[
+        Path | None, typer.Option(help="Also write a picture, .png.")
+    ] = None,
     animation: Annotated[
         Path | None,
-        typer.Option(help="Moving picture to write too, .gif or .png, up to 20 s."),
+        typer.Option(help="Also write an animation of up to 20 s, .gif or .png."),
     ] = None,
     point: Annotated[
         int | None,
         typer.Option(
-            help="PCA point, from 1, at which the arm shows its null space; default: "
-            "the one with the widest range."
+            help="PCA point, counted from 1, at which the arm shows its null "
+            "space. Default: the one with the widest range."
         ),
     ] = None,
     method: AnyMethod = "paper",
