@@ -63,10 +63,10 @@ def encode_c3d(
         0,  # analog samples a frame and channel
         rate,
     )
-    seen = ~np.isnan(positions).any(axis=2)
+    seen = ~np.isnan(positions).any(axis=2, keepdims=True)
     points = np.zeros((n_frames, n_points, _VALUES_PER_POINT), "<f4")
-    points[..., :3] = np.where(seen[..., None], positions, 0.0)
-    points[..., 3] = np.where(seen, 0.0, -1.0)
+    points[..., :3] = np.where(seen, positions, 0.0)
+    points[..., 3:] = np.where(seen, 0.0, -1.0)
     return _whole_blocks(header) + section + _whole_blocks(points.tobytes())
 
 
