@@ -57,7 +57,7 @@ Fingers = Annotated[
     typer.Option(
         "--finger",
         metavar="ADDRESS",
-        help="sim: or dynamixel:/dev/ttyUSB0; again with ?dof=2 for the second freedom "
+        help="sim:, dynamixel:/dev/ttyUSB0 or lerobot:TYPE; again with ?dof=2 for the second freedom "
         "of the map.",
     ),
 ]
