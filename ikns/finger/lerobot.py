@@ -281,6 +281,7 @@ class _Connecting:
 
 
 def _first_line(error: Exception) -> str:
-    """Return what an exception says, on one line without its full stop."""
+    """Return what an exception says, on one line and without full stops."""
     lines = str(error).strip().splitlines()
-    return (lines[0] if lines else type(error).__name__).rstrip(".")
+    text = lines[0] if lines else type(error).__name__
+    return text.rstrip(".").replace(". ", "; ")

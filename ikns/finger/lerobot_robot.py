@@ -58,7 +58,8 @@ def make_robot(kind: str, options: dict[str, str]) -> RobotDevice:
     except Exception as error:
         lines = str(error).strip().splitlines() or [type(error).__name__]
         raise InvalidInput(
-            f"lerobot refuses the robot '{kind}': {lines[0].rstrip('.')}."
+            f"lerobot refuses the robot '{kind}': "
+            f"{lines[0].rstrip('.').replace('. ', '; ')}."
         ) from None
     return robot
 
