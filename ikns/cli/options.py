@@ -57,8 +57,8 @@ Fingers = Annotated[
     typer.Option(
         "--finger",
         metavar="ADDRESS",
-        help="sim:, dynamixel:/dev/ttyUSB0 or lerobot:TYPE; again with ?dof=2 for the second freedom "
-        "of the map.",
+        help="sim:, dynamixel:/dev/ttyUSB0 or lerobot:TYPE; again with ?dof=2 for the "
+        "second freedom of the map.",
     ),
 ]
 Publish = Annotated[
