@@ -4,6 +4,7 @@ That it works with lerobot is not shown here, where lerobot is not installed: th
 what `benchmarks/outside/lerobot_robot.py` is for.
 """
 
+import gc
 import sys
 import threading
 import time
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.subject import Subject
-from ikns.errors import IknsError, InvalidInput
+from ikns.errors import IknsError, InvalidInput, StreamError
 from ikns.finger import (
     FingerError,
     LeRobotFinger,
@@ -27,8 +28,9 @@ from ikns.finger import (
 )
 from ikns.live.lerobot.action import action, action_names, check_joints
 from ikns.live.lerobot.signal import LiveSignal
+from ikns.live.runtime.priority import realtime_priority
 from ikns.nullspace.map import NullSpaceMap
-from ikns.recording.files import write_c3d
+from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
 
 JOINT = {"joint": "gripper.pos", "open": 100.0, "closed": 0.0}
@@ -333,6 +335,28 @@ def test_the_signal_holds_what_does_not_count_and_tells_its_safe_state(folder):
     finally:
         signal.stop()
     assert not signal.running
+
+
+def test_an_arm_that_is_not_seen_is_not_waited_for_for_ever(folder, monkeypatch):
+    recording = read(folder / "hidden.c3d")
+    monkeypatch.setattr("ikns.live.lerobot.signal._FIRST_TIMEOUT", 0.3)
+    hidden = recording.markers.copy()
+    hidden[:, [label.startswith("R") for label in recording.labels]] = np.nan
+    no_arm = Recording(recording.time, hidden, recording.labels)
+    write_c3d(folder / "no_arm.c3d", no_arm)
+    signal = LiveSignal(folder / "person", f"replay:{folder / 'no_arm.c3d'}")
+    with pytest.raises(StreamError, match="no frame counted"):
+        signal.start()
+    assert not signal.running
+
+
+def test_another_program_keeps_its_garbage_collector():
+    assert gc.isenabled()
+    with realtime_priority(exclusive=False):
+        assert gc.isenabled()
+    with realtime_priority():
+        assert not gc.isenabled()
+    assert gc.isenabled()
 
 
 def test_what_ends_the_signal_is_raised_where_it_is_asked_for(folder):

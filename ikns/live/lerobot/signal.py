@@ -91,12 +91,17 @@ class LiveSignal:
         )
         self._thread.start()
         give_up = time.monotonic() + _FIRST_TIMEOUT
-        while not self._ready.wait(0.05):
-            if not self.running or time.monotonic() > give_up:
-                self.stop()
-                raise self._error or StreamError(
-                    f"{self._address}: no frame counted: {self._why}."
-                )
+        try:
+            while not self._ready.wait(0.05):
+                if self._error is not None:
+                    raise self._error
+                if not self.running or time.monotonic() > give_up:
+                    raise StreamError(
+                        f"{self._address}: no frame counted: {self._why}."
+                    )
+        except BaseException:
+            self.stop()
+            raise
 
     def latest(self) -> tuple[float, float]:
         """Return c of the last frame that counted, and flexion now.
