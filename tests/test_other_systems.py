@@ -41,11 +41,16 @@ NOT_ON_MACOS = {
     *("SIGRTMIN", "SIGRTMAX", "SIGPWR", "SIGPOLL", "SO_PEERCRED", "SO_BINDTODEVICE"),
     *("getresuid", "setresuid", "CLOCK_BOOTTIME", "F_OFD_SETLK", "prlimit"),
 }
+#: Folders that macOS has not.
+PLACES = ("/proc", "/sys/", "/dev/input", "/dev/shm")
 
 
 def what_only_linux_has(path):
     """Names and paths of Linux in a file's code, docstrings left out."""
-    tree = ast.parse(path.read_text("utf-8"))
+    text = path.read_text("utf-8")
+    if not any(word in text for word in (*NOT_ON_MACOS, *PLACES)):
+        return
+    tree = ast.parse(text)
     said = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and node.attr in NOT_ON_MACOS:
@@ -54,7 +59,7 @@ def what_only_linux_has(path):
             isinstance(node, ast.Constant)
             and isinstance(node.value, str)
             and id(node) not in said
-            and node.value.startswith(("/proc", "/sys/", "/dev/input", "/dev/shm"))
+            and node.value.startswith(PLACES)
         ):
             yield node.value
 
