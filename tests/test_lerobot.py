@@ -25,6 +25,7 @@ from ikns.finger import (
     Safety,
     check_finger,
     open_finger,
+    open_fingers,
 )
 from ikns.live.lerobot.action import action, action_names, check_joints
 from ikns.live.lerobot.signal import LiveSignal
@@ -241,6 +242,20 @@ def test_wrong_addresses_are_refused_in_a_sentence(address, sentence):
     with pytest.raises(InvalidInput, match=sentence) as error:
         open_finger(address)
     assert ". " not in str(error.value)
+
+
+def test_two_joints_of_one_robot_are_no_two_fingers(monkeypatch):
+    def make(kind, options):
+        device = Device()
+        device.config.port = options["port"]
+        return device
+
+    monkeypatch.setattr("ikns.finger.opening.make_robot", make)
+    address = "lerobot:x?joint=gripper.pos&open=100&closed=0&port=/dev/{}&dof={}"
+    group = open_fingers([address.format("a", 1), address.format("b", 2)], n_dof=2)
+    assert group.dofs == (1, 2)
+    with pytest.raises(InvalidInput, match="are one robot"):
+        open_fingers([address.format("a", 1), address.format("a", 2)], n_dof=2)
 
 
 def test_without_lerobot_it_says_what_to_install(monkeypatch):

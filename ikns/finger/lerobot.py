@@ -76,6 +76,11 @@ class LeRobotFinger:
         self._off_checked = -math.inf
         self._unwanted_since = math.inf
 
+    @property
+    def port(self) -> str:
+        """Port of the robot; empty where its configuration has none."""
+        return self._joint.port
+
     def connect(self) -> None:
         """Connect and follow commands from the present position; leave the safe state.
 

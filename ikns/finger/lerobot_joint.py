@@ -47,6 +47,8 @@ class RobotJoint:
 
     Attributes
     ----------
+    port : str
+        Of the robot; empty where its configuration has none.
     off : bool
         Whether torque is off, as far as the robot lets one know.
     """
@@ -74,6 +76,7 @@ class RobotJoint:
                 "found disable_torque_on_disconnect=false and no motor bus."
             )
         self._robot, self.name = robot, name
+        self.port = str(getattr(configuration, "port", ""))
         self._open, self._span = open, closed - open
         self._others: dict[str, Any] = {}
         self.off = True

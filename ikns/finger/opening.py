@@ -131,9 +131,17 @@ def open_fingers(
 
 
 def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
-    """Refuse two fingers on one servo, and servos that cannot share their port."""
+    """Refuse two fingers on one servo or robot, and servos that cannot share a port."""
     seen: dict[str, list[tuple[str, DynamixelFinger]]] = {}
+    robots: dict[str, str] = {}
     for address, finger in zip(addresses, fingers, strict=True):
+        if isinstance(finger, LeRobotFinger) and finger.port:
+            port = os.path.realpath(finger.port)
+            if (other := robots.setdefault(port, address)) != address:
+                raise InvalidInput(
+                    f"'{other}' and '{address}' are one robot, of which one joint can "
+                    "be a finger."
+                )
         if not isinstance(finger, DynamixelFinger):
             continue
         others = seen.setdefault(os.path.realpath(finger.port), [])
