@@ -64,7 +64,14 @@ SOURCE = [
     "replay:{folder}",
 ]
 PUBLISH = ["", "x", "lsl:", "lsl: ", "udp:c", "lsl:c?scope=moon", "lsl:c?x=1"]
-FINGER = ["", "x", "sim:?safe=x", "dynamixel:", "dynamixel:{nowhere}?id=-1"]
+FINGER = [
+    "",
+    "x",
+    "sim:?safe=x",
+    "dynamixel:",
+    "dynamixel:{nowhere}?id=-1",
+    "lerobot:x",
+]
 TEXT = ["", "a\udcff"]
 FLAG: list[str] = []
 

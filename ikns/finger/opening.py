@@ -12,6 +12,8 @@ from ikns.errors import InvalidInput
 from ikns.finger.dynamixel import DynamixelFinger
 from ikns.finger.group import FingerGroup
 from ikns.finger.guard import Safety
+from ikns.finger.lerobot import LeRobotFinger
+from ikns.finger.lerobot_robot import make_robot
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import Finger
 
@@ -25,6 +27,12 @@ _DYNAMIXEL: dict[str, Callable[[str], Any]] = {
     "effort": float,
     "watchdog": float,
 }
+#: What else an address has is the robot's own configuration.
+_LEROBOT: dict[str, Callable[[str], Any]] = {
+    "joint": str,
+    "open": float,
+    "closed": float,
+}
 
 
 def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
@@ -35,7 +43,9 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
     address : str
         ``sim:`` or ``sim:width=60`` (width of an object, mm; also ``effort``), or
         ``dynamixel:PORT?id=1&baud=57600&model=xl430`` (also ``open`` and ``closed``,
-        ticks; ``effort``; ``watchdog``, s). Both take ``safe=limp``, ``safe=hold`` or
+        ticks; ``effort``; ``watchdog``, s), or a joint of a robot of lerobot,
+        ``lerobot:TYPE?joint=gripper.pos&open=100&closed=0`` with the robot's own
+        options such as ``port`` and ``id``. All take ``safe=limp``, ``safe=hold`` or
         ``safe=open``, which takes precedence over `safety`, and ``dof=1``, which only
         :func:`open_fingers` heeds.
     safety : Safety, optional
@@ -48,6 +58,8 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
     ------
     InvalidInput
         When the address is not one of these.
+    FingerError
+        When lerobot is needed and not installed.
 
     Examples
     --------
@@ -55,7 +67,8 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
     0.06
     >>> open_finger("gpio:7")
     Traceback (most recent call last):
-    ikns.errors.InvalidInput: unknown finger 'gpio:7', expected sim: or dynamixel:PORT.
+    ikns.errors.InvalidInput: unknown finger 'gpio:7', expected sim:, dynamixel:PORT \
+or lerobot:TYPE.
     """
     return _opened(address, Safety() if safety is None else safety)[0]
 
@@ -118,9 +131,17 @@ def open_fingers(
 
 
 def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
-    """Refuse two fingers on one servo, and servos that cannot share their port."""
+    """Refuse two fingers on one servo or robot, and servos that cannot share a port."""
     seen: dict[str, list[tuple[str, DynamixelFinger]]] = {}
+    robots: dict[str, str] = {}
     for address, finger in zip(addresses, fingers, strict=True):
+        if isinstance(finger, LeRobotFinger) and finger.port:
+            port = os.path.realpath(finger.port)
+            if (other := robots.setdefault(port, address)) != address:
+                raise InvalidInput(
+                    f"'{other}' and '{address}' are one robot, of which one joint can "
+                    "be a finger."
+                )
         if not isinstance(finger, DynamixelFinger):
             continue
         others = seen.setdefault(os.path.realpath(finger.port), [])
@@ -161,7 +182,30 @@ def _opened(address: str, safety: Safety) -> tuple[Finger, int]:
             if end in values:
                 values[f"{end}_ticks"] = values.pop(end)
         return DynamixelFinger(port, safety=safety, **values), dof
-    raise InvalidInput(f"unknown finger '{address}', expected sim: or dynamixel:PORT.")
+    if scheme == "lerobot" and colon:
+        kind, _, query = rest.partition("?")
+        return _lerobot_finger(address, kind, query, safety)
+    raise InvalidInput(
+        f"unknown finger '{address}', expected sim:, dynamixel:PORT or lerobot:TYPE."
+    )
+
+
+def _lerobot_finger(
+    address: str, kind: str, query: str, safety: Safety
+) -> tuple[Finger, int]:
+    pairs = _pairs(address, query)
+    ours = {*_LEROBOT, "safe", "dof"}
+    values = _values(address, [pair for pair in pairs if pair[0] in ours], _LEROBOT)
+    missing = [name for name in _LEROBOT if name not in values]
+    if not kind or missing:
+        raise InvalidInput(
+            f"'{address}' lacks {', '.join(missing) or 'the type of the robot'}, as in "
+            "lerobot:so101_follower?joint=gripper.pos&open=100&closed=0&port=PORT&id=ID."
+        )
+    safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
+    dof = _dof(address, values.pop("dof", 1))
+    robot = make_robot(kind, {name: text for name, text in pairs if name not in ours})
+    return LeRobotFinger(robot, safety=safety, **values), dof
 
 
 def _dof(address: str, dof: int) -> int:
@@ -173,14 +217,25 @@ def _dof(address: str, dof: int) -> int:
 def _options(
     address: str, query: str, known: dict[str, Callable[[str], Any]]
 ) -> dict[str, Any]:
-    types: dict[str, Callable[[str], Any]] = {**known, "safe": str, "dof": int}
-    values: dict[str, Any] = {}
+    return _values(address, _pairs(address, query), known)
+
+
+def _pairs(address: str, query: str) -> list[tuple[str, str]]:
     try:
-        pairs = parse_qsl(query, strict_parsing=True) if query else []
+        return parse_qsl(query, strict_parsing=True) if query else []
     except ValueError:
         raise InvalidInput(
             f"'{address}' should end in options like name=value&name=value."
         ) from None
+
+
+def _values(
+    address: str,
+    pairs: list[tuple[str, str]],
+    known: dict[str, Callable[[str], Any]],
+) -> dict[str, Any]:
+    types: dict[str, Callable[[str], Any]] = {**known, "safe": str, "dof": int}
+    values: dict[str, Any] = {}
     for name, text in pairs:
         if name not in types:
             raise InvalidInput(
