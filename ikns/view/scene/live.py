@@ -92,6 +92,7 @@ class LiveView:
             commands=[c for c in scene.commands if c["type"] != "set_animation"],
             times=np.zeros(0),
             c=np.zeros(0),
+            speed=np.zeros(0),
             start=0.0,
         )
         self._page = scene_html(still, live=frames).encode()

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ikns.statistics import Effect, Equivalence
-from ikns.view.parts import Cell, Picture, Table
+from ikns.view.cells import Cell
+from ikns.view.parts import Picture, Table
 from ikns.view.style import (
     BLUE,
     GREEN,

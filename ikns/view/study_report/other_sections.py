@@ -13,7 +13,8 @@ from ikns.experiments.study.summary import (
 )
 from ikns.experiments.study.summary.answers import people
 from ikns.experiments.study.summary.methods import methods, setting_text
-from ikns.view.parts import Cell, Section, Table
+from ikns.view.cells import Cell
+from ikns.view.parts import Section, Table
 
 #: Visits left out that are listed at most.
 _MOST = 50

@@ -12,7 +12,8 @@ from ikns.experiments.study.summary import (
     PickingSummary,
 )
 from ikns.experiments.study.summary.answers import people, worded
-from ikns.view.parts import Cell, Picture, Section, Table
+from ikns.view.cells import Cell
+from ikns.view.parts import Picture, Section, Table
 from ikns.view.study_report.comparisons import (
     NO_MARGIN,
     NO_TRIAL,

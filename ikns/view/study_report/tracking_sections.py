@@ -10,7 +10,8 @@ from ikns.experiments.study.summary.answers import people, worded
 from ikns.experiments.study.summary.tracking import UNITS
 from ikns.statistics.paper import RMSE, TRAJECTORIES
 from ikns.statistics.wording import p_text
-from ikns.view.parts import Cell, Picture, Section, Table
+from ikns.view.cells import Cell
+from ikns.view.parts import Picture, Section, Table
 from ikns.view.study_report.comparisons import (
     NO_MARGIN,
     NO_TRIAL,
