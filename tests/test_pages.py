@@ -13,9 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 import small_person
+import small_visits
 from axe_playwright_python.sync_playwright import Axe
 
 from ikns.body.chains import chain_joints
+from ikns.experiments.study import init_study
+from ikns.experiments.study.summary import summarize
 from ikns.motion.marker_ik import MarkerIK
 from ikns.view.elbow import elbow_widget
 from ikns.view.figures import residual_figure, workspace_figure
@@ -30,6 +33,7 @@ from ikns.view.report import (
 from ikns.view.scene import LiveView, map_scene, recording_scene, scene_html
 from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
 from ikns.view.scene.playback import kept_frames
+from ikns.view.study_report import study_page
 
 PHONE, DESK = {"width": 390, "height": 844}, {"width": 1280, "height": 800}
 
@@ -118,6 +122,19 @@ def test_a_report_fits_and_is_accessible(page: Any, tmp_path: Path) -> None:
     page.emulate_media(media="print")
     assert page.get_by_text("Words.").is_visible()
     page.emulate_media(media="screen")
+
+
+def test_the_page_of_ten_participants_is_short(page: Any, tmp_path: Path) -> None:
+    study = init_study(tmp_path / "study").parent
+    html, _ = study_page(summarize(small_visits.small_study(study, people=10)))
+    page.goto(shown(tmp_path, html))
+    for size in (DESK, PHONE):
+        page.set_viewport_size(size)
+        assert page.evaluate("document.documentElement.scrollHeight") <= 6000
+    judge(page)
+    # The first picture is the answers'.
+    first = page.locator("img").first
+    assert first.evaluate("image => image.closest('section').id") == "answers"
 
 
 def test_the_dragged_elbow_moves_c_and_the_finger_and_leaves_the_hand(

@@ -96,6 +96,7 @@ class ReportPage:
         self.figures = 0
         self.tables = 0
         self.headings: dict[str, str] = {}  # title by its id, in order
+        self.section_tag = ""  # label of a section's heading
 
     def anchor(self, title: str) -> str:
         """Return an id for a heading, and list it in the contents."""
@@ -120,9 +121,6 @@ class ReportPage:
             parts.append("</details>")
         opening = f'<section id="{self.anchor(section.title)}">{head}'
         return "\n".join([opening, *parts, "</section>"])
-
-    #: Label of a section's heading.
-    section_tag = ""
 
     def folded(self, detail: Picture | Table) -> str:
         """Picture or table under a line that opens it."""

@@ -62,7 +62,7 @@ def done_section(group: Group) -> Section:
                 f"no trial: {', '.join(empty[:10])}"
                 f"{' and others' if len(empty) > 10 else ''}."
             )
-    return Section("What was done", text, tables=tables)
+    return Section("What was done", text, tables=tables, folded=True)
 
 
 def _attempts(name: str, found: TrackingSummary | PickingSummary) -> Table:
@@ -154,7 +154,8 @@ def methods_section(group: Group) -> Section:
     """Paragraphs to paste."""
     return Section(
         "Methods, from the configuration",
-        [
+        folded=True,
+        text=[
             "Written from what the visits and the study file hold; to be pasted and "
             "shortened.",
             *methods(group),

@@ -65,7 +65,7 @@ def picking_sections(
         "Pick and place",
         text,
         [pictures["picking_objects"]] if figures else [],
-        [_success_table(found), _time_table(found)] if figures else [],
+        details=[_success_table(found), _time_table(found)] if figures else [],
     )
     for k, compared in enumerate(found.comparisons):
         name = difference_name("picking", k)
@@ -103,7 +103,8 @@ def _comparison(compared: PickComparison, pictures: list[Picture]) -> Section:
         title,
         text,
         pictures,
-        [
+        folded=True,
+        details=[
             tests_table([found.paper], others),
             *([effects_table(found.effects)] if found.effects else []),
         ],

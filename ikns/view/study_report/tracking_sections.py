@@ -104,16 +104,25 @@ def tracking_sections(
             f"{len(found.unmeasured)} finished trials hold less than a second of "
             f"control signal and were not measured: {_some(found.unmeasured)}."
         )
-    shown = ("tracking_traces", "tracking_error", "tracking_rmse")
     yield Section(
         "Tracking",
         text,
-        [pictures[k] for k in shown if k in pictures],
-        [_rmse_table(found), _metric_table(found)] if figures else [],
+        [pictures["tracking_rmse"]] if figures else [],
+        details=[
+            pictures["tracking_traces"],
+            pictures["tracking_error"],
+            _rmse_table(found),
+            _metric_table(found),
+        ]
+        if figures
+        else [],
     )
     if "tracking_learning" in pictures:
         yield Section(
-            "Tracking: learning", _learning(found), [pictures["tracking_learning"]]
+            "Tracking: learning",
+            _learning(found),
+            [pictures["tracking_learning"]],
+            folded=True,
         )
     for k, compared in enumerate(found.comparisons):
         name = difference_name("tracking", k)
@@ -157,10 +166,8 @@ def _comparison(
         title,
         text,
         pictures,
-        [
-            tests_table(found.paper, others),
-            effects_table(found.effects),
-        ],
+        folded=True,
+        details=[tests_table(found.paper, others), effects_table(found.effects)],
     )
 
 
