@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from accessible import judge
 
 from ikns.experiments.cockpit import Cockpit, page_socket
 from ikns.experiments.conduct import (
@@ -36,6 +37,10 @@ from ikns.experiments.visits import read_visit, tracking_record
 from ikns.finger import Safety, SimulatedFinger
 from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
 
+NEXT_WHILE_TRACKING = (
+    "The participant follows the line. Abort if something went wrong; the trial comes "
+    "again."
+)
 PAGES = ("gamepad", "keyboard", "mouse")
 #: A gamepad as browsers give it; the test moves its stick.
 GAMEPAD = """
@@ -337,6 +342,45 @@ def test_a_trial_with_the_keyboard_and_the_panel(chromium: Any, tmp_path: Path) 
     ramp = 0.4 - 0.5 * STEP * np.minimum(steps, 4)
     assert np.abs(record.c[:10] - ramp).max() < 0.5 / 60 + 1e-9
     assert np.isnan(record.c[10:]).all()  # when the clock jumped it was too old
+
+
+def test_instructions_come_first_and_a_training_trial_tells_its_score(
+    chromium: Any, tmp_path: Path
+) -> None:
+    """And both pages fit a phone and are accessible, waiting and while a trial runs."""
+    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1, training=1) as visit:
+        panel, page = visit.panel(), visit.participant()
+        says(panel, "next", "Press Begin when the participant is ready.")
+        page.wait_for_selector("#card", state="visible")
+        assert "Lift your elbow" in page.inner_text("#card")
+        assert page.is_hidden("#score")
+        judge(page)
+        judge(panel)
+        panel.click("#begin")
+        visit.until("align")
+        page.wait_for_selector("#card", state="hidden")
+        judge(page)
+        visit.let_pass(1.5)
+        visit.until("track")
+        says(panel, "next", NEXT_WHILE_TRACKING)
+        # The arm stays at 0.5, and tells so ten times a second.
+        for _ in range(250):
+            visit.source.put(visit.clock.monotonic(), 0.5)
+            visit.let_pass(0.1)
+        visit.let_pass(1.0)
+        visit.until("waiting")
+        (row,) = visit.rows
+        assert row["kind"] == "training"
+        says(page, "points", f"{measure(tracking_record(row)).rmse:.1f}")
+        # Not again: the condition is known.
+        assert page.is_hidden("#how")
+        judge(panel)
+        # What a trial is worth is told in training only.
+        panel.click("#begin")
+        visit.until("align")
+        panel.click("#abort")
+        visit.until("waiting")
+        page.wait_for_selector("#card", state="hidden")
 
 
 def test_a_page_that_closes_and_one_that_watches(chromium: Any, tmp_path: Path) -> None:

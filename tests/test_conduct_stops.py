@@ -34,9 +34,7 @@ def test_no_trial_begins_while_the_finger_is_stopped(
     at = stopped(tmp_path / "v", experiment)
     shown = ask(at, 0.1, "begin")
     assert shown["state"] == "waiting"
-    assert shown["message"] == (
-        "Finger stopped (Too hot); connect again to begin a trial."
-    )
+    assert shown["message"] == ("Finger stopped (Too hot); press Connect again first.")
     assert shown["stopped"]["title"] == "Finger stopped"
     assert shown["stopped"]["reason"] == "Too hot."
     assert "Connect again" in shown["stopped"]["remedy"]

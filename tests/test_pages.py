@@ -1,8 +1,6 @@
-"""Pages on a phone and on a desk: width, height, accessibility, and what one can drag.
+"""Reports and 3-D views on a phone and on a desk, and what one can drag there.
 
-One browser serves all. Accessibility is judged by axe-core
-(https://github.com/dequelabs/axe-core); of its four impacts, none may be serious or
-critical.
+One browser serves all.
 """
 
 from collections.abc import Iterator
@@ -14,7 +12,7 @@ import numpy as np
 import pytest
 import small_person
 import small_visits
-from axe_playwright_python.sync_playwright import Axe
+from accessible import DESK, PHONE, judge
 
 from ikns.body.chains import chain_joints
 from ikns.experiments.study import init_study
@@ -34,8 +32,6 @@ from ikns.view.scene import LiveView, map_scene, recording_scene, scene_html
 from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
 from ikns.view.scene.playback import kept_frames
 from ikns.view.study_report import study_page
-
-PHONE, DESK = {"width": 390, "height": 844}, {"width": 1280, "height": 800}
 
 
 @pytest.fixture(scope="module", name="page")
@@ -62,22 +58,6 @@ def shown(folder: Path, html: str) -> str:
     path = folder / "page.html"
     path.write_text(html, encoding="utf-8")
     return path.as_uri()
-
-
-def judge(page: Any) -> None:
-    """Fail on a page that is wider than its window, or that axe-core finds at fault."""
-    for size in (DESK, PHONE):
-        page.set_viewport_size(size)
-        wide = page.evaluate("document.documentElement.scrollWidth")
-        assert wide <= size["width"], size
-        found = Axe().run(page).response["violations"]
-        faults = [
-            (fault["id"], node["html"][:120], node["failureSummary"])
-            for fault in found
-            if fault["impact"] in ("serious", "critical")
-            for node in fault["nodes"]
-        ]
-        assert faults == [], size
 
 
 @cache

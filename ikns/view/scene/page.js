@@ -11,6 +11,9 @@ const scene = JSON.parse(find("scene").textContent, revive);
 // A picture is drawn once and has nothing to press.
 const picture = location.hash === "#picture";
 document.body.classList.toggle("picture", picture);
+// In the experimenter's panel, whose place is small.
+const embedded = window.parent !== window;
+document.body.classList.toggle("embedded", embedded);
 
 let viewer;
 try {
@@ -40,7 +43,7 @@ viewer.controls.update();
 if (!picture) new ResizeObserver(() => viewer.set_3d_pane_size()).observe(find("pane"));
 
 // A small window, such as the one in the experimenter's panel, is left to the body.
-find("legend").open = picture || (innerHeight >= 500 && innerWidth >= 760);
+find("legend").open = picture || (innerHeight >= 500 && innerWidth >= 760 && !embedded);
 for (const layer of scene.layers) {
   const item = document.createElement("li"), label = document.createElement("label");
   const box = document.createElement("input"), dot = document.createElement("i");

@@ -55,7 +55,7 @@ def tracking_figures(found: TrackingSummary) -> list[ReportFigure]:
         ReportFigure(
             "tracking_error",
             error_figure(found),
-            "Error over time: pointer less target, a participant's repeats averaged "
+            "Error over time: pointer minus target, a participant's repeats averaged "
             "first. Line: mean over participants; band: 10th to 90th percentile.",
             "Grid of time series of the error by condition and trajectory",
         ),
