@@ -88,6 +88,20 @@ def report() -> str:
     )
 
 
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "<div style='width: 400px'>wide</div>",
+        "<button></button>",
+        "<p style='color: #aaa; background: white'>pale</p>",
+    ],
+)
+def test_the_judge_of_pages_finds_a_fault(page: Any, fault: str) -> None:
+    page.set_content(f"<html lang='en'><title>t</title><main>{fault}</main></html>")
+    with pytest.raises(AssertionError):
+        judge(page)
+
+
 def test_a_report_fits_and_is_accessible(page: Any, tmp_path: Path) -> None:
     page.goto(shown(tmp_path, report()))
     page.evaluate("document.querySelectorAll('details').forEach(x => x.open = true)")
