@@ -536,7 +536,8 @@ def test_old_values_are_shown_as_unknown(chromium: Any, tmp_path: Path) -> None:
         visit.clock.stop.set()
         try:
             says_news = "() => document.getElementById('lost').textContent"
-            panel.wait_for_function(f"{says_news}.startsWith('No news for ')")
+            said = "No update from the program for "
+            panel.wait_for_function(f"{says_news}.startsWith('{said}')")
             panel.wait_for_selector("#lost", state="visible")
         finally:
             visit.clock.stop.clear()

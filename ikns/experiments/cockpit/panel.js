@@ -72,9 +72,9 @@ const number = (value, digits, unit = "") => (known(value) ? `${value.toFixed(di
 function facts() {
   const source = shown.source, rows = [["c", number(shown.c, 3), known(shown.c) ? "" : "bad"]];
   if (source.kind === "page") {
-    rows.push(["Participant's page", shown.page_connected ? "connected" : "none", shown.page_connected ? "good" : "bad"]);
+    rows.push(["Participant's page", shown.page_connected ? "connected" : "not open", shown.page_connected ? "good" : "bad"]);
     if (source.device) rows.push(["Gamepad", source.device, known(shown.c) ? "" : "bad"]);
-    rows.push(["Screen to answer, p99", number(known(source.round_trip) ? 1000 * source.round_trip : null, 0, " ms")]);
+    rows.push(["Page round trip, p99", number(known(source.round_trip) ? 1000 * source.round_trip : null, 0, " ms")]);
   }
   const milli = (value, digits, unit) => number(known(value) ? 1000 * value : null, digits, unit);
   // A value that was measured too long ago is unknown, whatever it was.

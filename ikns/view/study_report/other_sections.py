@@ -34,9 +34,9 @@ _OUTCOMES = {
 def done_section(group: Group) -> Section:
     """How many attempts were made, and how they ended."""
     text = [
-        "Every attempt that was made, training included. An aborted attempt comes "
-        "again; a skipped one was left out for good; `again` marks that what was done "
-        "before does not count."
+        "Every attempt, training included. An aborted attempt is repeated, a skipped "
+        "one is not; `again` marks trials that were repeated because their first result "
+        "does not count."
     ]
     tables = []
     for name, each in (
@@ -174,8 +174,8 @@ def left_out_section(summary: StudySummary) -> Section | None:
     return Section(
         "Left out",
         [
-            f"{count} of {summary.visits + count} visits could not be used; nothing "
-            "of them is in this report.",
+            f"{count} of {summary.visits + count} visits could not be used; none "
+            "of their data are in this report.",
             *reasons,
         ],
     )

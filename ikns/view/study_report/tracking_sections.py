@@ -47,7 +47,7 @@ def tracking_figures(found: TrackingSummary) -> list[ReportFigure]:
         ReportFigure(
             "tracking_traces",
             trace_figure(found),
-            "Target (grey) and pointer of the trial whose RMSE is the median of its "
+            "Target (gray) and pointer of the trial whose RMSE is the median of its "
             "cell, for each condition and trajectory; the paper shows such traces "
             "without saying how they were chosen.",
             "Grid of time series: target and pointer by condition and trajectory",
@@ -209,7 +209,7 @@ def _rmse_table(found: TrackingSummary) -> Table:
         rows,
         "RMSE, mean over participants' means, their standard deviation, and the "
         "interval of the mean. The paper's curves are unknown, so only the order of "
-        "size can be compared with its column.",
+        "magnitude can be compared with its column.",
     )
 
 
@@ -231,7 +231,7 @@ def _metric_table(found: TrackingSummary) -> Table:
         ],
         rows,
         "Mean ± standard deviation over n participants. The lag is how far the "
-        "pointer is behind; smoothness is negative, nearer to 0 is smoother.",
+        "pointer is behind; smoothness is negative, and closer to 0 is smoother.",
     )
 
 
