@@ -35,8 +35,8 @@ def done_section(group: Group) -> Section:
     """How many attempts were made, and how they ended."""
     text = [
         "Every attempt, training included. An aborted attempt is repeated, a skipped "
-        "one is not; `again` marks trials that were repeated because their first result "
-        "does not count."
+        "one is not; `again` marks trials that were repeated because an earlier "
+        "result does not count."
     ]
     tables = []
     for name, each in (
