@@ -233,6 +233,15 @@ def test_the_3d_pages_fit_and_curves_seek(page: Any, tmp_path: Path) -> None:
     page.wait_for_function(
         "told => document.getElementById('speed').textContent === told", arg=told
     )
+    # The keyboard turns the view about its target, by 0.1 rad.
+    way = "viewer.camera.position.clone().sub(viewer.controls.target).toArray()"
+    before = np.array(page.evaluate(way))
+    page.focus("#pane")
+    page.keyboard.press("ArrowLeft")
+    after = np.array(page.evaluate(way))
+    angles = [np.arctan2(x, z) for x, _, z in (before, after)]
+    assert angles[1] - angles[0] == pytest.approx(-0.1, abs=1e-9)
+    assert np.linalg.norm(after) == pytest.approx(np.linalg.norm(before), rel=1e-9)
     # Nothing of MeshCat's own panel, and the legend is beside the body.
     assert not page.locator(".dg.main").first.is_visible()
     pane, legend = (

@@ -160,7 +160,9 @@
 
   const state = { count: 0 };
   function show(q) {
-    const { links, hand } = arm(q), c = signal(q, point), flexion = Math.min(1, Math.max(0, c));
+    const { links, hand } = arm(q), c = signal(q, point);
+    // A point where nothing moved has no range, and no c.
+    const flexion = Number.isFinite(c) ? Math.min(1, Math.max(0, c)) : 0;
     Object.assign(state, { q, c, flexion, hand: hand.p, places: way.length, point: data.points.indexOf(point), count: state.count + 1 });
     draw("upper", path([links.upper_arm.p, links.forearm.p]));
     draw("fore", path([links.forearm.p, links.hand.p]));
@@ -169,7 +171,7 @@
     const [x, y] = paper(links.forearm.p);
     find("grip").setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)})`);
     find("place").value = way.length > 1 ? place / (way.length - 1) : 0;
-    find("c").textContent = c.toFixed(2);
+    find("c").textContent = Number.isFinite(c) ? c.toFixed(2) : "unknown";
     find("flexion").textContent = `${Math.round(100 * flexion)} % bent`;
     const moved = Math.sqrt(dot(add(hand.p, target.p, -1), add(hand.p, target.p, -1)));
     find("moved").textContent = `${(1000 * moved).toFixed(1)} mm`;

@@ -50,18 +50,10 @@ def _data(subject: Subject, side: str) -> dict[str, Any]:
     camera, target = camera_and_target(body, learned, chain, np.array(postures))
     columns = [body.joint_names.index(joint) for joint in chain_joints(chain)]
     wide = np.argmax((learned.upper_ - learned.lower_)[:, 0])
-    points = []
-    for q in postures:
-        hand = _hand(body, q, side)
-        lower, upper = learned.range(hand)
-        points.append(
-            {
-                "q": q[columns].tolist(),
-                "z": learned.directions(hand)[0].tolist(),
-                "lower": float(lower[0]),
-                "upper": float(upper[0]),
-            }
-        )
+    points = [
+        {"q": q[columns].tolist()} | _readout(learned, k, _hand(body, q, side))
+        for k, q in enumerate(postures)
+    ]
     return {
         "links": _links(body.urdf, f"{side}_hand", chain_joints(chain)),
         "limits": [body.lower[columns].tolist(), body.upper[columns].tolist()],
@@ -78,6 +70,15 @@ def _data(subject: Subject, side: str) -> dict[str, Any]:
             "full": FULL_FLEXION,
         },
     }
+
+
+def _readout(learned: NullSpaceMap, point: int, hand: Array) -> dict[str, Any]:
+    """Return Z, m and M where the hand is; the point's own where weights fail there."""
+    z, (lower, upper) = learned.directions(hand)[0], learned.range(hand)
+    if not np.isfinite(z).all():
+        z = learned.directions_[point, 0]
+        lower, upper = learned.lower_[point], learned.upper_[point]
+    return {"z": z.tolist(), "lower": float(lower[0]), "upper": float(upper[0])}
 
 
 def _posture(body: Skeleton, learned: NullSpaceMap, chain: str, point: int) -> Array:

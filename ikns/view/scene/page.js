@@ -42,6 +42,21 @@ viewer.set_3d_pane_size();
 viewer.controls.update();
 if (!picture) new ResizeObserver(() => viewer.set_3d_pane_size()).observe(find("pane"));
 
+// Arrow keys turn the view, as dragging does: rad around, and rad up or down.
+const TURNS = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
+find("pane").addEventListener("keydown", (event) => {
+  const turn = TURNS[event.key];
+  if (!turn) return;
+  event.preventDefault();
+  const { target } = viewer.controls, way = viewer.camera.position.clone().sub(target), far = way.length();
+  const around = Math.atan2(way.x, way.z) + turn[0];
+  const down = Math.min(3.0, Math.max(0.1, Math.acos(way.y / far) + turn[1]));
+  way.set(far * Math.sin(down) * Math.sin(around), far * Math.cos(down), far * Math.sin(down) * Math.cos(around));
+  viewer.camera.position.copy(target).add(way);
+  viewer.controls.update();
+  viewer.set_dirty();
+});
+
 // A small window, such as the one in the experimenter's panel, is left to the body.
 find("legend").open = picture || (innerHeight >= 500 && innerWidth >= 760 && !embedded);
 for (const layer of scene.layers) {

@@ -63,7 +63,7 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
 {style}</style></head><body>
 <header id="head">{badge}<h1>{title}</h1><p>{escape(scene.caption)}</p></header>
 <details id="legend"><summary>Layers</summary><ul></ul></details>
-<main id="pane"></main>
+<main id="pane" tabindex="0" aria-label="Body in 3-D; arrow keys turn it"></main>
 <footer id="player" hidden>
 <button id="play" type="button" aria-label="Play">&#9654;</button>
 <input id="time" type="range" min="0" step="any" value="0" aria-label="Time">
