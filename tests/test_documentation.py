@@ -109,7 +109,7 @@ def test_most_blocks_run_and_every_command_is_shown_somewhere() -> None:
     lines = [line for block in CONSOLE for line in block.commands]
     shown = {line[1] for line in lines if line[0] == "ikns"}
     commands = set(_commands())
-    assert commands - shown == {"demo"}  # which README's first block runs
+    assert commands - shown <= {"demo"}  # which README's first block runs
 
 
 def _commands() -> list[str]:
