@@ -106,6 +106,7 @@
     const before = side(point, target, -1).reverse();
     way = [...before, point.q, ...side(point, target, 1)];
     drawWay();
+    fit();
     set(before.length);
   };
   // Go to a place along the way; between two of its postures too.
@@ -134,6 +135,23 @@
     const links = arm(point.q).links, shoulder = links.upper_arm.p, other = [shoulder[0], shoulder[1], -shoulder[2]];
     const [x, y] = paper([-0.03, 0.22, 0]);
     find("trunk").innerHTML = `<circle cx="${x}" cy="${y}" r="${0.1 * SCALE}"/><path d="${path([[-0.055, 0.12, 0], [-0.06, -0.05, 0]])}" stroke-width="${0.1 * SCALE}"/><path d="${path([shoulder, other])}" stroke-width="${0.07 * SCALE}"/><path d="${path([[-0.06, -0.06, 0], [-0.06, -0.24, 0]])}" stroke-width="${0.24 * SCALE}"/>`;
+  }
+
+  // Show the whole body, and the arm wherever the elbow goes; hand and finger reach this far from the wrist, m.
+  const BEYOND_WRIST = 0.24;
+  function fit() {
+    const seen = [[-0.03, 0.32, 0], [-0.06, -0.36, 0]].map((p) => [...paper(p), 0.12 * SCALE]);
+    for (const q of way) {
+      const { links } = arm(q);
+      const shoulder = links.upper_arm.p;
+      seen.push([...paper([shoulder[0], shoulder[1], -shoulder[2]]), 30], [...paper(shoulder), 30], [...paper(links.forearm.p), 30]);
+      seen.push([...paper(links.hand.p), BEYOND_WRIST * SCALE]);
+    }
+    const least = [0, 1].map((k) => Math.min(...seen.map((at) => at[k] - at[2])));
+    const most = [0, 1].map((k) => Math.max(...seen.map((at) => at[k] + at[2])));
+    const height = Math.max(most[1] - least[1], (most[0] - least[0]) / 1.2), width = 1.2 * height;
+    const from = [0, 1].map((k) => (least[k] + most[k] - [width, height][k]) / 2);
+    find("arm").setAttribute("viewBox", [...from, width, height].map((x) => x.toFixed(1)).join(" "));
   }
 
   // Fingers of the hand as in the URDF: x to the thumb, y along; m.
