@@ -144,7 +144,8 @@ def methods_parts(report: dict[str, Any]) -> list[Any]:
 
 def _verdict(row: dict[str, Any], least: int, n_dof: int) -> str:
     if row["point"] is None:
-        return f"left out: fewer than {least}"
+        few = row["samples"] < least
+        return f"left out: fewer than {least}" if few else "left out: freedoms"
     if row["components"] > n_dof:
         return f"used, but took {row['components']} components"
     return "used"

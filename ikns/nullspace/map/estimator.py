@@ -196,7 +196,7 @@ class NullSpaceMap(EstimatorBase):
         NotEnoughData
             With fewer samples than points, too few usable points, or points in a plane;
             when more than a third of the points do not show every motion; fewer are
-            left out with a warning.
+            named in a warning, and left out where they have no direction.
         """
         from ikns.nullspace.clustering import BoundingBoxKMeans
 
