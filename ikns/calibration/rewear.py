@@ -88,7 +88,7 @@ def rewear(
     worn = subject.skeleton.marker_set.name
     if marker_set is None and worn not in MarkerSet.names():
         raise InvalidInput(
-            f"the calibration was with the markers of '{worn}', a set of one's own; "
+            f"the calibration was with the markers of '{worn}', a custom set; "
             "give its .toml file with --marker-set (marker_set)."
         )
     chain = subject.chain

@@ -68,8 +68,8 @@ class ScalingReport:
             return [*self.warnings]
         return [
             *self.warnings,
-            f"{source}: expected every marker in sight, found none of "
-            f"{', '.join(sorted(lost))}: left out, as their places are unknown.",
+            f"{source}: expected every marker to be visible, found none of "
+            f"{', '.join(sorted(lost))}: left out because their places are unknown.",
         ]
 
 

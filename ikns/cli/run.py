@@ -207,7 +207,7 @@ def run(
         report.lost_rows = writer.lost  # counted on disk once it is closed
     if writer is not None and not report.frames:
         session = None
-        sys.stderr.write("ikns: no frame came, so no session was kept.\n")
+        sys.stderr.write("ikns: no frame arrived, so no session was kept.\n")
     driven = "nothing (dry run)" if dry_run else " and ".join(addresses)
     title = f"{source} to {driven}"
     _show_report(report, title, session, losses, publisher, as_json=as_json)

@@ -80,7 +80,7 @@ def check_finger(
             kept.append(law)
     if strict and broken:
         raise FingerError(
-            "the finger breaks a law: "
+            "the finger violates a law: "
             + "; ".join(f"{law} ({what})" for law, what in broken.items())
             + "."
         )

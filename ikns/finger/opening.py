@@ -79,7 +79,7 @@ def open_fingers(
     n_dof: int | None = None,
     safety: Safety | None = None,
 ) -> FingerGroup:
-    """Make fingers that each follow a freedom of a map, not connected yet.
+    """Create one finger per degree of freedom of a map, not connected yet.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def open_fingers(
     (1, 2)
     >>> open_fingers(["sim:", "sim:"], n_dof=2)
     Traceback (most recent call last):
-    ikns.errors.InvalidInput: 'sim:' and 'sim:' both want dof=1, expected one each.
+    ikns.errors.InvalidInput: 'sim:' and 'sim:' both ask for dof=1, expected one each.
     """
     safety = Safety() if safety is None else safety
     taken: dict[int, str] = {}
@@ -116,12 +116,12 @@ def open_fingers(
         finger, dof = _opened(address, safety)
         if n_dof is not None and dof > n_dof:
             raise InvalidInput(
-                f"'{address}' wants dof={dof}, but the map has {n_dof} "
-                f"freedom{'s' * (n_dof > 1)}."
+                f"'{address}' asks for dof={dof}, but the map has {n_dof} "
+                f"degree{'s' * (n_dof > 1)} of freedom."
             )
         if dof in taken:
             raise InvalidInput(
-                f"'{taken[dof]}' and '{address}' both want dof={dof}, expected one "
+                f"'{taken[dof]}' and '{address}' both ask for dof={dof}, expected one "
                 "each."
             )
         taken[dof] = address
@@ -148,13 +148,13 @@ def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
         for other, one in others:
             if one.id == finger.id:
                 raise InvalidInput(
-                    f"'{other}' and '{address}' are one servo, expected another port "
-                    "or id."
+                    f"'{other}' and '{address}' are the same servo, expected another "
+                    "port or id."
                 )
             if one.speech != finger.speech:
                 raise InvalidInput(
-                    f"'{other}' and '{address}' are on one port, expected one baud "
-                    "rate and protocol."
+                    f"'{other}' and '{address}' are on the same port, expected one "
+                    "baud rate and protocol."
                 )
         others.append((address, finger))
 
@@ -210,7 +210,7 @@ def _lerobot_finger(
 
 def _dof(address: str, dof: int) -> int:
     if dof < 1:
-        raise InvalidInput(f"'{address}' has dof={dof}, expected a number from 1 on.")
+        raise InvalidInput(f"'{address}' has dof={dof}, expected 1 or more.")
     return dof
 
 

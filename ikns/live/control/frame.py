@@ -308,7 +308,7 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
     elif not isinstance(interpolator, NearestPoint):
         raise InvalidInput(
             "expected a map between natural neighbors or nearest points, found "
-            f"{type(interpolator).__name__}, which the live kernel does not know."
+            f"{type(interpolator).__name__}, which the live kernel does not support."
         )
     hands = [SIDES.index(side) for side in chain_sides(chain)]
     return ControlMap(

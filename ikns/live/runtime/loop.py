@@ -176,7 +176,7 @@ def run(
                 if on_status and loop.status_due(status_every):
                     on_status(loop.status())
         finally:
-            loop.disarm("asked to stop" if stopped.is_set() else "the end")
+            loop.disarm("stop requested" if stopped.is_set() else "the end")
     return loop.report
 
 

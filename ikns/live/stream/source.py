@@ -83,7 +83,7 @@ class Source:
         Returns
         -------
         Frame or None
-            None when no frame came within `timeout` seconds, or the source has ended.
+            None if no frame arrived within `timeout` seconds, or the source has ended.
         """
         frame = None if self.ended else self._feed.poll(timeout)
         now = time.monotonic()
