@@ -366,13 +366,13 @@ def test_the_command_says_what_drives_nothing(two, capsys, fingers, said):
     ("command", "fingers", "said"),
     [
         ("run", ["sim:", "sim:"], "both ask for dof=1"),
-        ("run", ["sim:dof=3"], "the map has 2 freedoms"),
+        ("run", ["sim:dof=3"], "the map has 2 degrees of freedom"),
         (
             "run",
             ["dynamixel:/dev/z", "dynamixel:/dev/z?dof=2"],
             "are the same servo",
         ),
-        ("track", ["sim:", "sim:dof=3"], "the map has 2 freedoms"),
+        ("track", ["sim:", "sim:dof=3"], "the map has 2 degrees of freedom"),
         ("pick", ["sim:", "sim:dof=1"], "both ask for dof=1"),
     ],
 )

@@ -366,7 +366,7 @@ def test_silence_is_reported_and_iterating_gives_up(name: str) -> None:
             assert any("no frame for 1" in event.text for event in source.events)
             outlet.push(there.markers[0])
             assert source.read(10.0) is not None
-            assert "frames again after" in source.events[-1].text
+            assert "frames resumed after" in source.events[-1].text
 
 
 def test_other_machines_reach_no_port_of_the_outlet(name: str) -> None:

@@ -36,7 +36,7 @@ def method_summary(
     *,
     own: bool = False,
 ) -> dict[str, Any]:
-    """Compare the methods of a subject where nothing is meant.
+    """Compare the methods of a subject when nothing is intended.
 
     Parameters
     ----------

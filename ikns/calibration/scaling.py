@@ -117,8 +117,8 @@ def scale(
     NotEnoughData
         When the trial is too short or the person moves in it.
     MarkerMismatch
-        When no marker is known or a whole segment has none, or no person stands like
-        that: names exchanged, another unit, a mirror image.
+        When no marker is known or a whole segment has none, or no person can stand like
+        that: swapped names, wrong unit, mirror image.
 
     Examples
     --------

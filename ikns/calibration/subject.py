@@ -90,11 +90,11 @@ class Subject:
 
     @property
     def methods(self) -> list[str]:
-        """What can read c off this subject's postures: ``paper``, and what else."""
+        """Methods available for this subject: ``paper`` and any others."""
         return ["paper", *(method for method in OTHERS if method in self.readouts)]
 
     def readout(self, method: Method = "paper") -> Readout:
-        """Return a method's map and what it reads.
+        """Return a method's map and the coordinate that it uses.
 
         Raises
         ------
@@ -224,7 +224,7 @@ class Subject:
         Raises
         ------
         InvalidInput
-            When the report's are no such numbers.
+            When the values in the report are invalid.
         """
         settings = self.report.get("settings", {})
         try:

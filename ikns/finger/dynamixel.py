@@ -28,7 +28,7 @@ _TRIES = 5
 class DynamixelFinger:
     """A finger driven by one Dynamixel servo in position control.
 
-    A thread of its own talks to the servo, so that a silent bus (35 ms for every
+    A dedicated thread talks to the servo, so that a silent bus (35 ms for every
     instruction without a response) never blocks the caller. It keeps sending the last
     goal, and the servo stops by itself when it receives nothing for `watchdog` seconds
     (models with Protocol 2.0; an AX-12 has no watchdog and keeps its last goal, which
@@ -133,7 +133,7 @@ class DynamixelFinger:
         ------
         FingerError
             When the port is missing or busy, or the servo does not respond, is another
-            model, or reports an alert. If it was connected before, it goes on switching
+            model, or reports an alert. If it was connected before, it keeps switching
             the torque off until :meth:`relax`.
         """
         with self._access:

@@ -47,7 +47,7 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
         ``lerobot:TYPE?joint=gripper.pos&open=100&closed=0`` with the robot's own
         options such as ``port`` and ``id``. All take ``safe=limp``, ``safe=hold`` or
         ``safe=open``, which takes precedence over `safety`, and ``dof=1``, which only
-        :func:`open_fingers` heeds.
+        :func:`open_fingers` uses.
     safety : Safety, optional
 
     Returns
@@ -84,10 +84,10 @@ def open_fingers(
     Parameters
     ----------
     addresses : sequence of str
-        As for :func:`open_finger`. ``dof=2`` is what drives a finger: the second
-        freedom of the map; without it, the first.
+        As for :func:`open_finger`. ``dof`` selects the degree of freedom of the map
+        that drives the finger; the first by default.
     n_dof : int, optional
-        Freedoms of the map, where one is known.
+        Degrees of freedom of the map, if known.
     safety : Safety, optional
         Of each finger.
 
@@ -98,8 +98,9 @@ def open_fingers(
     Raises
     ------
     InvalidInput
-        When an address is wrong, two fingers want one freedom or one servo, the servos
-        of a port have different rates or protocols, or the map lacks a freedom.
+        When an address is wrong, two fingers use the same degree of freedom or servo,
+        the servos of a port have different rates or protocols, or the map lacks a
+        degree of freedom.
 
     Examples
     --------
@@ -139,8 +140,8 @@ def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
             port = os.path.realpath(finger.port)
             if (other := robots.setdefault(port, address)) != address:
                 raise InvalidInput(
-                    f"'{other}' and '{address}' are one robot, of which one joint can "
-                    "be a finger."
+                    f"'{other}' and '{address}' are the same robot, of which "
+                    "only one joint can be a finger."
                 )
         if not isinstance(finger, DynamixelFinger):
             continue

@@ -92,7 +92,7 @@ class Source:
             mark_gaps(markers)
             frame = Frame(frame.number, frame.device_time, frame.receive_time, markers)
             if self._silent:
-                self._add_event(f"frames again after {now - self._last:.1f} s.")
+                self._add_event(f"frames resumed after {now - self._last:.1f} s.")
                 self._silent = False
             self._last = now
             self.continuity.add(frame)

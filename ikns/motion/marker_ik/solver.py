@@ -52,7 +52,7 @@ class MarkerIK:
     Parameters
     ----------
     skeleton : Skeleton
-        Body and markers; static-only markers weigh nothing.
+        Body and markers; static-only markers have no weight.
     max_iterations : int
         Steps per frame.
     tolerance : float
@@ -97,7 +97,7 @@ class MarkerIK:
         Returns
         -------
         Pose
-            With every marker gone it is the pose before, residual NaN, not converged.
+            Without any visible marker, the pose before; residual NaN, not converged.
         """
         seen = np.ascontiguousarray(markers, dtype=np.float64)
         if seen.shape != self._markers_shape:
