@@ -280,4 +280,4 @@ def test_ik_writes_no_number_for_what_was_not_seen(
     assert result["moved_deg"]["left_wrist_flexion"] is None
     assert result["moved_deg"]["left_elbow_flexion"] > 0
     assert main([*argv, "--force"]) == 0
-    assert "never in sight" in capsys.readouterr().out
+    assert "never visible" in capsys.readouterr().out

@@ -91,7 +91,7 @@ def test_each_output_ignores_the_other_motion(seed: int) -> None:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_second_freedom_that_was_not_explored_is_refused(seed: int) -> None:
     run = person(seed, 0.0)
-    with pytest.raises(NotEnoughData, match=r"2 freedoms.*--n-dof"):
+    with pytest.raises(NotEnoughData, match=r"2 degrees of freedom.*--n-dof"):
         calibrate(run.static.recording, [run.points.recording], n_dof=2)
 
 
@@ -141,7 +141,9 @@ def test_places_that_do_not_show_every_freedom_are_left_out_or_too_many(
         with pytest.raises(NotEnoughData, match="found them at 5:"):
             learned.fit(x, q, motions=motions)
         return
-    with pytest.warns(MapWarning, match=f"{short} of 8 places do not show 2 freedoms"):
+    with pytest.warns(
+        MapWarning, match=f"{short} of 8 places do not show 2 degrees of freedom"
+    ):
         learned.fit(x, q, motions=motions)
     # Only a place without a direction is missing.
     lacks = lacks if hidden == "still" else lacks[:0]

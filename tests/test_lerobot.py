@@ -254,7 +254,7 @@ def test_two_joints_of_one_robot_are_no_two_fingers(monkeypatch):
     address = "lerobot:x?joint=gripper.pos&open=100&closed=0&port=/dev/{}&dof={}"
     group = open_fingers([address.format("a", 1), address.format("b", 2)], n_dof=2)
     assert group.dofs == (1, 2)
-    with pytest.raises(InvalidInput, match="are one robot"):
+    with pytest.raises(InvalidInput, match="are the same robot"):
         open_fingers([address.format("a", 1), address.format("a", 2)], n_dof=2)
 
 

@@ -243,7 +243,7 @@ class LeRobotFinger:
                 self._guard.relax()
 
     def _given_up(self) -> FingerError:
-        return FingerError(f"{self._name}: connecting was given up.")
+        return FingerError(f"{self._name}: connecting was aborted.")
 
     def _cycle(self) -> None:
         """Send the goal, or keep the torque off, and observe."""

@@ -44,7 +44,7 @@ def check_publish(address: str) -> PublishAddress:
     scheme, colon, rest = address.partition(":")
     name, _, query = rest.partition("?")
     if scheme != "lsl" or not (colon and name.strip() and name.isprintable()):
-        raise InvalidInput(f"unknown place to publish {address!r}, expected {_KNOWN}.")
+        raise InvalidInput(f"unknown publishing target {address!r}, expected {_KNOWN}.")
     options = dict(parse_qsl(query, keep_blank_values=True))
     scope = options.pop("scope", "machine")
     if options:

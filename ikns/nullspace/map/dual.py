@@ -154,12 +154,14 @@ def _check_shown(centers: Array, faults: Sequence[str], n_dof: int) -> None:
     least = max(math.ceil(_MOST * count), min(4, count))
     if good < least:
         raise NotEnoughData(
-            f"expected {n_dof} freedoms at {least} of the {count} places or more, "
+            f"expected {n_dof} degrees of freedom at {least} of the {count} places or "
+            "more, "
             f"found them at {good}: {listed}: explore each by itself there (lift the "
             "elbow, turn the hand), or ask for fewer with --n-dof (n_dof)."
         )
     warnings.warn(
-        f"{len(wrong)} of {count} places do not show {n_dof} freedoms: {listed}.",
+        f"{len(wrong)} of {count} places do not show {n_dof} degrees of freedom: "
+        f"{listed}.",
         MapWarning,
         stacklevel=4,
     )
