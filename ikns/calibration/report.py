@@ -77,7 +77,8 @@ def exploration_report(
 
 def points_report(learned: NullSpaceMap, *, rate: float) -> list[dict[str, Any]]:
     """All PCA points, including those left out; `point` is the number in the map."""
-    used = iter(range(len(learned.centers_)))
+    # Left out with too few samples, or where they do not show every freedom.
+    used = {center.tobytes(): k for k, center in enumerate(learned.centers_)}
     rows: list[dict[str, Any]] = []
     for center, count in zip(learned.all_centers_, learned.all_counts_, strict=True):
         row: dict[str, Any] = {
@@ -86,8 +87,8 @@ def points_report(learned: NullSpaceMap, *, rate: float) -> list[dict[str, Any]]
             "samples": int(count),
             "still_s": float(count / rate),
         }
-        if count >= learned.min_samples:
-            k = next(used)
+        k = used.get(np.asarray(center).tobytes())
+        if k is not None:
             n = int(learned.n_components_[k])
             ratios = learned.explained_variance_ratio_[k]
             row |= {
