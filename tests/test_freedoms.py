@@ -5,6 +5,9 @@ arm turns as one about the line from shoulder to wrist while the hand stays, or 
 forearm turns while elbow and wrist stay. No Jacobian is in it.
 """
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 import small_person
@@ -195,3 +198,20 @@ def test_the_score_is_the_share_in_the_span_however_the_rows_lie() -> None:
     )
     # Everything moves in that plane: rounding.
     assert learned.score(x, q) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_the_report_numbers_the_places_that_the_map_has() -> None:
+    learned = SimpleNamespace(
+        all_centers_=np.eye(3),
+        all_counts_=np.array(
+            [50, 60, 70]
+        ),  # all enough, but the second shows too little
+        centers_=np.eye(3)[[0, 2]],
+        n_components_=np.array([1, 1]),
+        explained_variance_ratio_=np.array([[0.9, 0.1], [0.8, 0.2]]),
+        lower_=np.zeros((2, 1)),
+        upper_=np.ones((2, 1)),
+    )
+    rows = points_report(cast(Any, learned), rate=100.0)
+    assert [row["point"] for row in rows] == [1, None, 2]
+    assert [row.get("explained_variance") for row in rows] == [0.9, None, 0.8]
