@@ -38,7 +38,7 @@ def dask(n: int, *, threads: int = 1) -> Iterator[Any]:
     with LocalCluster(
         n_workers=n,
         threads_per_worker=threads,
-        dashboard_address=None,
+        dashboard_address=":0",
         silence_logs=logging.CRITICAL,
     ) as made:
         yield made
