@@ -74,6 +74,6 @@ Experiments with people are in :mod:`ikns.experiments`, figures and reports in
 
 import lazy_loader
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

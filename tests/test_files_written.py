@@ -192,7 +192,7 @@ def in_opensim(path):
     return names, table, older.isInDegrees()
 
 
-# OpenSim is in the extra `bench` only.
+# OpenSim is in the group `bench` only.
 READERS = [by_the_book] + [by_opensim] * (
     importlib.util.find_spec("opensim") is not None
 )
