@@ -11,7 +11,7 @@ import pytest
 # floor do not know each other.
 FLOORS = (
     "arrays errors endings",
-    "_kernels output",
+    "_kernels output ros2",
     "numerics",
     "recording finger statistics",
     "body",
@@ -49,6 +49,7 @@ ONLY_IN = {
     "serial": {"finger"},
     "statsmodels": {"statistics"},
     "vicon_dssdk": {"live"},
+    "zenoh": {"ros2"},
     "typer": {"cli"},
     "rich": {"cli"},
 }

@@ -62,7 +62,18 @@ SOURCE = [
     "replay:{binary}",
     "replay:{folder}",
 ]
-PUBLISH = ["", "x", "lsl:", "lsl: ", "udp:c", "lsl:c?scope=moon", "lsl:c?x=1"]
+PUBLISH = [
+    "",
+    "x",
+    "lsl:",
+    "lsl: ",
+    "udp:c",
+    "lsl:c?scope=moon",
+    "lsl:c?x=1",
+    "ros2:",
+    "ros2:9",
+    "ros2:a?router=x",
+]
 FINGER = ["", "x", "sim:?safe=x", "dynamixel:", "dynamixel:{nowhere}?id=-1"]
 TEXT = ["", "a\udcff"]
 FLAG: list[str] = []

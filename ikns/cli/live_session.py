@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import ikns
 
 if TYPE_CHECKING:
-    from ikns.live.publish import Publisher
+    from ikns.live.publish import Publishers
     from ikns.live.session import RunWriter
 
 
@@ -92,22 +92,34 @@ def live_session(
 
 @contextmanager
 def publishing(
-    address: str | None, subject: ikns.Subject | None, *, rate: float, simulated: bool
-) -> Iterator[Publisher | None]:
-    """Publish at an address, if there is one; without a subject, events only."""
-    if address is None:
+    addresses: Sequence[str],
+    subject: ikns.Subject | None,
+    *,
+    rate: float,
+    simulated: bool,
+) -> Iterator[Publishers | None]:
+    """Publish at addresses, if there are any; without a subject, events only."""
+    if not addresses:
         yield None
         return
-    from ikns.live.publish import open_publisher
+    from ikns.live.publish import Publishers, joint_places, open_publisher
 
-    with open_publisher(
-        address,
-        rate=rate,
-        n_dof=0 if subject is None else subject.null_space_map.n_dof,
-        simulated=simulated,
-        on_fault=say,
-    ) as publisher:
-        yield publisher
+    joints = {} if subject is None else joint_places(subject.skeleton, subject.chain)
+    with ExitStack() as stack:
+        opened = [
+            stack.enter_context(
+                open_publisher(
+                    address,
+                    rate=rate,
+                    n_dof=0 if subject is None else subject.null_space_map.n_dof,
+                    joints=joints,
+                    simulated=simulated,
+                    on_fault=say,
+                )
+            )
+            for address in addresses
+        ]
+        yield Publishers(opened)
 
 
 def say(sentence: str) -> None:

@@ -53,10 +53,12 @@ MarkerSetName = Annotated[
     ),
 ]
 Publish = Annotated[
-    str | None,
+    list[str] | None,
     typer.Option(
         help="lsl:NAME: c, flexion, state and residual as an LSL stream, and events as "
-        "another; on this machine only without lsl:NAME?scope=network.",
+        "another; on this machine only without lsl:NAME?scope=network. "
+        "ros2:NAMESPACE: topics of ROS 2, by the router of this machine without "
+        "ros2:NAMESPACE?router=HOST:PORT. Again for more.",
     ),
 ]
 OptionalMarkerSet = Annotated[

@@ -25,7 +25,7 @@ from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.live.publish.publisher import Publisher
+    from ikns.live.publish import Publishers
     from ikns.live.runtime import LoopStatus, Report
 
 #: Interval of the status line on the terminal, s.
@@ -122,8 +122,8 @@ def run(
 
     if realtime:
         check_realtime()
-    if publish is not None:
-        check_publish(publish)
+    for address in publish or []:
+        check_publish(address)
     settings = ControlSettings(
         hold_speed=hold_speed, method=method, max_uncertainty=max_uncertainty
     )
@@ -136,7 +136,7 @@ def run(
         stream = stack.enter_context(opened)
         simulated = is_simulated(calibrated, subject, played_files(source))
         pace = stream.rate * stream.speed
-        shared = publishing(publish, calibrated, rate=pace, simulated=simulated)
+        shared = publishing(publish or [], calibrated, rate=pace, simulated=simulated)
         publisher = stack.enter_context(shared)
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
@@ -217,7 +217,7 @@ def _show_report(
     title: str,
     session: Path | None,
     losses: list[str],
-    publisher: Publisher | None,
+    publisher: Publishers | None,
     *,
     as_json: bool,
 ) -> None:

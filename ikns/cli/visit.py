@@ -94,7 +94,7 @@ def conduct(
             with open_arm_source(arm, subject) as source:
                 ikns.warm_up()
                 rate = source.rate * source.speed
-        shared = publishing(arm.publish, subject, rate=rate, simulated=simulated)
+        shared = publishing(arm.publish or [], subject, rate=rate, simulated=simulated)
         publisher = stack.enter_context(shared)
         common = _about(identity, arm, pages, conditions, simulated=simulated)
         common |= {
@@ -208,10 +208,11 @@ def _checked(
         )
     subject = arm_subject(arm) if "ikns" in conditions else None
     finger_opener(arm)
-    if arm.publish is not None:
+    if arm.publish:
         from ikns.live.publish import check_publish
 
-        check_publish(arm.publish)
+        for address in arm.publish:
+            check_publish(address)
     check_port(pages.host, pages.port)
     _check_session(arm.session)
     simulated = virtual or (subject is not None and arm_is_simulated(subject, arm))

@@ -16,7 +16,7 @@ from ikns.errors import InvalidInput
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Driver
     from ikns.finger import Finger
-    from ikns.live.publish import Publisher
+    from ikns.live.publish import Publishers
     from ikns.live.runtime import LoopStatus
     from ikns.live.session import RunWriter
     from ikns.live.stream import Source
@@ -52,7 +52,7 @@ class ArmOptions:
         What reads c off the posture.
     names : dict
         Other labels for markers of the source, new by old.
-    publish : str or None
+    publish : list of str or None
         Where signals and events are published.
     max_uncertainty : float
         Largest standard deviation of c with which the finger moves.
@@ -70,7 +70,7 @@ class ArmOptions:
     method: Literal["paper", "intent"]
     names: dict[str, str]
     max_uncertainty: float
-    publish: str | None = None
+    publish: list[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def arm_driver(
     participant: str,
     shown: Sequence[Callable[[LoopStatus], None]],
     losses: list[str],
-    publisher: Publisher | None = None,
+    publisher: Publishers | None = None,
 ) -> AbstractContextManager[Driver]:
     """Run the live loop as driver, with a session of its own.
 
