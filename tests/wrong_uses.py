@@ -57,6 +57,8 @@ SOURCE = [
     "",
     "x",
     "natnet:",
+    "ros2:",
+    "ros2:/markers?rate=0",
     "replay:",
     "replay:{nowhere}",
     "replay:{binary}",

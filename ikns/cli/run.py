@@ -37,8 +37,8 @@ def run(
     source: Annotated[
         str,
         typer.Option(
-            help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or "
-            "natnet:HOST (OptiTrack)."
+            help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, "
+            "natnet:HOST (OptiTrack), or ros2:TOPIC."
         ),
     ],
     rename: Rename = None,
