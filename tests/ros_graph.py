@@ -11,6 +11,7 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 import time
 
 import zenoh
@@ -237,6 +238,78 @@ class Peer:
 
     def close(self):
         self.session.close()
+
+
+class Robot(Peer):
+    """A robot with a joint that goes where it is told, and stays there in silence.
+
+    A trajectory is followed as joint_trajectory_controller does: a straight line to its
+    one point.
+
+    Attributes
+    ----------
+    goals : list of (time, position)
+    position : float
+        Of its joint "finger".
+    """
+
+    def __init__(self, port, *, command="joint_trajectory", position=0.0, joints=None):
+        super().__init__(port)
+        self.position, self.goals = position, []
+        self._names = joints or ["wrist", "finger"]
+        self._goal, self._reach = position, 0.01
+        self.quiet, self._end = threading.Event(), threading.Event()
+        kinds = {
+            "joint_trajectory": "trajectory_msgs/msg/JointTrajectory",
+            "position": "std_msgs/msg/Float64MultiArray",
+        }
+        handler = zenoh.handlers.Callback(self._obey, indirect=False)
+        self._kind = kinds[command]
+        where = key("/finger/commands", self._kind)
+        self.controller = self.session.declare_subscriber(where, handler)
+        self.announce("MS", "/finger/commands", self._kind)
+        self._tell = self.publisher("/joint_states", "sensor_msgs/msg/JointState")
+        self._thread = threading.Thread(target=self._live)
+        self._thread.start()
+
+    def _obey(self, sample):
+        message = read(self._kind, sample.payload.to_bytes())
+        if "points" in message:
+            assert message["joint_names"] == ["finger"]
+            assert message["stamp.sec"] == message["stamp.nanosec"] == 0
+            (point,) = message["points"]
+            (self._goal,) = point["positions"]
+            self._reach = point["sec"] + 1e-9 * point["nanosec"]
+        else:
+            (self._goal,) = message["data"]
+            assert (message["dim"], message["data_offset"]) == ([], 0)
+        self.goals.append((time.monotonic(), self._goal))
+
+    def _live(self):
+        before = time.monotonic()
+        while not self._end.wait(0.005):
+            now = time.monotonic()
+            share = min((now - before) / max(self._reach, 1e-3), 1)
+            self.position += share * (self._goal - self.position)
+            before = now
+            if not self.quiet.is_set():
+                places = [0.7 if n == "wrist" else self.position for n in self._names]
+                self._tell(
+                    {
+                        "stamp.sec": 1,
+                        "stamp.nanosec": 0,
+                        "frame_id": "",
+                        "name": self._names,
+                        "position": places,
+                        "velocity": [],
+                        "effort": [],
+                    }
+                )
+
+    def close(self):
+        self._end.set()
+        self._thread.join()
+        super().close()
 
 
 class Graph:

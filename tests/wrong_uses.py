@@ -76,7 +76,16 @@ PUBLISH = [
     "ros2:9",
     "ros2:a?router=x",
 ]
-FINGER = ["", "x", "sim:?safe=x", "dynamixel:", "dynamixel:{nowhere}?id=-1"]
+FINGER = [
+    "",
+    "x",
+    "sim:?safe=x",
+    "dynamixel:",
+    "dynamixel:{nowhere}?id=-1",
+    "ros2:",
+    "ros2:/f",
+    "ros2:/f?type=position&open=0&closed=1",
+]
 TEXT = ["", "a\udcff"]
 FLAG: list[str] = []
 

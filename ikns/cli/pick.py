@@ -93,7 +93,7 @@ def pick(
     rename: Rename = None,
     labels: LabelFile = None,
     finger: Annotated[
-        str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
+        str, typer.Option(help="sim:, dynamixel:/dev/ttyUSB0 or ros2:TOPIC?...")
     ] = "sim:",
     session: SessionFolder = None,
     safe_state: SafeState = "limp",

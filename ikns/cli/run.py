@@ -44,7 +44,7 @@ def run(
     rename: Rename = None,
     labels: LabelFile = None,
     finger: Annotated[
-        str, typer.Option(help="sim: or dynamixel:/dev/ttyUSB0.")
+        str, typer.Option(help="sim:, dynamixel:/dev/ttyUSB0 or ros2:TOPIC?...")
     ] = "sim:",
     session: Annotated[
         Path | None, typer.Option(help="Folder to record everything in.")

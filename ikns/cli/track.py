@@ -105,7 +105,8 @@ def track(
     rename: Rename = None,
     labels: LabelFile = None,
     finger: Annotated[
-        str | None, typer.Option(help="For ikns: sim: or dynamixel:/dev/ttyUSB0.")
+        str | None,
+        typer.Option(help="For ikns: sim:, dynamixel:/dev/ttyUSB0 or ros2:TOPIC?..."),
     ] = None,
     session: SessionFolder = None,
     smooth: Annotated[

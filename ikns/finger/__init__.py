@@ -11,6 +11,7 @@ from ikns.finger.errors import FingerError
 from ikns.finger.guard import Safety
 from ikns.finger.limiter import Limiter, Limits
 from ikns.finger.opening import open_finger
+from ikns.finger.ros import RosFinger
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import MODES, SAFE_STATES, Finger, FingerState
 
@@ -24,6 +25,7 @@ __all__ = [
     "FingerState",
     "Limiter",
     "Limits",
+    "RosFinger",
     "Safety",
     "SimulatedFinger",
     "check_finger",
