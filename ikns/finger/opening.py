@@ -13,6 +13,7 @@ from ikns.finger.guard import Safety
 from ikns.finger.ros import RosFinger
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import Finger
+from ikns.ros2.address import OPTIONS as ROS_OPTIONS
 from ikns.ros2.address import ros_address
 
 _SIMULATED: dict[str, Callable[[str], Any]] = {"width": float, "effort": float}
@@ -109,7 +110,9 @@ def _ros_finger(address: str, rest: str, safety: Safety) -> RosFinger:
         )
     with naming(f"'{address}'"):
         safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
-        where = {key: values.pop(key) for key in ("router", "domain") if key in values}
+        where: dict[str, str] = {
+            key: values.pop(key) for key in ROS_OPTIONS if key in values
+        }
         return RosFinger(
             ros_address(topic, where),
             command=values.pop("type"),
