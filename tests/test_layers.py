@@ -50,6 +50,7 @@ ONLY_IN = {
     "statsmodels": {"statistics"},
     "vicon_dssdk": {"live"},
     "zenoh": {"ros2"},
+    "rerun": {"view"},
     "typer": {"cli"},
     "rich": {"cli"},
 }

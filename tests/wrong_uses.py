@@ -155,6 +155,7 @@ WRONG = {
     "pilot": READ_FOLDER,
     "png": PICTURE,
     "publish": PUBLISH,
+    "rrd": [*WRITE_FILE, "x.exe", "x"],
     "point": [*COUNT, "99"],
     "point_seconds": POSITIVE,
     "points": COUNT,
@@ -217,7 +218,7 @@ WRONG = {
 FLAGS = {
     *("as_json", "auto", "browser", "clavicle", "dry_run", "everywhere", "force"),
     *("guess", "live", "loop", "open_page", "quick", "realtime", "resume", "simulated"),
-    *("rewear", "short", "smooth", "view"),
+    *("rerun", "rewear", "short", "smooth", "view"),
 }
 #: Options that count only together with others.
 WITH = {

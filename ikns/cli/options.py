@@ -61,6 +61,18 @@ Publish = Annotated[
         "ros2:NAMESPACE?router=HOST:PORT. Again for more.",
     ),
 ]
+Rerun = Annotated[
+    bool,
+    typer.Option(
+        "--rerun",
+        help="Show markers, arms, c, residuals and events in Rerun's viewer, on this "
+        "machine.",
+    ),
+]
+Rrd = Annotated[
+    Path | None,
+    typer.Option(help="Write the same to a file of Rerun, FILE.rrd."),
+]
 OptionalMarkerSet = Annotated[
     str | None,
     typer.Option(

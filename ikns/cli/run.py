@@ -16,8 +16,22 @@ import typer
 
 import ikns
 from ikns.calibration.subject_files import check_subject_folder
-from ikns.cli.live_session import live_session, publishing, say, software
-from ikns.cli.options import AsJson, LabelFile, Publish, Rename, SubjectFolder
+from ikns.cli.live_session import (
+    live_session,
+    publishing,
+    say,
+    software,
+    timeline_of,
+)
+from ikns.cli.options import (
+    AsJson,
+    LabelFile,
+    Publish,
+    Rename,
+    Rerun,
+    Rrd,
+    SubjectFolder,
+)
 from ikns.cli.output import show, table
 from ikns.cli.reading import label_names
 from ikns.cli.stop_notice import STOPPED, stop_line, watch_stops
@@ -92,6 +106,8 @@ def run(
         ),
     ] = "paper",
     publish: Publish = None,
+    rerun: Rerun = False,
+    rrd: Rrd = None,
     view: Annotated[
         bool, typer.Option("--view", help="Show the body live in a browser.")
     ] = False,
@@ -124,6 +140,7 @@ def run(
         check_realtime()
     for address in publish or []:
         check_publish(address)
+    timeline = timeline_of(rerun=rerun, rrd=rrd)
     settings = ControlSettings(
         hold_speed=hold_speed, method=method, max_uncertainty=max_uncertainty
     )
@@ -136,7 +153,13 @@ def run(
         stream = stack.enter_context(opened)
         simulated = is_simulated(calibrated, subject, played_files(source))
         pace = stream.rate * stream.speed
-        shared = publishing(publish or [], calibrated, rate=pace, simulated=simulated)
+        shared = publishing(
+            publish or [],
+            calibrated,
+            rate=pace,
+            simulated=simulated,
+            timeline=timeline,
+        )
         publisher = stack.enter_context(shared)
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())

@@ -94,7 +94,13 @@ def conduct(
             with open_arm_source(arm, subject) as source:
                 ikns.warm_up()
                 rate = source.rate * source.speed
-        shared = publishing(arm.publish or [], subject, rate=rate, simulated=simulated)
+        shared = publishing(
+            arm.publish or [],
+            subject,
+            rate=rate,
+            simulated=simulated,
+            timeline=arm.timeline,
+        )
         publisher = stack.enter_context(shared)
         common = _about(identity, arm, pages, conditions, simulated=simulated)
         common |= {

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import ikns
-from ikns.cli.live_session import live_session, software
+from ikns.cli.live_session import Timeline, live_session, software
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -54,6 +54,8 @@ class ArmOptions:
         Other labels for markers of the source, new by old.
     publish : list of str or None
         Where signals and events are published.
+    timeline : Timeline or None
+        Where they are logged for Rerun.
     max_uncertainty : float
         Largest standard deviation of c with which the finger moves.
     """
@@ -71,6 +73,7 @@ class ArmOptions:
     names: dict[str, str]
     max_uncertainty: float
     publish: list[str] | None = None
+    timeline: Timeline | None = None
 
 
 @dataclass(frozen=True)
