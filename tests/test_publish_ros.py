@@ -150,6 +150,17 @@ def test_a_router_that_hangs_is_told():
     assert "does not answer" in told[0]
 
 
+def test_a_pause_of_the_publisher_is_no_fault(monkeypatch):
+    monkeypatch.setattr("ikns.live.publish.ros._SILENCE", 0.2)
+    with Graph() as graph, opened(graph) as publisher:
+        for k in range(3):
+            time.sleep(0.4)
+            publisher.event(float(k), "trial", str(k))
+            while publisher.sent <= k and not publisher.fault:
+                time.sleep(0.01)
+        assert publisher.fault == ""
+
+
 def test_commands_publish_to_several_places(files, tmp_path, capfd):
     with Graph({"/arm/c": "std_msgs/msg/Float64"}) as graph:
         argv = [

@@ -78,7 +78,7 @@ class RosNode:
         self._token = node_token(address.domain, self._id, self._name)
         self._keep_token(self._token)
         self._asked = -math.inf
-        self._answered = time.monotonic()
+        self._waiting = math.inf  # since the first question that has no answer yet
 
     @property
     def connected(self) -> bool:
@@ -86,7 +86,7 @@ class RosNode:
         return bool(self._session.info.routers_zid())
 
     def silence(self) -> float:
-        """Ask the router now and then, and say how long ago it last answered, s.
+        """Ask the router now and then, and say how long it owes an answer, s.
 
         Call it often. A program that hangs, or a cable that is out, keeps a connection;
         only an answer says more.
@@ -94,8 +94,9 @@ class RosNode:
         now = time.monotonic()
         if now - self._asked >= _PROBE:
             self._asked = now
+            self._waiting = min(self._waiting, now)
             self._ask_router()
-        return now - self._answered
+        return max(now - self._waiting, 0.0)
 
     def publisher(self, topic: str, type_name: str) -> RosPublisher:
         """Return what publishes on a topic."""
@@ -163,8 +164,8 @@ class RosNode:
         failed: list[Any] = []
 
         def end() -> None:
-            if not failed:
-                self._answered = max(self._answered, asked)
+            if not failed and asked >= self._waiting:
+                self._waiting = math.inf
 
         handler = self._zenoh.handlers.Callback(failed.append, end, indirect=False)
         where = f"{self._token}/none"
