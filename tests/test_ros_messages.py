@@ -1,6 +1,9 @@
 """ROS 2 messages: bytes, hashes and names against tables that share no code."""
 
 import math
+import signal
+import subprocess
+import sys
 
 import pytest
 import ros_graph
@@ -8,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ikns.errors import InvalidInput
-from ikns.ros2 import ros_address
+from ikns.ros2 import RosNode, ros_address
 from ikns.ros2.cdr import decode, encode
 from ikns.ros2.definitions import definitions, type_hash
 from ikns.ros2.keys import endpoint_token, read_token, topic_key
@@ -100,6 +103,24 @@ def test_a_domain_comes_from_the_address_or_from_the_environment(monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", "x")
     with pytest.raises(InvalidInput, match="ROS_DOMAIN_ID to be a number"):
         ros_address("a", {})
+
+
+def test_a_router_for_trying_things_serves_this_machine_only():
+    port = str(ros_graph.free_port())
+    command = [sys.executable, "-m", "ikns.ros2.router", port]
+    router = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        assert "listens at tcp/127.0.0.1" in router.stderr.readline()
+        RosNode(
+            ros_address("/a", {"router": f"127.0.0.1:{port}"}), needed_by="a test"
+        ).close()
+        second = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert second.returncode == 2
+        assert "to be a free port" in second.stderr
+    finally:
+        router.send_signal(signal.SIGINT)
+        assert router.wait(10) == 0
+        router.stderr.close()
 
 
 def test_not_a_number_survives():
