@@ -223,7 +223,12 @@ class Peer:
 
     def publisher(self, topic, type_name):
         self.announce("MP", topic, type_name)
-        made = self.session.declare_publisher(key(topic, type_name), express=True)
+        # It waits, as the tests count what arrives on a machine that is busy.
+        made = self.session.declare_publisher(
+            key(topic, type_name),
+            express=True,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+        )
         self.kept.append(made)
         return lambda message: made.put(write(type_name, message))
 

@@ -9,12 +9,12 @@ from command_line import check_refused
 from ros_graph import Graph, Peer, Robot
 
 from ikns.errors import InvalidInput
-from ikns.finger import FingerError, check_finger, open_finger
+from ikns.finger import FingerError, Safety, check_finger, open_finger
 from ikns.finger.laws import LAWS
 
 OPEN, CLOSED = 0.2, 1.4
 #: A cycle of the finger's thread is 20 ms; the rest is for a machine that is busy.
-BUSY = 2.0
+BUSY = 5.0
 
 
 @pytest.fixture
@@ -37,6 +37,12 @@ def address(graph, more="&feedback=joint_states", *, command="joint_trajectory")
     )
 
 
+def opened(graph, more="&feedback=joint_states", *, silence=5.0, **about):
+    """A finger that forgives a busy machine: commands may pause, and feedback too."""
+    safety = Safety(silence_timeout=silence, command_timeout=10.0)
+    return open_finger(address(graph, more, **about), safety=safety)
+
+
 def drive(finger, flexion, duration):
     end = time.monotonic() + duration
     while time.monotonic() < end:
@@ -52,7 +58,9 @@ def until(holds):
 
 
 def test_it_keeps_the_laws_of_every_finger(graph, robot):
-    report = check_finger(lambda: open_finger(address(graph)))
+    report = check_finger(
+        lambda: open_finger(address(graph), safety=Safety(silence_timeout=5.0))
+    )
     assert set(report.kept) == set(LAWS)
     # What the robot got kept the range too; a ten-billionth is for the arithmetic.
     _, goals = np.array(robot.goals).T
@@ -61,7 +69,7 @@ def test_it_keeps_the_laws_of_every_finger(graph, robot):
 
 
 def test_without_feedback_nothing_is_called_measured(graph, robot):
-    finger = open_finger(address(graph, "", command="joint_trajectory"))
+    finger = opened(graph, "")
     with finger:
         drive(finger, 1.0, 0.1)
         assert math.isnan(finger.state().flexion)
@@ -72,7 +80,7 @@ def test_without_feedback_nothing_is_called_measured(graph, robot):
 
 def test_positions_are_one_number(graph):
     robot = Robot(graph.port, command="position", position=0.5)
-    with open_finger(address(graph, command="position")) as finger:
+    with opened(graph, command="position") as finger:
         drive(finger, 1.0, 0.3)
     robot.close()
     assert finger.state().mode == "relaxed"
@@ -83,7 +91,7 @@ def test_positions_are_one_number(graph):
 
 
 def test_the_end_leaves_it_where_it_is(graph, robot):
-    with open_finger(address(graph)) as finger:
+    with opened(graph) as finger:
         drive(finger, 1.0, 0.2)
         until(lambda: robot.position > 0.55)
     count = len(robot.goals)
@@ -98,8 +106,8 @@ def test_the_end_leaves_it_where_it_is(graph, robot):
     ("fault", "within", "says"),
     [
         ("kill", 0.02, "the router at 127.0.0.1:{} went away"),
-        ("pause", 0.25 + 0.05 + 0.02, "no answer from the router at 127.0.0.1:{}"),
-        ("quiet", 0.25 + 0.02, "no feedback of joint 'finger' for 0.25 s"),
+        ("pause", 1.0 + 0.05 + 0.02, "no answer from the router at 127.0.0.1:{}"),
+        ("quiet", 1.0 + 0.02, "no feedback of joint 'finger' for 1 s"),
         ("controller", 0.02, "nobody listens to /finger/commands any more"),
     ],
 )
@@ -107,7 +115,7 @@ def test_a_fault_makes_it_safe_in_the_stated_time(
     graph, robot, fault, within, says, monkeypatch
 ):
     monkeypatch.setattr("ikns.finger.ros_joint._WAIT", 0.3)
-    with open_finger(address(graph)) as finger:
+    with opened(graph, silence=1.0) as finger:
         drive(finger, 0.6, 0.1)
         began = time.monotonic()
         if fault in ("kill", "pause"):
@@ -122,7 +130,9 @@ def test_a_fault_makes_it_safe_in_the_stated_time(
         took = time.monotonic() - began
         state = finger.state()
         assert state.mode == "safe"
-        assert says.format(graph.port) in state.alert
+        # A router that hangs keeps the feedback back too: either may be noticed first.
+        silent = "no feedback of joint" if fault == "pause" else says
+        assert state.alert.startswith((says.format(graph.port), silent))
         assert took < within + BUSY
         with pytest.raises(FingerError):  # it cannot be armed as long as that lasts
             finger.connect()
@@ -131,7 +141,9 @@ def test_a_fault_makes_it_safe_in_the_stated_time(
 
 
 def test_in_its_safe_state_it_opens_if_asked_to(graph, robot):
-    with open_finger(address(graph).replace("safe=hold", "safe=open")) as finger:
+    where = address(graph).replace("safe=hold", "safe=open")
+    safety = Safety(silence_timeout=5.0, command_timeout=10.0)
+    with open_finger(where, safety=safety) as finger:
         drive(finger, 0.6, 0.2)
         finger.make_safe("a test")
         until(lambda: robot.position < OPEN + 0.01)
@@ -139,7 +151,8 @@ def test_in_its_safe_state_it_opens_if_asked_to(graph, robot):
 
 
 def test_a_loop_that_hangs_leaves_it_safe(graph, robot):
-    with open_finger(address(graph)) as finger:
+    safety = Safety(silence_timeout=5.0)
+    with open_finger(address(graph), safety=safety) as finger:
         drive(finger, 1.0, 0.1)
         until(lambda: finger.state().mode == "safe")
         assert finger.state().alert == "no command for 0.5 s"

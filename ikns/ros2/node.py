@@ -35,6 +35,11 @@ _ASK = 1.0
 #: Time between questions whether the router answers, s, and how long each one waits.
 _PROBE, _PROBE_ENDS = 0.05, 5.0
 
+#: How long a message may wait for room in the queue before it is dropped, s. zenoh's
+#: own 1 ms drops messages on a machine that is merely busy.
+_ROOM = 0.02
+_QUEUE = "transport/link/tx/queue/congestion_control"
+
 #: Called with the bytes of a message and the time of its receipt, s of
 #: `time.monotonic`, from a thread of zenoh.
 Receiver = Callable[[bytes, float], None]
@@ -43,8 +48,8 @@ Receiver = Callable[[bytes, float], None]
 class RosNode:
     """A connection to the router of a ROS 2 graph.
 
-    When the router goes away it is connected again as soon as it is back. Nothing waits
-    meanwhile: what is sent is lost.
+    When the router goes away it is connected again as soon as it is back. What is sent
+    meanwhile is lost.
 
     Parameters
     ----------
@@ -98,14 +103,19 @@ class RosNode:
             self._ask_router()
         return max(now - self._waiting, 0.0)
 
-    def publisher(self, topic: str, type_name: str) -> RosPublisher:
-        """Return what publishes on a topic."""
+    def publisher(
+        self, topic: str, type_name: str, *, wait: bool = False
+    ) -> RosPublisher:
+        """Return what publishes on a topic.
+
+        With `wait` a message waits for room in zenoh's queue, as long as that takes;
+        without, 20 ms at most, and is then dropped unseen.
+        """
         key = topic_key(self.address.domain, topic, type_name)
-        zenoh = self._zenoh
-        # Reliable for whom it reaches, yet a queue that is full never holds us up.
+        zenoh, control = self._zenoh, self._zenoh.CongestionControl
         publisher = self._session.declare_publisher(
             key,
-            congestion_control=zenoh.CongestionControl.DROP,
+            congestion_control=control.BLOCK if wait else control.DROP,
             reliability=zenoh.Reliability.RELIABLE,
             express=True,
         )
@@ -183,6 +193,7 @@ class RosNode:
             "scouting/multicast/enabled": False,
             "scouting/gossip/enabled": False,
             "transport/unicast/open_timeout": round(1000 * _CONNECT),
+            f"{_QUEUE}/drop/wait_before_drop": round(1e6 * _ROOM),
         }.items():
             configuration.insert_json5(path, json.dumps(value))
         return configuration
@@ -229,7 +240,7 @@ class RosPublisher:
         return bool(self._publisher.matching_status.matching)
 
     def put(self, message: Message, *, at: int) -> None:
-        """Send a message; it never waits for a listener.
+        """Send a message.
 
         Parameters
         ----------

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from functools import partial
 
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
@@ -90,18 +91,18 @@ class RosSink:
         self._about = {"simulated": "yes" if simulated else "no"}
         self._said = ("", -math.inf)
         node = self._node
-        self._events = node.publisher(f"{space}/events", "std_msgs/msg/String")
+        # This thread may wait, and what does not fit into its queue is counted.
+        publisher = partial(node.publisher, wait=True)
+        self._events = publisher(f"{space}/events", "std_msgs/msg/String")
         self._c, self._flexion, self._joints, self._state = [], None, None, None
         if n_dof:
             names = ["c"] if n_dof == 1 else [f"c{k + 1}" for k in range(n_dof)]
             number = "std_msgs/msg/Float64"
-            self._c = [node.publisher(f"{space}/{name}", number) for name in names]
-            self._flexion = node.publisher(f"{space}/flexion", number)
-            self._state = node.publisher(
-                DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray"
-            )
+            self._c = [publisher(f"{space}/{name}", number) for name in names]
+            self._flexion = publisher(f"{space}/flexion", number)
+            self._state = publisher(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray")
             if joints:
-                self._joints = node.publisher(
+                self._joints = publisher(
                     f"{space}/joint_states", "sensor_msgs/msg/JointState"
                 )
 
