@@ -13,13 +13,15 @@ class Told:
 
 
 class Points3D(Told):
-    def __init__(self, positions, *, radii=None, labels=None, show_labels=None):
-        super().__init__(positions, labels=labels)
+    @classmethod
+    def from_fields(cls, *, positions=None, radii=None, labels=None, show_labels=None):
+        return cls(positions, labels=labels)
 
 
 class LineStrips3D(Told):
-    def __init__(self, strips, *, radii=None, colors=None):
-        super().__init__(strips)
+    @classmethod
+    def from_fields(cls, *, strips=None, radii=None, colors=None):
+        return cls(strips)
 
 
 class Scalars(Told):
@@ -47,7 +49,9 @@ class RecordingStream:
         assert timeline == "time"
         self.now = float(duration)
 
-    def log(self, path, thing):
+    def log(self, path, thing, *, static=False):
+        if static:
+            return
         numbers = thing.args[0]
         if not isinstance(numbers, str):
             numbers = (

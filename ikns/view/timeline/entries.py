@@ -22,9 +22,9 @@ class Points(NamedTuple):
 
 
 class Lines(NamedTuple):
-    """Polylines, each (n, 3) m."""
+    """Polylines, each (n, 3) m; an array where all have as many points."""
 
-    strips: tuple[Array, ...]
+    strips: tuple[Array, ...] | Array
 
 
 Entry = Points | Lines | float
@@ -73,7 +73,7 @@ def frame_entries(
         placed = skeleton.markers_in_world(q)
         shown["world/arms"] = Lines(_arms(skeleton, q))
         pairs = np.stack([markers[seen], placed[seen]], axis=1)
-        shown["world/residuals"] = Lines(tuple(pairs))
+        shown["world/residuals"] = Lines(pairs)
     else:  # what was drawn before must not stay
         shown["world/arms"] = shown["world/residuals"] = Lines(())
     shown |= {path: v for path, v in numbers.items() if math.isfinite(v)}
