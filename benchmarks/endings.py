@@ -34,7 +34,7 @@ QUICK = ("HUP", "STOP 0.5 s")
 
 def person(folder: Path) -> None:
     """Simulate a person and a recording to play, unless they are there."""
-    if (folder / "person").exists():
+    if (folder / "two").exists():
         return
     import small_person
 
@@ -42,6 +42,7 @@ def person(folder: Path) -> None:
     free = small_person.protocol().free.recording
     small_person.write(folder, "free", free)
     small_person.subject().save(folder / "person")
+    small_person.two_freedoms().save(folder / "two")
 
 
 def rows(results: list[Result]) -> list[dict]:

@@ -310,12 +310,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20, help="how many subjects")
     parser.add_argument("--first", type=int, default=0, help="seed of the first")
     parser.add_argument("--side", default="right", choices=SIDES)
-    parser.add_argument("--quick", action="store_true", help="2 subjects, 3 s a point")
+    parser.add_argument("--quick", action="store_true", help="one subject, 3 s a point")
     parser.add_argument("--only", type=int, help="only this condition, from 0")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     seeds = range(
-        options.first, options.first + (2 if options.quick else options.seeds)
+        options.first, options.first + (1 if options.quick else options.seeds)
     )
     about = {
         "seeds": [seeds[0], seeds[-1]],

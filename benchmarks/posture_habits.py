@@ -149,11 +149,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=BESIDE)
     parser.add_argument("--people", type=int, default=20, help="simulated ones")
-    parser.add_argument("--quick", action="store_true", help="one real, two simulated")
+    parser.add_argument("--quick", action="store_true", help="one real, one simulated")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     arms = real_arms(options.data / "ue_adl", people=1 if options.quick else None)
-    people = range(2 if options.quick else options.people)
+    people = range(1 if options.quick else options.people)
     table = {"real": measured(arms)}
     for kind, draw in KINDS.items():
         table[kind] = measured([simulated_arm(k, draw(k)) for k in people])

@@ -4,16 +4,19 @@ Everything is simulated.
 
 1. The study that `ikns study init` writes (10 participants, both experiments, both
    conditions, 180 tracking trials), from nothing, with this many processes.
-2. A small study by one process, two, and two Dask workers: are all files the same, bit
-   for bit? And killed (SIGKILL) at random instants and gone on with until it is done?
+2. A small study by one process and by two: are all files the same, bit for bit? And
+   killed (SIGKILL) at random instants and gone on with until it is done?
+   `study_cluster.py` asks the same of Dask workers.
 3. Memory of the running process, and of its largest worker, when 10, 50 and 100 % of a
    larger cohort's tracking is done.
+
+With `--quick` one small study answers all three: by one process, and by two that are
+killed on the way.
 """
 
 import argparse
 import hashlib
 import json
-import logging
 import os
 import platform
 import random
@@ -57,14 +60,12 @@ def declared(folder: Path, table: dict[str, Any]) -> Path:
     return folder
 
 
-def example(folder: Path, jobs: int, *, quick: bool) -> dict[str, Any]:
-    """Time the study that ships; `quick` a small one."""
-    if quick:
-        declared(folder, SMALL)
-    else:
-        init_study(folder)
+def example(folder: Path, jobs: int, people: int | None) -> dict[str, Any]:
+    """Time the study that is in a folder, or of its first people."""
     study = read_study(folder)
-    run = run_study(folder, n_jobs=jobs, participants=1 if quick else None)
+    before = os.times()
+    run = run_study(folder, n_jobs=jobs, participants=people)
+    cpu = sum(os.times()[:4]) - sum(before[:4])
     visits = [read_visit(path) for path in list_visits(folder)]
     trials = {
         name: sum(len(v.attempts) for v in visits if v.about["experiment"] == name)
@@ -79,6 +80,7 @@ def example(folder: Path, jobs: int, *, quick: bool) -> dict[str, Any]:
         "picks": trials["picking"],
         "failed": len(run.failed),
         "seconds": run.seconds,
+        "cpu": cpu,
         "cells_per_s": run.simulated / run.seconds,
         "bytes_per_cell": size / run.simulated,
     }
@@ -94,24 +96,24 @@ def contents(study: Path) -> dict[str, bytes]:
     }
 
 
-def alike(folder: Path, kills: int, *, seed: int) -> list[dict[str, Any]]:
-    """Compute a small study in four ways."""
-    from distributed import LocalCluster
+class Alike:
+    """Compares the files of studies, bit for bit."""
 
-    rows: list[dict[str, Any]] = []
-    first: dict[str, bytes] = {}
+    def __init__(self) -> None:
+        self.rows: list[dict[str, Any]] = []
+        self._first: dict[str, bytes] = {}
 
-    def note(how: str, study: Path, began: float) -> None:
+    def note(self, how: str, study: Path, seconds: float) -> None:
+        """Add a row; the first one's files are what the others should be."""
         found = contents(study)
-        if not first:
-            first.update(found)
+        first = self._first = self._first or found
         names = sorted(first.keys() | found.keys())
         odd = [name for name in names if first.get(name) != found.get(name)]
         sums = hashlib.sha256(b"".join(name.encode() + found[name] for name in found))
-        rows.append(
+        self.rows.append(
             {
                 "how": how,
-                "seconds": time.perf_counter() - began,
+                "seconds": seconds,
                 "cells": len(list_visits(study)),
                 "digest": sums.hexdigest()[:12],
                 "same_bits": not odd,
@@ -119,23 +121,10 @@ def alike(folder: Path, kills: int, *, seed: int) -> list[dict[str, Any]]:
             }
         )
 
-    for jobs in (1, 2):
-        study = declared(folder / f"processes-{jobs}", SMALL)
-        began = time.perf_counter()
-        run_study(study, n_jobs=jobs)
-        note(f"{jobs} process{'es' * (jobs > 1)}", study, began)
-    study = declared(folder / "dask", SMALL)
-    with LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        dashboard_address=None,
-        silence_logs=logging.CRITICAL,
-    ) as cluster:
-        began = time.perf_counter()
-        run_study(study, scheduler=cluster.scheduler_address)
-        note("2 Dask workers", study, began)
-    study, luck, killed = declared(folder / "killed", SMALL), random.Random(seed), 0
-    began = time.perf_counter()
+
+def killed_runs(study: Path, kills: int, *, seed: int) -> int:
+    """Run a study in two processes, and kill it; return how often."""
+    luck, killed = random.Random(seed), 0
     for _ in range(kills):
         with subprocess.Popen([sys.executable, "-c", RUN, str(study), "2"]) as running:
             try:
@@ -143,40 +132,78 @@ def alike(folder: Path, kills: int, *, seed: int) -> list[dict[str, Any]]:
             except subprocess.TimeoutExpired:
                 running.send_signal(signal.SIGKILL)
                 killed += 1
-    run_study(study, n_jobs=2)
-    note(f"2 processes, killed {killed} times", study, began)
-    return rows
+    return killed
 
 
-def memory(folder: Path, people: int, jobs: int) -> list[dict[str, Any]]:
-    """Resident memory while the tracking of a cohort is simulated."""
-    table = {
-        "study": {"name": "cohort"},
-        "cohort": {"participants": people},
-        "tracking": {},
-    }
-    if people < 10:  # quick
-        table |= {"tracking": SMALL["tracking"], "parameters": SMALL["parameters"]}
-    study = declared(folder / "cohort", table)
-    marks = {max(1, round(share * people)): share for share in (0.1, 0.5, 1.0)}
-    rows = []
+def cohort(folder: Path, people: int) -> Path:
+    """Make a study of tracking alone."""
+    table = {"study": {"name": "cohort"}, "cohort": {"participants": people}}
+    return declared(folder, table | {"tracking": {}})
+
+
+def memory(study: Path, jobs: int) -> list[dict[str, Any]]:
+    """Resident memory while a study is simulated, or what is left of it."""
+    marks, rows = {0.1, 0.5, 1.0}, []
+    first: list[int] = []
 
     def look(step: str, done: int, total: int) -> None:
-        if step == "simulating" and done in marks:
-            workers = [resident(child) for child in children(os.getpid())]
-            rows.append(
-                {
-                    "done": done,
-                    "share": marks.pop(done),
-                    "process_MB": resident(os.getpid()) / 1e6,
-                    "largest_worker_MB": max(workers, default=0) / 1e6,
-                }
-            )
+        if step != "simulating":
+            return
+        first.append(done)
+        share = (done - first[0]) / max(total - first[0], 1)
+        passed = {mark for mark in marks if share >= mark}
+        if not passed:
+            return
+        marks.difference_update(passed)
+        workers = [resident(child) for child in children(os.getpid())]
+        rows.append(
+            {
+                "done": done,
+                "share": max(passed),
+                "process_MB": resident(os.getpid()) / 1e6,
+                "largest_worker_MB": max(workers, default=0) / 1e6,
+            }
+        )
 
     run = run_study(study, n_jobs=jobs, on_progress=look)
+    people = read_study(study).participants
     for row in rows:
         row |= {"participants": people, "seconds_in_all": run.seconds}
     return rows
+
+
+def tables(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Compute the three tables."""
+    init_study(folder / "example")
+    shipped = example(folder / "example", options.jobs, options.first)
+    alike = Alike()
+    for jobs in (1, 2):
+        study = declared(folder / f"processes-{jobs}", SMALL)
+        run = run_study(study, n_jobs=jobs)
+        alike.note(f"{jobs} process{'es' * (jobs > 1)}", study, run.seconds)
+    study = declared(folder / "killed", SMALL)
+    began = time.perf_counter()
+    killed = killed_runs(study, options.kills, seed=options.seed)
+    run_study(study, n_jobs=2)
+    took = time.perf_counter() - began
+    alike.note(f"2 processes, killed {killed} times", study, took)
+    found = memory(cohort(folder / "cohort", options.people), options.jobs)
+    return {"example": shipped, "alike": alike.rows, "memory": found}
+
+
+def quick_tables(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Compute them all of one small study, twice simulated."""
+    table, alike = SMALL | {"cohort": {"participants": 2}}, Alike()
+    study = declared(folder / "one", table)
+    small = example(study, 1, None)
+    alike.note("1 process", study, small["seconds"])
+    study = declared(folder / "killed", table)
+    began = time.perf_counter()
+    killed = killed_runs(study, 1, seed=options.seed)
+    found = memory(study, 2)
+    took = time.perf_counter() - began
+    alike.note(f"2 processes, killed {killed} times", study, took)
+    return {"example": small, "alike": alike.rows, "memory": found}
 
 
 def resident(process: int) -> int:
@@ -207,6 +234,8 @@ def show(result: dict[str, Any]) -> None:
         f"| tracking trials, picks | {e['tracking_trials']}, {e['picks']} |\n"
         f"| cells, of which failed | {e['cells']}, {e['failed']} |\n"
         f"| wall time | {e['seconds']:.0f} s ({e['cells_per_s']:.2f} cells/s) |\n"
+        f"| CPU time | {e['cpu']:.0f} s ({e['cpu'] / e['participants']:.1f} a person) "
+        "|\n"
         f"| on disk | {e['bytes_per_cell'] / 1e3:.0f} kB a cell |"
     )
     print(
@@ -219,7 +248,7 @@ def show(result: dict[str, Any]) -> None:
         )
     rows = result["memory"]
     print(
-        f"\n| tracking of {rows[0]['participants']} | running process, MB "
+        f"\n| participants: {rows[0]['participants']} | running process, MB "
         "| largest worker, MB |\n|---|---|---|"
     )
     for row in rows:
@@ -227,26 +256,23 @@ def show(result: dict[str, Any]) -> None:
             f"| {row['share']:.0%} done | {row['process_MB']:.0f} "
             f"| {row['largest_worker_MB']:.0f} |"
         )
-    print(f"\nThat cohort took {rows[0]['seconds_in_all']:.0f} s.")
+    print(f"\nThat took {rows[0]['seconds_in_all']:.0f} s.")
 
 
 def main() -> None:
     """Print the tables, or one JSON object."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--first", type=int, help="people of the shipped study; all")
     parser.add_argument("--people", type=int, default=60, help="of the larger cohort")
     parser.add_argument("--kills", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0, help="of the kills' instants")
-    parser.add_argument("--quick", action="store_true", help="few people, 1 kill")
+    parser.add_argument("--quick", action="store_true", help="two people, 1 kill")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
-    people, kills = options.people, options.kills
-    if options.quick:
-        people, kills = 1, 1
-        SMALL["cohort"] = {"participants": 2}
     warm_up()
     with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
+        compute = quick_tables if options.quick else tables
         result: dict[str, Any] = {
             "about": {
                 "simulated": True,
@@ -256,9 +282,7 @@ def main() -> None:
                 "numpy": version("numpy"),
                 "seed": options.seed,
             },
-            "example": example(folder / "example", options.jobs, quick=options.quick),
-            "alike": alike(folder, kills, seed=options.seed),
-            "memory": memory(folder, people, options.jobs),
+            **compute(Path(place), options),
         }
     if options.json:
         print(json.dumps(result))

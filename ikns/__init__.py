@@ -44,6 +44,7 @@ Control: from live markers to the control signal c
 
 Finger: the wearable robotic finger
     open_finger                  connect to a finger by its address
+    open_fingers                 several, each with its freedom of the map
     SimulatedFinger              a finger without hardware
     DynamixelFinger              a finger with a Dynamixel servo
     check_finger                 conformance test of a finger class

@@ -42,6 +42,7 @@ from .live.warm_up import warm_up as warm_up
 
 # Finger
 from .finger import open_finger as open_finger
+from .finger import open_fingers as open_fingers
 from .finger import SimulatedFinger as SimulatedFinger
 from .finger import DynamixelFinger as DynamixelFinger
 from .finger import check_finger as check_finger

@@ -3,8 +3,12 @@
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
+from ikns.body.chains import chain_joints
 from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
+from ikns.nullspace.map import NullSpaceMap
 from ikns.recording.files import write_c3d
 from ikns.recording.recording import Recording
 from ikns.simulation import (
@@ -82,6 +86,26 @@ def known_by_movement() -> Subject:
         [protocol().points.recording],
         natural=[another_day().free.recording],
     )
+
+
+@cache
+def two_freedoms() -> Subject:
+    """The person with a second output, forearm pronation, in a map by hand.
+
+    Half a radian to either side of where the forearm was at each place: there noise of
+    a millimeter leaves c_2 certain.
+    """
+    one, joint = subject(), chain_joints("right_arm").index("right_forearm_pronation")
+    learned = one.null_space_map
+    middle = learned.cluster_means_[:, joint]
+    turn = np.tile(np.eye(7)[joint], (len(middle), 1))
+    made = NullSpaceMap.from_arrays(
+        learned.centers_,
+        np.stack([learned.directions_[:, 0], turn], axis=1),
+        np.column_stack([learned.lower_[:, 0], middle - 0.5]),
+        np.column_stack([learned.upper_[:, 0], middle + 0.5]),
+    )
+    return Subject(one.skeleton, made, one.chain, one.report)
 
 
 def write(folder: Path, name: str, recording: Recording) -> Path:

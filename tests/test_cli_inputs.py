@@ -28,11 +28,16 @@ FILES_OUT = {
     "compare": ["figure"],
     "robot": ["figure"],
     "ucm": ["figure"],
-    "view": ["out", "png"],
+    "view": ["out", "png", "animation"],
     "replay": ["export"],
     "study plan": ["figure"],
 }
-FOLDERS_OUT = {"calibrate": ["out"], "demo": ["out"], "report": ["out"]}
+FOLDERS_OUT = {
+    "calibrate": ["out"],
+    "demo": ["out"],
+    "report": ["out"],
+    "docs": ["pictures"],
+}
 #: Written too, but only where nothing is or what the command itself began: --force is
 #: not offered.
 NEW_OUT = {
@@ -67,6 +72,7 @@ READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "replay": ([], {"session": "session"}),
     "calibrate": ([], {"static": "static.c3d", "exploration": "points.c3d", **NAMES}),
     "demo": ([], {}),
+    "docs": ([], {}),
     "run": (["--source", "replay:free.c3d"], {**PERSON, **NAMES}),
     "servo": ([], {}),
     "track": ([], {"study": "study", **PERSON, **NAMES}),
@@ -159,7 +165,13 @@ DISGUISES: dict[str, Callable[[Path, Path], None]] = {
     "chain": chain_of_links,
     "hard link": lambda target, source: os.link(source, target),
 }
-SUFFIX = {"target": ".c3d", "figure": ".png", "png": ".png", "export": ".csv"}
+SUFFIX = {
+    "target": ".c3d",
+    "figure": ".png",
+    "png": ".png",
+    "animation": ".gif",
+    "export": ".csv",
+}
 READERS = [
     (name, output, option)
     for name, outputs in FILES_OUT.items()

@@ -103,11 +103,28 @@ def test_time_left_is_told_where_there_is_no_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(command, "_EVERY", 0.0)
-    with command._progress_or_lines() as report:
+    estimates: dict[str, Countdown] = {}
+    with command._progress_or_lines(estimates) as report:
         report("compiling", 1, 2)
-        for done in (4, 5, 6):  # four were there before
+        report("simulating", 4, 8)
+        estimates["simulating"] = Countdown([None, 600.0, 7200.0])
+        for done in (4, 5, 6):
             report("simulating", done, 8)
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.split(",")[0] for line in lines] == ["5 of 8 cells", "6 of 8 cells"]
-    assert all(line.endswith("0 s left") for line in lines)
-    assert [command._minutes(s) for s in (80, 600, 7200)] == ["80 s", "10 min", "2.0 h"]
+    assert capsys.readouterr().err.splitlines() == [
+        "5 of 8 cells, about 10 min left",
+        "6 of 8 cells, about 2.0 h left",
+    ]
+    assert command._minutes(80) == "80 s"
+
+
+class Countdown:
+    """An estimate that says one thing after the other."""
+
+    def __init__(self, said: list[float | None]) -> None:
+        self._said = iter(said)
+
+    def seconds(self) -> float | None:
+        return next(self._said)
+
+    def share(self) -> float:
+        return 0.5

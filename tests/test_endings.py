@@ -2,6 +2,7 @@
 
 import importlib
 import math
+import re
 import signal
 import subprocess
 import sys
@@ -21,7 +22,7 @@ trials = importlib.import_module("ending.trial")
 endings = importlib.import_module("endings")
 sys.path.remove(str(ROOT / "benchmarks"))
 
-#: Drives the servo at sys.argv[1] with nothing but bytes; `leave` is what it does then.
+#: Drives servos at sys.argv[1] with nothing but bytes; `leave` is what it does then.
 DRIVES = """
 import os, signal, subprocess, sys, termios, time
 from independent_servo.packet import packet
@@ -29,9 +30,10 @@ fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
 settings = termios.tcgetattr(fd)
 settings[4:6] = [termios.B57600] * 2
 termios.tcsetattr(fd, termios.TCSANOW, settings)
-def write(address, value, size):
+def write(address, value, size, ids=[int(word) for word in sys.argv[2:]]):
     body = bytes([3]) + address.to_bytes(2, "little") + value.to_bytes(size, "little")
-    os.write(fd, packet(2, 1, body))
+    for number in ids:
+        os.write(fd, packet(2, number, body))
 def leave(number, frame):
     {leave}
 signal.signal(signal.SIGINT, leave)
@@ -43,6 +45,9 @@ for goal in range(2000, 10**6):
 """
 
 
+TWO = "4 ms, two servos"
+
+
 class Script:
     """Starts a script instead of the command that it is asked for."""
 
@@ -50,14 +55,16 @@ class Script:
         self._source = DRIVES.replace("{leave}", leave)
 
     def start(self, argv: list[str], folder: Path) -> Any:
-        port = argv[argv.index("--finger") + 1].partition(":")[2]
+        addresses = [b for a, b in zip(argv, argv[1:], strict=False) if a == "--finger"]
+        ports = [re.split("[:?]", address)[1] for address in addresses]
+        ids = [address.partition("id=")[2][0] for address in addresses]
         environment = programs.environment()
         environment["PYTHONPATH"] += f":{ROOT / 'tests'}"
 
         def begin(out: Path, err: Path) -> tuple[int, Callable[[], int | None]]:
             with out.open("wb") as stdout, err.open("ab") as stderr:
                 process = subprocess.Popen(
-                    [sys.executable, "-c", self._source, port],
+                    [sys.executable, "-c", self._source, ports[0], *ids],
                     stdout=stdout,
                     stderr=stderr,
                     start_new_session=True,
@@ -68,11 +75,11 @@ class Script:
         return programs.Program(folder, begin)
 
 
-def ended(ending: str, leave: str) -> Any:
+def ended(ending: str, leave: str, line: str = "0 ms") -> Any:
     return trials.trial(
         ending,
         "run",
-        trials.LINES[0],
+        next(known for known in trials.LINES if known.name == line),
         starter=Script(leave),
         files=Path("nowhere"),
         safe_state="limp",
@@ -101,6 +108,13 @@ def test_torque_that_is_left_on_is_never_in_time() -> None:
     (row,) = endings.rows([result])
     assert (row["in_time"], row["n"], row["exit"]) == (0, 1, ["3"])
     assert "| never |" in endings.shown(row)
+
+
+@pytest.mark.parametrize("left", [1, 2])
+def test_torque_that_is_left_on_at_one_of_two_servos_is_found(left: int) -> None:
+    result = ended("INT", f"write(64, 0, 1, [{3 - left}]); os._exit(0)", TWO)
+    assert not result.in_time(0)
+    assert result.violations == {"torque left on": 1}
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.nullspace.map.dual import dual_rows
 from ikns.simulation import simulate_protocol, virtual_subject
 
@@ -103,18 +103,54 @@ def test_a_second_output_that_follows_the_first_is_refused() -> None:
     q[:, 1], q[:, 4] = s, 0.6 * s**2 + rng.normal(0, 0.01, len(s))
     learned = NullSpaceMap(8, n_dof=2)
     motions = lambda q: np.eye(7)[[1, 4]]  # noqa: E731
+    with pytest.raises(NotEnoughData, match="at 6 of the 8 places or more, found them"):
+        learned.fit(np.repeat(corners, 200, axis=0), q, motions=motions)
+
+    q[:, 4] = rng.uniform(-1, 1, len(s))
     learned.fit(np.repeat(corners, 200, axis=0), q, motions=motions)
     from ikns.calibration.freedoms import check_freedoms
 
-    with pytest.raises(NotEnoughData, match="the second at 0 of 8 places"):
-        check_freedoms(learned, q, motions)
-    q[:, 4] = rng.uniform(-1, 1, len(s))
-    learned.fit(np.repeat(corners, 200, axis=0), q, motions=motions)
-    assert check_freedoms(learned, q, motions) == []
+    assert check_freedoms(learned, q) == []
     q[:, 4] = 0.8 * s + 0.6 * q[:, 4]
     learned.fit(np.repeat(corners, 200, axis=0), q, motions=motions)
-    (told,) = check_freedoms(learned, q, motions)
+    (told,) = check_freedoms(learned, q)
     assert "outputs 1 and 2 move together (r 0.8" in told
+
+
+@pytest.mark.parametrize("hidden", ["still", "small", "together"])
+@pytest.mark.parametrize("short", [1, 2, 3])
+def test_places_that_do_not_show_every_freedom_are_left_out_or_too_many(
+    hidden: str, short: int
+) -> None:
+    """One rule, whatever a place lacks: six of eight places have to show both."""
+    rng = np.random.default_rng(short)
+    corners = 0.3 * np.array(list(np.ndindex(2, 2, 2)))
+    wishes = rng.uniform(-1, 1, (2, 8, 100))
+    lacks = rng.permutation(8)[:short]
+    wishes[1, lacks] = {
+        "still": np.zeros((short, 100)),
+        "small": 0.1 * wishes[1, lacks],  # 0.2 rad are less than 15 deg
+        "together": wishes[0, lacks] + 0.1 * wishes[1, lacks],
+    }[hidden]
+    q = np.zeros((800, 7))
+    q[:, [1, 4]] = wishes.reshape(2, -1).T
+    learned, x = NullSpaceMap(8, n_dof=2), np.repeat(corners, 100, axis=0)
+    motions = lambda q: np.eye(7)[[1, 4]]  # noqa: E731
+    if short == 3:
+        with pytest.raises(NotEnoughData, match="found them at 5:"):
+            learned.fit(x, q, motions=motions)
+        return
+    with pytest.warns(MapWarning, match=f"{short} of 8 places do not show 2 freedoms"):
+        learned.fit(x, q, motions=motions)
+    left = np.delete(corners, lacks, axis=0)
+    found = learned.centers_[np.lexsort(learned.centers_.T[::-1])]
+    np.testing.assert_allclose(found, left, atol=1e-12)
+    assert len(learned.cluster_means_) == len(learned.counts_) == 8 - short
+    assert set(learned.labels_) == {-1, *range(8 - short)}
+    # The rows of the others are the joints themselves.
+    np.testing.assert_allclose(
+        learned.directions_, np.tile(np.eye(7)[[1, 4]], (8 - short, 1, 1)), atol=1e-12
+    )
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3), st.integers(0, 2))

@@ -1,11 +1,13 @@
 """Machine code is kept for exactly the sources that it was made from."""
 
 import ast
+import importlib
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 from ikns._kernels import compiled as module
@@ -108,6 +110,23 @@ def test_no_other_module_imports_a_kernel_without_a_wrapper():
                 names = {alias.name for alias in node.names}
                 if node.module.startswith("ikns._kernels"):
                     assert not any(name.startswith("_") for name in names), path
+
+
+def test_a_constant_is_no_reason_to_compile_again():
+    half = numba.njit(lambda x, half: x / 2 if half else x)
+    module._take_constants_as_values(half)
+
+    @numba.njit
+    def both(x: float) -> tuple[float, float]:
+        return half(x, True), half(x, False)
+
+    assert both(4.0) == (2.0, 4.0)
+    assert len(half.signatures) == 1
+    for path in KERNELS.rglob("*.py"):
+        name = ".".join(path.relative_to(KERNELS.parents[1]).with_suffix("").parts)
+        for kernel in vars(importlib.import_module(name)).values():
+            for signature in getattr(kernel, "signatures", ()):
+                assert "Literal" not in str(signature), kernel
 
 
 def test_importing_the_package_does_not_load_numba():

@@ -29,6 +29,7 @@ ONLY_IN = {
     "pinocchio": {"body", "view"},
     "sklearn": {"nullspace"},
     "matplotlib": {"view"},
+    "PIL": {"view"},
     "meshcat": {"view"},
     "llvmlite": {"_kernels"},
     "numba": {"_kernels"},

@@ -168,7 +168,7 @@ DECISION = SimpleNamespace(
     solved=SimpleNamespace(
         c=np.array([0.5]), residual=0.001, q=np.zeros(31), uncertainty=np.zeros(1)
     ),
-    flexion=0.5,
+    flexions=(0.5,),
     state="active",
     rejection="",
     valid=True,

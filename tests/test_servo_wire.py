@@ -197,6 +197,7 @@ def test_every_fault_can_be_written_down():
     [
         ["--model", "hs53"],
         ["--id", "300"],
+        ["--id", "1", "--id", "1"],
         ["--baud", "12345"],
         ["--fault", "fire@3"],
         ["--duration", "-1"],

@@ -148,7 +148,7 @@ def test_a_recording_is_logged_frame_by_frame(tmp_path, read_back):
     log.close()
     rows = read_back(tmp_path / "a.rrd")
     for k in range(2):
-        found = [(at, value) for at, value, _ in rows[f"signal/c{k + 1}"]]
+        found = [(at, value) for at, value, _ in rows[f"signal/c_{k + 1}"]]
         np.testing.assert_allclose(found, np.c_[recording.time, c[:, k]], atol=1e-9)
     assert len(rows["world/arms"]) == 5
 

@@ -227,3 +227,18 @@ def test_what_makes_no_sense_is_refused():
         visit.begin(1.0)
     with pytest.raises(InvalidInput):
         visit.repeat("one goes on")
+
+
+def test_many_samples_are_recorded_like_one_after_the_other() -> None:
+    profile = draw_profile("T1", seed=0)
+    times = [0.0, 0.5, 0.5, 0.4, 2.0, 5.0, 12.0, 30.0, 31.0]
+    c = [0.1, np.nan, 0.3, 0.4, 1.5, -0.2, 0.6, 0.7, 0.8]
+    one, many = TrackingTrial(profile), TrackingTrial(profile)
+    for trial in (one, many):
+        trial.start(0.0)
+    for now, each in zip(times, c, strict=True):
+        one.add_sample(now, each)
+    many.add_samples(times, c)
+    assert many.update(32.0) == one.update(32.0)
+    assert many.record.time.tobytes() == one.record.time.tobytes()
+    assert many.record.c.tobytes() == one.record.c.tobytes()

@@ -38,6 +38,7 @@ RIGHT = {
     "study init": "new",
     "study run": "{study}",
     "study plan": "--margin 5",
+    "docs": "--no-open",
 }
 
 NOT_A_NUMBER = ["x", ""]
@@ -152,8 +153,10 @@ WRONG = {
     "outside": ["", "no-such-choice"],
     "participant": [*TEXT, "a/b", "..", "a b"],
     "participants": COUNT,
+    "pictures": WRITE_FOLDER,
     "pilot": READ_FOLDER,
     "png": PICTURE,
+    "animation": PICTURE,
     "publish": PUBLISH,
     "rrd": [*WRITE_FILE, "x.exe", "x"],
     "point": [*COUNT, "99"],
@@ -214,6 +217,7 @@ WRONG = {
     "view subject": READ_FOLDER,
     "visit": WRITE_FOLDER,
     "wait": FROM_ZERO,
+    "worker_timeout": POSITIVE,
 }
 FLAGS = {
     *("as_json", "auto", "browser", "clavicle", "dry_run", "everywhere", "force"),
@@ -347,6 +351,8 @@ TOGETHER = [
     "ucm --subject {person}",
     "ucm {points} {points} --subject {person}",
     "view {person} --out same.png --png same.png",
+    "view {person} --png same.png --animation same.png",
+    "view {person} --animation moving.mp4",
     "view {person} {free} {points}",
     "run --subject {person}",
     "run --subject {person} --source replay:{free} --resume",

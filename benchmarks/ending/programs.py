@@ -39,16 +39,20 @@ _OPTIONS = {
 
 
 def argv_of(
-    command: str, files: Path, folder: Path, port: Path, safe_state: str
+    command: str, files: Path, folder: Path, servos: list[str], safe_state: str
 ) -> list[str]:
-    """Words of a command that moves the finger at a port until it is ended."""
+    """Words of a command that moves servos, PORT?id=1, until it is ended."""
+    person = "person" if len(servos) == 1 else "two"
+    fingers = [f"dynamixel:{servo}" for servo in servos]
+    fingers[1:] = [f"{finger}&dof=2" for finger in fingers[1:]]
     return [
         command,
         *([str(folder / "visit")] if command != "run" else []),
         *_OPTIONS[command],
-        *("--subject", str(files / "person")),
+        *("--subject", str(files / person)),
         *("--source", f"replay:{files / 'free.c3d'}?loop=yes"),
-        *("--finger", f"dynamixel:{port}", "--safe-state", safe_state),
+        *(word for finger in fingers for word in ("--finger", finger)),
+        *("--safe-state", safe_state),
     ]
 
 

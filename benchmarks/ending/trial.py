@@ -11,6 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,23 +25,30 @@ __all__ = ["ENDINGS", "LINES", "Canary", "Line", "Result", "trial"]
 
 
 class Line(NamedTuple):
-    """How slow the line to the servo is."""
+    """How slow the line to the servo is; ids of the servos of each port."""
 
     name: str
     answer_delay: float  # s
     byte_time: bool
+    ports: tuple[tuple[int, ...], ...] = ((1,),)
 
     @property
     def exchange(self) -> float:
-        """Seconds of the longest question and answer: 14 bytes there, 46 back."""
+        """Seconds of the longest question and answer: 14 bytes there, 46 back.
+
+        Servos of one port take turns.
+        """
         wire = 60 * 10 / _BAUD if self.byte_time else 0.0
-        return self.answer_delay + wire + 0.0005  # return delay
+        one = self.answer_delay + wire + 0.0005  # return delay
+        return one * max(map(len, self.ports))
 
 
 _BAUD = 57600
 LINES = (
     *(Line(f"{ms} ms", ms / 1000, False) for ms in (0, 2, 4, 10)),
     Line("57600 baud", 0.0, True),
+    Line("4 ms, two servos", 0.004, False, ((1, 2),)),
+    Line("4 ms, two ports", 0.004, False, ((1,), (1,))),
 )
 #: Stated (SAFETY.md): one look and a few packets; the servo's own watchdog; a loop that
 #: hangs is made safe by the finger itself. Packets take longer on a slow line, and the
@@ -135,28 +143,50 @@ def trial(
 ) -> Result:
     """Start a program, end it at a random instant, and ask the servo."""
     result = Result(ending, command, line.name)
-    with tempfile.TemporaryDirectory() as scratch:
+    with tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
         folder = Path(scratch)
-        slow = {"answer_delay": line.answer_delay, "byte_time": line.byte_time}
-        with ServoProcess(folder, baud=_BAUD, **slow) as servo:
-            argv = argv_of(command, files, folder, servo.port, safe_state)
-            program = starter.start(argv, folder)
-            pages = Pages(command, program) if command != "run" else None
-            try:
-                if not _moves(servo, program, pages):
-                    result.failed = program.said().strip()[-300:] or "never moved"
-                    return result
-                time.sleep(rng.uniform(0.05, 1.0))
-                began = time.monotonic()
-                _end(ending, program, servo, line, safe_state, result)
-                result.stall = canary.worst(began)
-                result.exit = program.poll()
-                _judge(program, servo, began, safe_state, result)
-            finally:
-                if pages is not None:
-                    pages.close()
-                program.end()
+        servos, words = _start(line, folder, stack)
+        program = starter.start(
+            argv_of(command, files, folder, words, safe_state), folder
+        )
+        pages = Pages(command, program) if command != "run" else None
+        try:
+            if not _moves(servos, program, pages):
+                result.failed = program.said().strip()[-300:] or "never moved"
+                return result
+            time.sleep(rng.uniform(0.05, 1.0))
+            began = time.monotonic()
+            _end(ending, program, servos, line, safe_state, result)
+            result.stall = canary.worst(began)
+            result.exit = program.poll()
+            for servo in servos:
+                _judge(servo, ending, began, safe_state, result)
+            _judge_program(program, result)
+        finally:
+            if pages is not None:
+                pages.close()
+            program.end()
     return result
+
+
+def _start(line: Line, folder: Path, stack: ExitStack) -> tuple[list[Any], list[str]]:
+    """Start the servos of a line; return them, and each as PORT?id=1."""
+    servos: list[Any] = []
+    words = []
+    for k, ids in enumerate(line.ports):
+        place = folder / f"port{k}"
+        place.mkdir()
+        process = ServoProcess(
+            place,
+            id=ids,
+            baud=_BAUD,
+            answer_delay=line.answer_delay,
+            byte_time=line.byte_time,
+        )
+        stack.enter_context(process)
+        servos += [process.servo(number) for number in ids]
+        words += [f"{process.port}?id={number}" for number in ids]
+    return servos, words
 
 
 def _wait(condition: Callable[[], bool], seconds: float) -> bool:
@@ -168,13 +198,16 @@ def _wait(condition: Callable[[], bool], seconds: float) -> bool:
     return True
 
 
-def _moves(servo: ServoProcess, program: Program, pages: Pages | None) -> bool:
-    """Wait until the program has moved the servo under torque for a while."""
+def _moves(servos: list[Any], program: Program, pages: Pages | None) -> bool:
+    """Wait until the program has moved the servos under torque for a while."""
 
     def moving() -> bool:
-        goals = {e["goal"] for e in servo.events("goal") if e["torque"]}
+        goals = [
+            {e["goal"] for e in servo.events("goal") if e["torque"]} for servo in servos
+        ]
         ready = pages is None or pages.running.is_set()
-        return (len(goals) > 5 and ready) or program.poll() is not None
+        moved = min(map(len, goals)) > 5
+        return (moved and ready) or program.poll() is not None
 
     return _wait(moving, _BEGIN) and program.poll() is None
 
@@ -182,7 +215,7 @@ def _moves(servo: ServoProcess, program: Program, pages: Pages | None) -> bool:
 def _end(
     ending: str,
     program: Program,
-    servo: ServoProcess,
+    servos: list[Any],
     line: Line,
     safe_state: str,
     result: Result,
@@ -195,8 +228,8 @@ def _end(
         time.sleep(0.2)
     struck = time.monotonic()
     if ending == "port taken 1 s":
-        _take_port(servo.port, pause)
-        result.measured.append(("at rest", _at_rest(servo, struck), _WATCHDOG))
+        _take_port(servos[0].port, pause)
+        result.measured.append(("at rest", _at_rest(servos, struck), _WATCHDOG))
     else:
         program.send(number, group=number in _TERMINAL)
     if ending == "INT 3 times":
@@ -204,30 +237,30 @@ def _end(
             time.sleep(0.05)
             program.send(number, group=True)
     if number == signal.SIGKILL:
-        _wait(lambda: not math.isnan(_at_rest(servo, struck)), _REST)
-        result.measured.append(("at rest", _at_rest(servo, struck), _WATCHDOG))
+        _wait(lambda: not math.isnan(_at_rest(servos, struck)), _REST)
+        result.measured.append(("at rest", _at_rest(servos, struck), _WATCHDOG))
         _wait(lambda: program.poll() is not None, _END)
         return
     if number == signal.SIGSTOP:
         time.sleep(pause)
-        result.measured.append(("at rest", _at_rest(servo, struck), _WATCHDOG))
+        result.measured.append(("at rest", _at_rest(servos, struck), _WATCHDOG))
         struck = time.monotonic()
         program.send(signal.SIGCONT, group=False)
         stated = _HANG + _LOOK + _FEW * line.exchange
         time.sleep(stated + 1.0)
         if safe_state == "limp":
             result.measured.append(
-                ("torque off after CONT", _torque_off(servo, struck), stated)
+                ("torque off after CONT", _torque_off(servos, struck), stated)
             )
-        elif _follows(servo, safe_state, struck + stated):
+        elif any(_follows(servo, safe_state, struck + stated) for servo in servos):
             result.violations["follows after CONT"] = 1
     if number in _LIVES_ON:
         struck = time.monotonic()
         program.send(signal.SIGINT, group=True)
     _wait(lambda: program.poll() is not None, _END)
-    _wait(lambda: not math.isnan(_torque_off(servo, struck)), _REST)
+    _wait(lambda: not math.isnan(_torque_off(servos, struck)), _REST)
     what = "torque off" if number not in _LIVES_ON else "torque off after INT"
-    result.measured.append((what, _torque_off(servo, struck), leave))
+    result.measured.append((what, _torque_off(servos, struck), leave))
 
 
 def _take_port(port: Path, seconds: float) -> None:
@@ -242,22 +275,27 @@ def _take_port(port: Path, seconds: float) -> None:
         os.close(fd)
 
 
-def _torque_off(servo: ServoProcess, since: float) -> float:
-    """Seconds until the torque went off for good; NaN while it is on."""
-    if servo["torque_enable"]:
+def _torque_off(servos: list[Any], since: float) -> float:
+    """Seconds until every torque went off for good; NaN while one is on."""
+    if any(servo["torque_enable"] for servo in servos):
         return math.nan
-    off = [e["t"] for e in servo.events("torque") if not e["on"]]
-    return max(off[-1] - since, 0.0)
+    off = [
+        [e["t"] for e in servo.events("torque") if not e["on"]][-1] for servo in servos
+    ]
+    return max(max(off) - since, 0.0)
 
 
-def _at_rest(servo: ServoProcess, since: float) -> float:
-    """Seconds until the motor was stopped, by the watchdog or without torque."""
-    events = [e for e in servo.events() if e["event"] in ("torque", "watchdog")]
-    stops = [e["t"] for e in events if e.get("tripped") == 1 or e.get("on") == 0]
-    return next((max(t - since, 0.0) for t in stops if t >= since), math.nan)
+def _at_rest(servos: list[Any], since: float) -> float:
+    """Seconds until every motor was stopped, by the watchdog or without torque."""
+    times = []
+    for servo in servos:
+        events = [e for e in servo.events() if e["event"] in ("torque", "watchdog")]
+        stops = [e["t"] for e in events if e.get("tripped") == 1 or e.get("on") == 0]
+        times.append(next((t - since for t in stops if t >= since), math.nan))
+    return math.nan if any(t != t for t in times) else max(*times, 0.0)
 
 
-def _follows(servo: ServoProcess, safe_state: str, since: float) -> bool:
+def _follows(servo: Any, safe_state: str, since: float) -> bool:
     """Whether goals still do more than hold, or open, to a few ticks."""
     goals = [e["goal"] for e in servo.events("goal") if e["t"] > since]
     if safe_state == "hold":
@@ -266,33 +304,42 @@ def _follows(servo: ServoProcess, safe_state: str, since: float) -> bool:
 
 
 def _judge(
-    program: Program,
-    servo: ServoProcess,
-    began: float,
-    safe_state: str,
-    result: Result,
+    servo: Any, ending: str, began: float, safe_state: str, result: Result
 ) -> None:
-    """Count what must not be, and end what is left."""
-    events, wrong = servo.events(), result.violations
-    number = ENDINGS[result.ending][0]
+    """Count what must not be at a servo."""
+    events, wrong = servo.events(), dict[str, int]()
+    number = ENDINGS[ending][0]
     stopped = servo["bus_watchdog"] == -1
     goals = [e for e in events if e["event"] == "goal"]
     low_high = [(e["goal"], *e["limits"]) for e in goals]
     wrong["goal beyond limits"] = sum(not lo <= g <= hi for g, lo, hi in low_high)
     eeprom = [e for e in events if e["event"] == "eeprom"]
     wrong["EEPROM under torque"] = sum(e["torque"] for e in eeprom)
-    result.said = program.said().strip().rpartition("\n")[2]
-    wrong["traceback"] = program.said().count("Traceback (most recent")
     if number != signal.SIGKILL and result.exit is not None:
         wrong["torque left on"] = servo["torque_enable"]
         wrong["not at rest"] = int(bool(servo["torque_enable"]) and not stopped)
-    wrong["does not end"] = int(result.exit is None)
-    if result.exit is not None:
-        _wait(lambda: not program.left_over(), 1.0)
-        wrong["lost process"] = len(program.left_over())
     if (
         safe_state == "limp" or number not in _LIVES_ON
     ):  # else it is taken up again, to hold
         on = [e for e in events if e["event"] == "torque" and e["on"]]
         wrong["torque on again"] = sum(e["t"] > began for e in on)
-    result.violations = {name: count for name, count in wrong.items() if count}
+    _count(wrong, result)
+
+
+def _judge_program(program: Program, result: Result) -> None:
+    """Count what must not be of the program, and end what is left."""
+    result.said = program.said().strip().rpartition("\n")[2]
+    wrong = {
+        "traceback": program.said().count("Traceback (most recent"),
+        "does not end": int(result.exit is None),
+    }
+    if result.exit is not None:
+        _wait(lambda: not program.left_over(), 1.0)
+        wrong["lost process"] = len(program.left_over())
+    _count(wrong, result)
+
+
+def _count(wrong: dict[str, int], result: Result) -> None:
+    for name, count in wrong.items():
+        if count:
+            result.violations[name] = result.violations.get(name, 0) + count

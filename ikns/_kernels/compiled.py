@@ -19,6 +19,7 @@ from typing import Any, cast
 
 import llvmlite
 import numba
+from numba.core.types import unliteral
 
 from ikns._kernels.machine_code import SUFFIX, KernelCache, is_private, say_once
 
@@ -43,10 +44,27 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         "no_cfunc_wrapper": True,
     }
     kernel: Any = numba.njit(**options)(function)
+    _take_constants_as_values(kernel)
     if folder is not None:
         # As `cache=True` does, with numba's own cache.
         kernel._cache = KernelCache(function, folder)
     return cast("Callable[..., Any]", kernel)
+
+
+def _take_constants_as_values(kernel: Any) -> None:
+    """Do not compile a kernel anew for each constant that another kernel passes to it.
+
+    Numba takes ``f(x, True)`` in compiled code for a type of argument of its own. The
+    whole solver was compiled twice so, a sixth of all the time.
+    """
+    template = kernel.get_call_template
+
+    def of_values(args: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
+        values = tuple(unliteral(argument) for argument in args)
+        named = {name: unliteral(argument) for name, argument in keywords.items()}
+        return template(values, named)
+
+    kernel.get_call_template = of_values
 
 
 def on_disk(module: str) -> bool:

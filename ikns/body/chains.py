@@ -7,6 +7,7 @@ of a file or a model, so directions stay comparable.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 from ikns.errors import InvalidInput
 
@@ -48,6 +49,7 @@ def chain_joints(chain: str) -> tuple[str, ...]:
     return CHAINS[chain]
 
 
+@cache
 def chain_sides(chain: str) -> tuple[str, ...]:
     """Return the sides whose hands perform the chain's task."""
     joints = chain_joints(chain)

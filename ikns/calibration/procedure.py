@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from ikns.motion.marker_ik.rejection import rejection_sentence
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.nullspace.map.samples import no_still_sample
+from ikns.nullspace.readout import Readout
 from ikns.recording.recording import Recording
 
 #: So many times as far as a chain's own hand the other one moves only where the chain
@@ -59,6 +60,7 @@ def calibrate(
     min_static: float = 1.0,
     min_still: float = 0.5,
     min_rest: float = 0.0,
+    other_methods: bool = True,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Subject:
     """Calibrate a person.
@@ -95,6 +97,8 @@ def calibrate(
         Shorter rests of the hand do not count, s; see
         :func:`ikns.nullspace.map.still_mask`. With 0.5 a recording may also hold free
         movement, in which the hand is slow for a moment wherever it reverses.
+    other_methods : bool
+        Whether to learn the readouts of the methods proximal and intent, too.
     progress : callable, optional
         Called with (step, done, total).
 
@@ -163,15 +167,18 @@ def calibrate(
         raise NotEnoughData(f"{names}: {found} {side}".rstrip())
     with naming(names):
         hands, caught = _fit(learned, skeleton, pairs, chain, side)
-    with naming(", ".join(recording.source for recording in natural) or names):
-        readouts, methods = learn_readouts(
-            skeleton,
-            learned,
-            pairs,
-            chain,
-            natural=measured.natural,
-            max_hand_speed=max_hand_speed,
-        )
+    readouts: dict[str, Readout] = {}
+    methods: dict[str, Any] = {"without": {}, "warnings": []}
+    if other_methods:
+        with naming(", ".join(recording.source for recording in natural) or names):
+            readouts, methods = learn_readouts(
+                skeleton,
+                learned,
+                pairs,
+                chain,
+                natural=measured.natural,
+                max_hand_speed=max_hand_speed,
+            )
     report = {
         "chain": chain,
         "marker_set": skeleton.marker_set.name,
@@ -202,7 +209,8 @@ def calibrate(
     }
     shown = _shown(hands, learned)
     subject = Subject(skeleton, learned, chain, report, motions, shown, readouts)
-    methods["summary"] = method_summary(subject, natural=measured.natural, own=True)
+    if other_methods:
+        methods["summary"] = method_summary(subject, natural=measured.natural, own=True)
     return subject
 
 
@@ -246,7 +254,7 @@ def _fit(
         try:
             check_places(x, n_points=learned.n_points)
             learned.fit(x, q, groups=places, motions=motions)
-            together = [] if motions is None else check_freedoms(learned, q, motions)
+            together = [] if motions is None else check_freedoms(learned, q)
         except NotEnoughData as error:
             if not side:
                 raise

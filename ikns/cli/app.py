@@ -9,7 +9,8 @@ import signal
 import sys
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin
 
 import typer
 
@@ -20,12 +21,18 @@ from ikns.cli.repairs import repairs, tell
 from ikns.endings import BROKEN_PIPE, signal_exit_code
 from ikns.errors import DataLoss, InvalidInput
 
-#: Commands in the order of the help.
-_COMMANDS = (
-    *("demo", "check", "scale", "calibrate", "ik", "control", "convert", "compare"),
-    *("robot", "ucm", "view", "run", "replay", "stream", "servo", "track", "pick"),
-    *("report", "study", "markers"),
-)
+#: Commands by what they are for, in the order of the help.
+_GROUPS = {
+    "Start here": ("demo", "docs"),
+    "Recordings and bodies": ("check", "scale", "ik", "convert", "markers"),
+    "Null space": ("calibrate", "control", "compare", "ucm", "view", "robot"),
+    "Live": ("run", "replay"),
+    "Experiments": ("track", "pick", "study", "report"),
+    "Desk tools": ("stream", "servo"),
+}
+_COMMANDS = {name: group for group, names in _GROUPS.items() for name in names}
+#: What the help calls the values of an option.
+_VALUES = {bool: "", int: "INTEGER", float: "NUMBER", str: "TEXT", Path: "PATH"}
 #: Files of commands that are not called like them.
 _FILES = {"report": "study_report"}
 
@@ -39,15 +46,15 @@ def make_app(*names: str) -> typer.Typer:
         name="ikns",
         help="Learn a person's kinematic null space and turn it into a control signal.",
         no_args_is_help=True,
-        add_completion=False,
     )
     app.callback()(_options)
     for name in names or _COMMANDS:
         file = importlib.import_module(f"ikns.cli.{_FILES.get(name, name)}")
         if group := getattr(file, f"{name}_app", None):
-            app.add_typer(group, name=name)
+            app.add_typer(group, name=name, rich_help_panel=_COMMANDS[name])
         else:
-            app.command()(checked(getattr(file, name)))
+            command = checked(getattr(file, name))
+            app.command(rich_help_panel=_COMMANDS[name])(command)
     return app
 
 
@@ -127,7 +134,22 @@ def _run(given: list[str]) -> int:
 @functools.cache
 def _parser(*names: str) -> Any:
     """Return the parser of commands, built once for all calls."""
-    return typer.main.get_command(make_app(*names))
+    parser = typer.main.get_command(make_app(*names))
+    _name_values(parser)
+    return parser
+
+
+def _name_values(command: Any) -> None:
+    """Name what options take as people do: NUMBER and PATH, not <float range>."""
+    for part in getattr(command, "commands", {}).values():
+        _name_values(part)
+    for option in command.get_params(typer.Context(command)):  # --help too
+        kind = option.type_descriptor.annotation
+        kind = get_args(kind)[0] if get_origin(kind) is list else kind
+        if option.param_type_name == "option" and option.metavar is None:
+            option.metavar = _VALUES.get(kind)
+        # Ranges leave no room for words; who is beyond one is told it.
+        option._get_number_range_help_str = lambda: None
 
 
 def _refuse_empty(argv: Sequence[str]) -> None:

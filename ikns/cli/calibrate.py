@@ -28,40 +28,41 @@ def calibrate(
     context: typer.Context,
     read: Read,
     out: Annotated[Path, typer.Option(help="Subject folder to write.")],
-    static: Annotated[
-        Path | None, typer.Option(help="Recording of the person standing still.")
-    ] = None,
+    static: Annotated[Path | None, typer.Option(help="Static trial.")] = None,
     exploration: Annotated[
         list[Path] | None,
-        typer.Option(help="Recordings with the hand held at the points, one or more."),
+        typer.Option(
+            help="Recordings of exploration, with the hand held at each point. "
+            "Repeat for more."
+        ),
     ] = None,
     natural: Annotated[
         list[Path] | None,
-        typer.Option(help="Recordings of ordinary movement, for the method intent."),
+        typer.Option(help="Recordings of natural movement, for the method intent."),
     ] = None,
     short: Annotated[
         bool,
         typer.Option(
             "--short",
-            help="Short protocol, for the method intent: 3 s static, 20 s of ordinary "
-            "movement (--natural), two held places.",
+            help="Short protocol for the method intent: 3 s standing still, 20 s "
+            "of natural movement (--natural), the hand held at two points.",
         ),
     ] = False,
     rewear: Annotated[
         bool,
         typer.Option(
             "--rewear",
-            help="Markers were put on again: keep what --subject learned, and fit it "
-            "to a new --static and --natural.",
+            help="Markers were reapplied: keep what --subject has learned and "
+            "fit it to a new --static and --natural.",
         ),
     ] = False,
     subject: Annotated[
         Path | None,
-        typer.Option(help="For --rewear: folder that `ikns calibrate` wrote."),
+        typer.Option(help="Subject folder to update with --rewear."),
     ] = None,
     live: Annotated[
         bool,
-        typer.Option("--live", help="Record now, from --source, with prompts."),
+        typer.Option("--live", help="Record live from --source, with prompts."),
     ] = False,
     source: Annotated[
         str | None,
@@ -75,48 +76,64 @@ def calibrate(
         typer.Option(help="Folder for live recordings; default: OUT-recordings."),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue with recordings that exist.")
+        bool,
+        typer.Option(
+            "--resume", help="Continue an interrupted calibration with its recordings."
+        ),
     ] = False,
     auto: Annotated[
         bool,
-        typer.Option("--auto", help="Live without a keyboard: follow every verdict."),
+        typer.Option(
+            "--auto",
+            help="Accept or repeat each recording by its verdict, without a keyboard.",
+        ),
     ] = False,
     marker_set: MarkerSetName = "oxford24",
     side: Annotated[
-        Literal["right", "left", "both"], typer.Option(help="Arm of the task.")
+        Literal["right", "left", "both"], typer.Option(help="Arm to calibrate.")
     ] = "right",
     clavicle: Annotated[
         bool, typer.Option("--clavicle", help="Include the clavicle in the chain.")
     ] = False,
     stature: Annotated[
         float | None,
-        typer.Option(help="Standing height, m; with --mass and --sex for --static."),
+        typer.Option(
+            help="Standing height, m. With --mass and --sex it replaces --static."
+        ),
     ] = None,
     mass: Annotated[float | None, typer.Option(help="Body mass, kg.")] = None,
     sex: Annotated[str | None, typer.Option(help="'female' or 'male'.")] = None,
     points: Annotated[
         int,
-        typer.Option(help="PCA points; 2 with --short.", min=1, max=1000),
+        typer.Option(help="Number of PCA points; 2 with --short.", min=1, max=1000),
     ] = 10,
     static_seconds: Annotated[
-        float, typer.Option(help="Live: standing still, s.", min=0.0, max=3600.0)
+        float,
+        typer.Option(help="Live: length of the static trial, s.", min=0.0, max=3600.0),
     ] = 5.0,
     free_seconds: Annotated[
-        float, typer.Option(help="Live: free exploration, s.", min=0.0, max=3600.0)
+        float,
+        typer.Option(
+            help="Live: length of the free exploration, s.", min=0.0, max=3600.0
+        ),
     ] = 60.0,
     natural_seconds: Annotated[
         float,
         typer.Option(
-            help="Live: ordinary movement with everyday objects, s; 0 for none.",
+            help="Live: length of the natural movement with everyday objects, s; "
+            "0 for none.",
             min=0.0,
             max=3600.0,
         ),
     ] = 20.0,
     point_seconds: Annotated[
-        float, typer.Option(help="Live: each point, s.", min=0.0, max=3600.0)
+        float, typer.Option(help="Live: time at each point, s.", min=0.0, max=3600.0)
     ] = 5.0,
     countdown: Annotated[
-        float, typer.Option(help="Live: before each recording, s.", min=0.0, max=3600.0)
+        float,
+        typer.Option(
+            help="Live: countdown before each recording, s.", min=0.0, max=3600.0
+        ),
     ] = 3.0,
     n_dof: Annotated[
         int,
@@ -129,7 +146,7 @@ def calibrate(
     max_hand_speed: Annotated[
         float,
         typer.Option(
-            help="Hand speed below which it counts as still, m/s.", min=0.0, max=10.0
+            help="Speed below which the hand counts as still, m/s.", min=0.0, max=10.0
         ),
     ] = 0.05,
     radius: Annotated[
@@ -140,7 +157,7 @@ def calibrate(
     ] = None,
     outside: Annotated[
         Literal["nearest", "project", "nan"],
-        typer.Option(help="Map outside the volume of the points."),
+        typer.Option(help="Which map to use outside the volume of the points."),
     ] = "nearest",
     min_static: Annotated[
         float,
@@ -149,14 +166,14 @@ def calibrate(
     min_still: Annotated[
         float,
         typer.Option(
-            help="Least duration of still samples at a point, s.", min=0.0, max=3600.0
+            help="Shortest time of still samples at a point, s.", min=0.0, max=3600.0
         ),
     ] = 0.5,
     min_rest: Annotated[
         float,
         typer.Option(
-            help="Shorter rests of the hand do not count, s; 0.5 for recordings with "
-            "free movement.",
+            help="Shortest rest of the hand that counts, s. Use 0.5 if "
+            "recordings contain free movement.",
             min=0.0,
             max=3600.0,
         ),

@@ -23,11 +23,11 @@ def check(
     ],
     static: Annotated[
         Path | None,
-        typer.Option(help="Recording of the person standing still, to compare with."),
+        typer.Option(help="Static trial to compare with."),
     ] = None,
     subject: Annotated[
         Path | None,
-        typer.Option(help="Folder that `ikns calibrate` wrote, to compare with."),
+        typer.Option(help="Subject folder to compare with."),
     ] = None,
     marker_set: OptionalMarkerSet = None,
     from_: From = None,

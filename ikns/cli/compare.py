@@ -62,13 +62,13 @@ def compare(
     chain: Annotated[
         Literal["own", "both"],
         typer.Option(
-            help="Joints: those of the map, or also the arm with (without) the "
-            "clavicle, learned again."
+            help="Joints to compare: those of the map, or the arm with (without) "
+            "the clavicle, learned again."
         ),
     ] = "both",
     coordinates: Annotated[
         Literal["internal", "isb", "rotation_vector", "all"],
-        typer.Option(help="Of the shoulder; learned again where not internal."),
+        typer.Option(help="Shoulder coordinates. Any but internal are learned again."),
     ] = "internal",
     reaches: Annotated[
         Path | None, typer.Option(help="Recording of natural reaches, for crosstalk.")
@@ -80,11 +80,13 @@ def compare(
     intervals: Annotated[
         int,
         typer.Option(
-            help="Resamples for the 95 % intervals; 0 for none.", min=0, max=100000
+            help="Number of resamples for the 95 % intervals; 0 for none.",
+            min=0,
+            max=100000,
         ),
     ] = 400,
     seed: Annotated[
-        int, typer.Option(help="Of the resamples.", min=0, max=2**32 - 1)
+        int, typer.Option(help="Seed of the resamples.", min=0, max=2**32 - 1)
     ] = 0,
     from_: From = None,
     to: To = None,

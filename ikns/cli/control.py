@@ -34,8 +34,8 @@ def control(
     max_uncertainty: Annotated[
         float,
         typer.Option(
-            help="Leave c out while its standard deviation is larger. It is when "
-            "markers are hidden that c needs.",
+            help="Leave c empty while its standard deviation is larger, as it is "
+            "when markers that c needs are hidden.",
             min=0.0,
             max=10.0,
         ),

@@ -43,7 +43,8 @@ def convert(
     from_: From = None,
     to: To = None,
     stream: Annotated[
-        str | None, typer.Option(help="Of several with markers in an .xdf file.")
+        str | None,
+        typer.Option(help="Name of the marker stream, if an .xdf file has several."),
     ] = None,
     force: Force = False,
     as_json: AsJson = False,

@@ -36,7 +36,7 @@ def demo(
         int, typer.Option(help="Seed of the virtual subject.", min=0, max=2**32 - 1)
     ] = 1,
     quick: Annotated[
-        bool, typer.Option("--quick", help="3 s a point instead of 5 s.")
+        bool, typer.Option("--quick", help="Record 3 s instead of 5 s at each point.")
     ] = False,
     force: Force = False,
     as_json: AsJson = False,

@@ -26,7 +26,7 @@ def ik(
     ] = None,
     static: Annotated[
         Path | None,
-        typer.Option(help="Instead of a subject: the person standing still."),
+        typer.Option(help="Static trial, instead of --subject."),
     ] = None,
     marker_set: OptionalMarkerSet = None,
     out: Annotated[

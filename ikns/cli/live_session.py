@@ -168,6 +168,28 @@ def _timeline(where: Timeline, subject: ikns.Subject | None, title: str) -> Publ
     return Publisher("rerun", sink, on_fault=say)
 
 
+def say_undriven(n_dof: int, dofs: Sequence[int]) -> None:
+    """Say which freedoms of a map drive no finger, if there are any."""
+    from ikns.nullspace.signal_names import signal_names
+
+    names = signal_names(n_dof)
+    idle = [k for k in range(1, n_dof + 1) if k not in dofs]
+    if idle:
+        which = ", ".join(names[k - 1] for k in idle)
+        verb = "drives" if len(idle) == 1 else "drive"
+        sys.stderr.write(
+            f"ikns: {which} {verb} nothing; a finger follows with --finger "
+            f"'sim:dof={idle[0]}' or 'dynamixel:PORT?dof={idle[0]}'.\n"
+        )
+
+
+def written(addresses: Sequence[str]) -> str | list[str] | None:
+    """Return addresses of fingers as a session keeps them: one as it is, or a list."""
+    if len(addresses) > 1:
+        return list(addresses)
+    return addresses[0] if addresses else None
+
+
 def say(sentence: str) -> None:
     """Print a sentence on a new line of stderr, if it is still there."""
     with suppress(OSError):

@@ -26,9 +26,7 @@ markers_app = typer.Typer(
 #: A marker this many placement deviations from its nominal place is pointed out.
 _FAR = 3.0
 
-StaticFile = Annotated[
-    Path, typer.Argument(help="Recording of the person standing still.")
-]
+StaticFile = Annotated[Path, typer.Argument(help="Static trial.")]
 SetArgument = Annotated[
     str,
     typer.Argument(
@@ -265,10 +263,10 @@ def new(
     ] = None,
     guess: Annotated[
         bool,
-        typer.Option("--guess", help="Ask nothing: take what the labels usually mean."),
+        typer.Option("--guess", help="Do not ask: take what the labels usually mean."),
     ] = False,
     name: Annotated[
-        str | None, typer.Option(help="Name of the set; default: that of the file.")
+        str | None, typer.Option(help="Name of the set. Default: that of the file.")
     ] = None,
     min_static: MinStatic = 1.0,
     force: Force = False,

@@ -23,33 +23,49 @@ RecordingFile = Annotated[
 ]
 SubjectPrefix = Annotated[
     str | None,
-    typer.Option(help="Of several people in a file: Ann, for labels like Ann:RSHO."),
+    typer.Option(
+        help="Which person to read where labels are like Ann:RSHO, for example Ann."
+    ),
 ]
 From = Annotated[
     str | None,
     typer.Option(
-        "--from", help="Start there: seconds, or the name of an event in a C3D file."
+        "--from",
+        help="Start of the part to read: seconds, or the name of an event in "
+        "a C3D or Qualisys file.",
     ),
 ]
 To = Annotated[
-    str | None, typer.Option("--to", help="Stop there: seconds, or an event likewise.")
+    str | None,
+    typer.Option(
+        "--to", help="End of the part to read: seconds, or the name of an event."
+    ),
 ]
 Rename = Annotated[
     list[str] | None,
     typer.Option(
         metavar="OLD=NEW",
-        help="Another label for a marker of the recordings; again for more.",
+        help="Read marker OLD as NEW. Repeat for more markers.",
     ),
 ]
 LabelFile = Annotated[
     Path | None,
-    typer.Option(help="Text file with a line OLD=NEW for each such marker."),
+    typer.Option(help="Text file with a line OLD=NEW for each renamed marker."),
 ]
 MarkerSetName = Annotated[
     str,
     typer.Option(
         help="A name that `ikns markers list` shows, such as plug_in_gait, or the path "
         "of a .toml file."
+    ),
+]
+Fingers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--finger",
+        metavar="ADDRESS",
+        help="sim:, dynamixel:/dev/ttyUSB0 or ros2:TOPIC?...; again with dof=2 for the "
+        "second freedom of the map.",
     ),
 ]
 Publish = Annotated[
@@ -84,7 +100,8 @@ OptionalMarkerSet = Annotated[
 AnyMethod = Annotated[
     Literal["paper", "proximal", "intent"],
     typer.Option(
-        help="What reads c off the posture: the paper's map over joint angles, the "
-        "upper arm and elbow alone, or the departure from the natural posture."
+        help="How c is read from the posture: the paper's map of joint "
+        "angles, a map of upper arm and elbow only, or the departure "
+        "from the natural posture."
     ),
 ]

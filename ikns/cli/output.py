@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 #: Columns of a table that is written to a file or a pipe, which have no width.
 _WIDTH = 100
@@ -148,31 +148,79 @@ def seconds_left(
     return max(pace * left - (now - last), 0.0)
 
 
-def _time_left(bars: Any) -> Any:
-    """Return a column of rich with the time left."""
+class Estimate(Protocol):
+    """What knows better than a count how far a step is."""
+
+    def share(self) -> float:
+        """Return what share is done, 0 to 1."""
+
+    def seconds(self) -> float | None:
+        """Return how long the rest takes, s; None if that is not known yet."""
+
+
+def _time_left(bars: Any, estimates: Mapping[str, Estimate]) -> Any:
+    """Return a column of rich with the time left, or since when without an end."""
     from rich.text import Text
 
     class TimeLeft(bars.ProgressColumn):
         def render(self, task: Any) -> Any:
             fields, done = task.fields, int(task.completed)
-            left = seconds_left(
-                time.monotonic(),
-                fields["began"],
-                fields["last"],
-                done - fields["first"],
-                int(task.total or 0) - done,
-            )
+            if task.total is None:
+                so_far = timedelta(seconds=int(time.monotonic() - fields["began"]))
+                return Text(f"{so_far} so far", style="progress.elapsed")
+            if task.finished:
+                return Text("")
+            if task.description in estimates:
+                left = estimates[task.description].seconds()
+            else:
+                left = seconds_left(
+                    time.monotonic(),
+                    fields["began"],
+                    fields["last"],
+                    done - fields["first"],
+                    int(task.total or 0) - done,
+                )
             shown = "-:--:--" if left is None else str(timedelta(seconds=round(left)))
             return Text(shown, style="progress.remaining")
 
     return TimeLeft()
 
 
+def _display(bars: Any, estimates: Mapping[str, Estimate]) -> Any:
+    """Return rich's display of bars."""
+    from rich.console import Console
+
+    class Display(bars.Progress):
+        def get_renderables(self) -> Iterable[Any]:
+            for task in self.tasks:
+                if task.description in estimates:
+                    task.completed = estimates[task.description].share() * task.total
+                task.fields["share"] = "" if task.total is None else _percent(task)
+            yield from super().get_renderables()
+
+    columns = (
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.TextColumn("{task.fields[share]}"),
+        _time_left(bars, estimates),
+    )
+    return Display(*columns, console=Console(stderr=True), transient=True)
+
+
+def _percent(task: Any) -> str:
+    return f"{task.percentage:>3.0f}%"
+
+
 @contextmanager
-def progress(*, kernels: bool = True) -> Iterator[Callable[[str, int, int], None]]:
+def progress(
+    *, kernels: bool = True, estimates: Mapping[str, Estimate] | None = None
+) -> Iterator[Callable[[str, int, int], None]]:
     """Show bars on stderr if it is a terminal; call with (step, done, total).
 
-    Kernels that are not compiled yet are compiled here, on two cores.
+    One that only moves says that the command works, and for how long it has.
+    Kernels that are not compiled yet are compiled here, on two cores. Steps in
+    `estimates`, to which they may be added while the bars are shown, go by these
+    instead of by their count.
     """
     if not sys.stderr.isatty():
         if kernels:
@@ -181,23 +229,18 @@ def progress(*, kernels: bool = True) -> Iterator[Callable[[str, int, int], None
         return
     erase_loading()
     from rich import progress as bars
-    from rich.console import Console
 
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.TaskProgressColumn(),
-        _time_left(bars),
-    )
-    with bars.Progress(
-        *columns, console=Console(stderr=True), transient=True
-    ) as display:
+    with _display(bars, {} if estimates is None else estimates) as display:
         tasks: dict[str, bars.TaskID] = {}
+        # Moves also where no step says how far it is.
+        display.add_task("working", total=None, began=time.monotonic(), share="")
 
         def report(step: str, done: int, total: int) -> None:
             now = time.monotonic()
             if step not in tasks:
-                tasks[step] = display.add_task(step, began=now, first=done, last=now)
+                tasks[step] = display.add_task(
+                    step, began=now, first=done, last=now, share=""
+                )
             display.update(tasks[step], completed=done, total=total, last=now)
 
         if kernels:

@@ -8,7 +8,15 @@ from typing import Annotated, Any
 import typer
 
 from ikns.cli.live_session import timeline_of
-from ikns.cli.options import AsJson, LabelFile, Publish, Rename, Rerun, Rrd
+from ikns.cli.options import (
+    AsJson,
+    Fingers,
+    LabelFile,
+    Publish,
+    Rename,
+    Rerun,
+    Rrd,
+)
 from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
@@ -58,13 +66,14 @@ def pick(
     objects: Annotated[
         str | None,
         typer.Option(
-            help="Codes of the paper's table, such as A,B, or all.", show_default="all"
+            help="Codes of objects in the paper's table, such as A,B, or all.",
+            show_default="all",
         ),
     ] = None,
     repeats: Annotated[
         int | None,
         typer.Option(
-            help="Repeats of each object in each condition.",
+            help="Repetitions of each object in each condition.",
             show_default="1",
             min=1,
             max=1000,
@@ -73,7 +82,10 @@ def pick(
     training: Annotated[
         int | None,
         typer.Option(
-            help="Objects before each condition.", show_default="10", min=0, max=1000
+            help="Training objects before each condition.",
+            show_default="10",
+            min=0,
+            max=1000,
         ),
     ] = None,
     limit: Annotated[
@@ -86,22 +98,20 @@ def pick(
     seed: Annotated[
         int | None,
         typer.Option(
-            help="Seed of the orders.", show_default="0", min=0, max=2**32 - 1
+            help="Seed of the order of objects.", show_default="0", min=0, max=2**32 - 1
         ),
     ] = None,
     subject: ForIkns = None,
     source: SourceAddress = None,
     rename: Rename = None,
     labels: LabelFile = None,
-    finger: Annotated[
-        str, typer.Option(help="sim:, dynamixel:/dev/ttyUSB0 or ros2:TOPIC?...")
-    ] = "sim:",
+    finger: Fingers = None,
     session: SessionFolder = None,
     safe_state: SafeState = "limp",
     hold_speed: Annotated[
         float | None,
         typer.Option(
-            help="For ikns: hold the finger while the hand is faster, m/s.",
+            help="For ikns: hold the finger while the hand is faster than this, m/s.",
             min=0.0,
             max=100.0,
         ),
@@ -159,7 +169,7 @@ def pick(
         ArmOptions(
             subject,
             source,
-            finger,
+            tuple(finger or ("sim:",)),
             session,
             smooth=False,
             safe_state=safe_state,

@@ -23,7 +23,7 @@ from ikns.output.inputs import refuse_input, refuse_input_folder
 Read = Callable[..., Any]
 
 #: Options of these commands that name something to write.
-_OUTPUTS = ("out", "png", "figure", "rrd")
+_OUTPUTS = ("out", "png", "animation", "figure", "rrd")
 _OPTIONS = {
     "subject_prefix": (SubjectPrefix, None),
     "rename": (Rename, None),
@@ -32,7 +32,8 @@ _OPTIONS = {
         Annotated[
             float | None,
             typer.Option(
-                help="Low-pass the positions at so many Hz; for keypoints, 4 to 8.",
+                help="Cutoff of a low-pass filter on positions, Hz; 4 to 8 for "
+                "keypoints.",
                 min=0.0,
                 max=1000.0,
             ),

@@ -31,7 +31,7 @@ def robot(
             "or OpenSim's .mot or .sto."
         ),
     ],
-    frame: Annotated[str, typer.Option(help="Link that does the task.")],
+    frame: Annotated[str, typer.Option(help="Link that performs the task.")],
     start: Annotated[
         str | None,
         typer.Option(
@@ -41,7 +41,10 @@ def robot(
     ] = None,
     task: Annotated[
         Literal["both", "pose", "position"],
-        typer.Option(help="What was held; both as far as the joints leave freedom."),
+        typer.Option(
+            help="What was held: position, orientation, or both as far as the "
+            "joints leave freedom."
+        ),
     ] = "both",
     up: Annotated[
         Literal["x", "y", "z"],
@@ -57,7 +60,7 @@ def robot(
     speed: Annotated[
         float,
         typer.Option(
-            help="Speed below which the frame counts as held, m/s.", min=0.0, max=100.0
+            help="Speed below which the link counts as held, m/s.", min=0.0, max=100.0
         ),
     ] = 0.05,
     simulated: Annotated[

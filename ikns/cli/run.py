@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import shutil
 import sys
@@ -20,11 +19,14 @@ from ikns.cli.live_session import (
     live_session,
     publishing,
     say,
+    say_undriven,
     software,
     timeline_of,
+    written,
 )
 from ikns.cli.options import (
     AsJson,
+    Fingers,
     LabelFile,
     Publish,
     Rename,
@@ -40,7 +42,7 @@ from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
     from ikns.live.publish import Publishers
-    from ikns.live.runtime import LoopStatus, Report
+    from ikns.live.runtime import AxisStatus, LoopStatus, Report
 
 #: Interval of the status line on the terminal, s.
 _LINE_EVERY = 0.2
@@ -57,9 +59,7 @@ def run(
     ],
     rename: Rename = None,
     labels: LabelFile = None,
-    finger: Annotated[
-        str, typer.Option(help="sim:, dynamixel:/dev/ttyUSB0 or ros2:TOPIC?...")
-    ] = "sim:",
+    finger: Fingers = None,
     session: Annotated[
         Path | None, typer.Option(help="Folder to record everything in.")
     ] = None,
@@ -67,11 +67,13 @@ def run(
         bool, typer.Option("--resume", help="Add a run to a session that exists.")
     ] = False,
     participant: Annotated[
-        str, typer.Option(help="Pseudonym: letters and digits.")
+        str, typer.Option(help="Participant's code: letters and digits.")
     ] = "01",
     duration: Annotated[
         float | None,
-        typer.Option(help="Seconds; until Ctrl-C without it.", min=0.0, max=86400.0),
+        typer.Option(
+            help="Length of the run, s. Default: until Ctrl-C.", min=0.0, max=86400.0
+        ),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Do everything but move the finger.")
@@ -79,21 +81,23 @@ def run(
     safe_state: Annotated[
         Literal["limp", "hold", "open"],
         typer.Option(
-            help="State of the finger when poses stop coming; releasing a held object "
-            "may itself be the hazard."
+            help="State of the finger when poses stop arriving. Releasing a held "
+            "object may itself be a hazard."
         ),
     ] = "limp",
     hold_speed: Annotated[
         float | None,
         typer.Option(
-            help="Hold the finger while the hand is faster, m/s.", min=0.0, max=100.0
+            help="Hold the finger while the hand is faster than this, m/s.",
+            min=0.0,
+            max=100.0,
         ),
     ] = None,
     max_uncertainty: Annotated[
         float,
         typer.Option(
-            help="Hold the finger while the standard deviation of c is larger."
-            " It is when markers are hidden that c needs.",
+            help="Hold the finger while the standard deviation of c is larger, "
+            "as it is when markers that c needs are hidden.",
             min=0.0,
             max=10.0,
         ),
@@ -101,8 +105,8 @@ def run(
     method: Annotated[
         Literal["paper", "intent"],
         typer.Option(
-            help="What reads c off the posture: the paper's map, or the departure from "
-            "the natural posture."
+            help="How c is read from the posture: the paper's map, or the "
+            "departure from the natural posture."
         ),
     ] = "paper",
     publish: Publish = None,
@@ -114,7 +118,7 @@ def run(
     realtime: Annotated[
         bool,
         typer.Option(
-            "--realtime", help="Real-time priority for the control loop, if allowed."
+            "--realtime", help="Run the control loop at real-time priority, if allowed."
         ),
     ] = False,
     as_json: AsJson = False,
@@ -122,6 +126,7 @@ def run(
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
 
     Exits with 3 when it ran but the finger never moved, or ended in its safe state.
+    Without --finger it is a simulated one; of several, what stops one stops all.
 
     Research software, not a medical device.
     """
@@ -129,7 +134,7 @@ def run(
     check_subject_folder(subject)
 
     from ikns.calibration.simulated import is_simulated, played_files
-    from ikns.finger import Safety, open_finger
+    from ikns.finger import Safety, open_fingers
     from ikns.live.control.settings import ControlSettings
     from ikns.live.publish import check_publish
     from ikns.live.runtime import check_realtime
@@ -141,13 +146,18 @@ def run(
     for address in publish or []:
         check_publish(address)
     timeline = timeline_of(rerun=rerun, rrd=rrd)
-    settings = ControlSettings(
-        hold_speed=hold_speed, method=method, max_uncertainty=max_uncertainty
-    )
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
     names = label_names(rename, labels)
-    device = open_finger(finger, safety=Safety(safe_state=safe_state))
+    n_dof, addresses = calibrated.null_space_map.n_dof, finger or ["sim:"]
+    group = open_fingers(addresses, n_dof=n_dof, safety=Safety(safe_state=safe_state))
+    settings = ControlSettings(
+        hold_speed=hold_speed,
+        method=method,
+        max_uncertainty=max_uncertainty,
+        dofs=group.dofs,
+    )
+    say_undriven(n_dof, group.dofs)
     with ExitStack() as stack:
         opened = open_source(source, subject=calibrated, names=names)
         stream = stack.enter_context(opened)
@@ -170,7 +180,7 @@ def run(
                 "source": source,
                 "source_labels": list(stream.labels),
                 "renamed": names,
-                "finger": None if dry_run else finger,
+                "finger": None if dry_run else written(addresses),
                 "safe_state": safe_state,
                 "publish": publish,
             }
@@ -178,7 +188,7 @@ def run(
                 session,
                 calibrated,
                 subject,
-                software() | started | {"settings": dataclasses.asdict(settings)},
+                software() | started | {"settings": settings.table()},
                 rate=stream.rate,
                 participant=participant,
                 resume=resume,
@@ -192,7 +202,7 @@ def run(
         report = drive(
             stream,
             calibrated,
-            None if dry_run else device,
+            None if dry_run else group,
             settings=settings,
             session=writer,
             duration=math.inf if duration is None else duration,
@@ -209,7 +219,8 @@ def run(
     if writer is not None and not report.frames:
         session = None
         sys.stderr.write("ikns: no frame came, so no session was kept.\n")
-    title = f"{source} to {'nothing (dry run)' if dry_run else finger}"
+    driven = "nothing (dry run)" if dry_run else " and ".join(addresses)
+    title = f"{source} to {driven}"
     _show_report(report, title, session, losses, publisher, as_json=as_json)
     _exit(report, losses)
 
@@ -323,7 +334,7 @@ def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], N
 
 def _line(s: LoopStatus) -> str:
     """Return the status, most important first: a narrow terminal cuts the rest."""
-    drive = f"{s.state:<7} c {s.c:5.2f} flexion {s.flexion:4.2f} ({s.measured:4.2f})"
+    drive = f"{s.state:<7} {' '.join(_axis(axis, s.axes) for axis in s.axes)}"
     late = 1e3 * s.latency
     # Never wider, so that 80 columns hold the residual too.
     pace = f"{s.rate:4.0f}/s p99 {late:4.{2 if late < 9.995 else 0}f} ms"
@@ -335,6 +346,13 @@ def _line(s: LoopStatus) -> str:
         f"c +-{s.uncertainty:5.3f} worst {1e3 * s.worst_residual:3.0f} mm "
         f"misses {s.misses}"
     )
+
+
+def _axis(axis: AxisStatus, axes: tuple[AxisStatus, ...]) -> str:
+    if len(axes) == 1 and axis.dof == 1:
+        return f"c {axis.c:5.2f} flexion {axis.flexion:4.2f} ({axis.measured:4.2f})"
+    # Two fit into 80 columns: c, flexion, measured.
+    return f"c_{axis.dof} {axis.c:5.2f} {axis.flexion:4.2f} ({axis.measured:4.2f})"
 
 
 def _result(report: Report) -> dict[str, Any]:

@@ -20,18 +20,18 @@ def stream(
     read: Read,
     recording: RecordingFile,
     name: Annotated[
-        str | None, typer.Option(help="Name of the stream; the file's by default.")
+        str | None, typer.Option(help="Name of the stream. Default: that of the file.")
     ] = None,
-    speed: Annotated[float, typer.Option(help="1: as recorded.")] = 1.0,
-    loop: Annotated[
-        bool, typer.Option("--loop", help="Start over at the end, until Ctrl-C.")
-    ] = False,
+    speed: Annotated[
+        float, typer.Option(help="Playback speed; 1 is as recorded.")
+    ] = 1.0,
+    loop: Annotated[bool, typer.Option("--loop", help="Repeat until Ctrl-C.")] = False,
     fault: Annotated[
         str,
         typer.Option(
-            help="Faults with their probability a frame, such as "
-            "drop=0.01,late=0.001:0.3,repeat=0.01,swap=0.01,freeze=0.001:0.5 "
-            "(late and freeze with seconds)."
+            help="Faults with their probability per frame, such as drop=0.01,lat "
+            "e=0.001:0.3,repeat=0.01,swap=0.01,freeze=0.001:0.5 (late and "
+            "freeze with seconds)."
         ),
     ] = "",
     seed: Annotated[int, typer.Option(help="Seed of the faults.")] = 0,
@@ -44,7 +44,7 @@ def stream(
     everywhere: Annotated[
         bool,
         typer.Option(
-            "--everywhere", help="Serve other machines too; markers are personal data."
+            "--everywhere", help="Also serve other machines. Markers are personal data."
         ),
     ] = False,
     as_json: AsJson = False,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,7 +14,7 @@ import typer
 
 from ikns.cli.checks import checked
 from ikns.cli.options import AsJson, Force
-from ikns.cli.output import loading, notes, progress, show
+from ikns.cli.output import Estimate, loading, notes, progress, show
 from ikns.cli.study_plan import plan
 from ikns.errors import InvalidInput
 
@@ -34,6 +34,8 @@ StudyFolder = Annotated[Path, typer.Argument(help="Folder of the study.")]
 
 def init(folder: StudyFolder, force: Force = False, as_json: AsJson = False) -> None:
     """Write a study folder with a commented example: both experiments, 10 people."""
+    loading()
+
     from ikns.experiments.study import init_study, read_study
 
     path = init_study(folder, force=force)
@@ -50,14 +52,24 @@ def init(folder: StudyFolder, force: Force = False, as_json: AsJson = False) -> 
 def run(
     folder: StudyFolder,
     jobs: Annotated[
-        int, typer.Option(help="Processes; -1: one for each core.", min=-1, max=1024)
+        int,
+        typer.Option(help="Number of processes; -1: one per core.", min=-1, max=1024),
     ] = -1,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Dask scheduler to compute on, tcp://HOST:PORT."),
+        typer.Option(
+            help="Address of a Dask scheduler to compute on, tcp://HOST:PORT."
+        ),
     ] = None,
+    worker_timeout: Annotated[
+        float,
+        typer.Option(
+            help="Longest time that the scheduler may be without workers, s.", min=1.0
+        ),
+    ] = 60.0,
     participants: Annotated[
-        int | None, typer.Option(help="Only the first N.", min=1, max=5000)
+        int | None,
+        typer.Option(help="Simulate only the first N participants.", min=1, max=5000),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -74,13 +86,16 @@ def run(
     from ikns.experiments.study import read_study, run_study
 
     study = read_study(folder)
-    with _progress_or_lines() as report:
+    estimates: dict[str, Any] = {}
+    with _progress_or_lines(estimates) as report:
         done = run_study(
             folder,
             n_jobs=jobs,
             scheduler=scheduler,
             participants=participants,
+            worker_timeout=worker_timeout,
             on_progress=report,
+            on_time_left=lambda left: estimates.update(simulating=left),
         )
     result: dict[str, Any] = {
         "study": folder,
@@ -90,13 +105,20 @@ def run(
         "found": done.found,
         "simulated_now": done.simulated,
         "failed": done.failed,
+        "damaged": done.damaged,
         "seconds": done.seconds,
     }
     warned = []
+    if done.damaged:
+        named = " ".join(list(done.damaged.values())[:_NAMED])
+        warned += [
+            f"{len(done.damaged)} of {done.cells} cells were damaged and are simulated "
+            f"again: {named} What was left of them is beside them, under hidden names."
+        ]
     if done.failed:
         few = list(done.failed.items())[:_NAMED]
         named = "; ".join(f"{name}: {reason}" for name, reason in few)
-        warned = [
+        warned += [
             f"{len(done.failed)} of {done.simulated} cells have no attempts: {named}"
         ]
     show(
@@ -114,25 +136,22 @@ for command in (init, run, plan):
 
 
 @contextmanager
-def _progress_or_lines() -> Iterator[Callable[[str, int, int], None]]:
+def _progress_or_lines(
+    estimates: Mapping[str, Estimate],
+) -> Iterator[Callable[[str, int, int], None]]:
     """Report progress: a bar on a terminal, elsewhere a line now and then."""
     if sys.stderr.isatty():
-        with progress() as report:
+        with progress(estimates=estimates) as report:
             yield report
         return
-    began = last = time.monotonic()
-    first: int | None = None
+    last = time.monotonic()
 
     def line(step: str, done: int, total: int) -> None:
-        nonlocal first, last
-        if step != "simulating":
+        nonlocal last
+        left = estimates[step].seconds() if step in estimates else None
+        if left is None or time.monotonic() - last < _EVERY:
             return
-        now = time.monotonic()
-        first = done if first is None else first
-        if now - last < _EVERY or done == first:
-            return
-        last = now
-        left = (now - began) / (done - first) * (total - done)
+        last = time.monotonic()
         sys.stderr.write(f"{done} of {total} cells, about {_minutes(left)} left\n")
         sys.stderr.flush()
 

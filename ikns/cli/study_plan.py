@@ -34,11 +34,11 @@ _LARGEST_MARGIN = 1e6
 def plan(
     study: Annotated[
         Path | None,
-        typer.Argument(help="Study that declares margin, design and seed."),
+        typer.Argument(help="Study that declares the margin, design and seed."),
     ] = None,
     experiment: Annotated[
         Literal["tracking", "picking"] | None,
-        typer.Option(help="Experiment; of a study: the first declared."),
+        typer.Option(help="Experiment. Default: the first that the study declares."),
     ] = None,
     margin: Annotated[
         float | None,
@@ -47,20 +47,25 @@ def plan(
     difference: Annotated[
         float,
         typer.Option(
-            help="True difference; without a margin, the one to detect.",
+            help="True difference. Without a margin: the difference to detect.",
             min=-1000000.0,
             max=1000000.0,
         ),
     ] = 0.0,
     participants: Annotated[
-        int | None, typer.Option(help="Of the study.", min=2, max=5000)
+        int | None, typer.Option(help="Number of participants.", min=2, max=5000)
     ] = None,
     levels: Annotated[
-        int | None, typer.Option(help="Trajectories or objects.", min=1, max=1000)
+        int | None,
+        typer.Option(help="Number of trajectories or objects.", min=1, max=1000),
     ] = None,
     repeats: Annotated[
         int | None,
-        typer.Option(help="Of each level in each condition.", min=1, max=1000),
+        typer.Option(
+            help="Repetitions of each trajectory or object in each condition.",
+            min=1,
+            max=1000,
+        ),
     ] = None,
     spread: Annotated[
         float | None,
@@ -72,13 +77,17 @@ def plan(
     level_spread: Annotated[
         float | None,
         typer.Option(
-            help="Between levels within a participant; with --spread.", max=1000000.0
+            help="Standard deviation between trajectories or objects within a "
+            "participant; with --spread.",
+            max=1000000.0,
         ),
     ] = None,
     trial_spread: Annotated[
         float | None,
         typer.Option(
-            help="Between repeats of one condition; with --spread.", max=1000000.0
+            help="Standard deviation between repetitions of one condition; with "
+            "--spread.",
+            max=1000000.0,
         ),
     ] = None,
     pilot: Annotated[
@@ -86,9 +95,12 @@ def plan(
         typer.Option(help="Pilot study whose visits give the spread of differences."),
     ] = None,
     power: Annotated[float, typer.Option(help="Target power.")] = 0.8,
-    alpha: Annotated[float, typer.Option(help="Level of each one-sided test.")] = 0.05,
+    alpha: Annotated[
+        float, typer.Option(help="Significance level of each one-sided test.")
+    ] = 0.05,
     most: Annotated[
-        int, typer.Option(help="Most participants to try.", min=2, max=5000)
+        int,
+        typer.Option(help="Largest number of participants to try.", min=2, max=5000),
     ] = 500,
     simulations: Annotated[
         int,

@@ -18,13 +18,13 @@ def report(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder to write; by default `report` in the study."),
+        typer.Option(help="Folder to write. Default: `report` in the study."),
     ] = None,
     jobs: Annotated[
         int | None,
         typer.Option(
-            help="Processes that read visits; -1: one for each core, the default for "
-            "many visits.",
+            help="Number of processes that read visits; -1: one per core, the "
+            "default for many visits.",
             min=-1,
             max=1024,
         ),

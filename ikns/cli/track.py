@@ -9,7 +9,15 @@ from typing import Annotated, Any, Literal
 import typer
 
 from ikns.cli.live_session import timeline_of
-from ikns.cli.options import AsJson, LabelFile, Publish, Rename, Rerun, Rrd
+from ikns.cli.options import (
+    AsJson,
+    Fingers,
+    LabelFile,
+    Publish,
+    Rename,
+    Rerun,
+    Rrd,
+)
 from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
@@ -67,7 +75,7 @@ def track(
     repeats: Annotated[
         int | None,
         typer.Option(
-            help="Repeats of each trajectory in each condition.",
+            help="Repetitions of each trajectory in each condition.",
             show_default="3",
             min=1,
             max=1000,
@@ -76,19 +84,22 @@ def track(
     training: Annotated[
         int | None,
         typer.Option(
-            help="Trials before each condition.", show_default="10", min=0, max=1000
+            help="Training trials before each condition.",
+            show_default="10",
+            min=0,
+            max=1000,
         ),
     ] = None,
     seconds: Annotated[
         float | None,
         typer.Option(
-            help="Duration of a trajectory, s.", show_default="25", min=0.0, max=3600.0
+            help="Length of each trajectory, s.", show_default="25", min=0.0, max=3600.0
         ),
     ] = None,
     align: Annotated[
         float | None,
         typer.Option(
-            help="Time to align before a trajectory, s.",
+            help="Time to reach the start of each trajectory, s.",
             show_default="5",
             min=0.0,
             max=3600.0,
@@ -105,16 +116,11 @@ def track(
     source: SourceAddress = None,
     rename: Rename = None,
     labels: LabelFile = None,
-    finger: Annotated[
-        str | None,
-        typer.Option(help="For ikns: sim:, dynamixel:/dev/ttyUSB0 or ros2:TOPIC?..."),
-    ] = None,
+    finger: Fingers = None,
     session: SessionFolder = None,
     smooth: Annotated[
         bool,
-        typer.Option(
-            "--smooth", help="The pointer shows the smoothed flexion instead of c."
-        ),
+        typer.Option("--smooth", help="Show the smoothed flexion instead of c."),
     ] = False,
     safe_state: SafeState = "limp",
     stick: Annotated[
@@ -191,7 +197,7 @@ def track(
         ArmOptions(
             subject,
             source,
-            finger,
+            tuple(finger or ()),
             session,
             smooth=smooth,
             safe_state=safe_state,

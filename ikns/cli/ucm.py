@@ -45,7 +45,8 @@ def ucm(
     most_different: Annotated[
         float,
         typer.Option(
-            help="Largest difference of two repetitions' hand paths, by their size.",
+            help="Largest difference between the hand paths of two repetitions, "
+            "relative to their size.",
             min=0.0,
             max=10.0,
         ),

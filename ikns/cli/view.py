@@ -45,12 +45,18 @@ def view(
         Path | None,
         typer.Option(help="HTML file to write.", show_default="view.html"),
     ] = None,
-    png: Annotated[Path | None, typer.Option(help="Picture to write too.")] = None,
+    png: Annotated[
+        Path | None, typer.Option(help="Also write a picture, .png.")
+    ] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option(help="Also write an animation of up to 20 s, .gif or .png."),
+    ] = None,
     point: Annotated[
         int | None,
         typer.Option(
-            help="PCA point, from 1, at which the arm shows its null space; default: "
-            "the one with the widest range."
+            help="PCA point, counted from 1, at which the arm shows its null "
+            "space. Default: the one with the widest range."
         ),
     ] = None,
     method: AnyMethod = "paper",
@@ -72,11 +78,11 @@ def view(
     """
     inputs = [subject, recording]
     if rerun or rrd is not None:
-        others = (out, png, point) != (None, None, None) or open_page
+        others = (out, png, animation, point) != (None,) * 4 or open_page
         if recording is None or others:
             raise InvalidInput(
                 "--rerun and --rrd show a recording, and no page or picture with it; "
-                "leave out --out, --png, --open and --point."
+                "leave out --out, --png, --animation, --open and --point."
             )
         where = timeline_of(rerun=rerun, rrd=rrd, force=force, inputs=inputs)
         assert where is not None
@@ -92,14 +98,23 @@ def view(
         return
     out = Path("view.html") if out is None else out
     refuse_overwriting(out, force=force, inputs=inputs)
-    if png is not None:
-        refuse_overwriting(png, force=force, inputs=inputs)
-        if png.resolve() == out.resolve():
-            raise InvalidInput(f"{png}: expected two files, found one for both.")
-        if png.suffix.lower() != ".png":
-            raise InvalidInput(
-                f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
-            )
+    pictures = [path for path in (png, animation) if path is not None]
+    for path in pictures:
+        refuse_overwriting(path, force=force, inputs=inputs)
+    if len({path.resolve() for path in (out, *pictures)}) <= len(pictures):
+        raise InvalidInput(
+            f"{pictures[-1]}: expected a file for each picture and for the page, found "
+            "one for two of them."
+        )
+    if png is not None and png.suffix.lower() != ".png":
+        raise InvalidInput(
+            f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
+        )
+    if animation is not None and animation.suffix.lower() not in (".gif", ".png"):
+        raise InvalidInput(
+            f"{animation}: expected a moving picture with the ending .gif or .png, "
+            f"found '{animation.suffix}'."
+        )
     if recording is None and (from_, to) != (None, None):
         raise InvalidInput("expected a recording for --from and --to, found none.")
     if recording is None and method != "paper":
@@ -133,6 +148,11 @@ def view(
     )
     page = scene_html(scene)
     picture = None if png is None else scene_picture(scene)
+    moving = (
+        None
+        if animation is None
+        else _animation(scene, person, animation, held=recording is None)
+    )
     write_text(out, page, force=force)
     remarks = [] if frames is None else tell_faults(person, frames)
     if png is not None and picture is not None:
@@ -140,6 +160,8 @@ def view(
         if picture.note:
             remarks.append(picture.note)
             sys.stderr.write(f"ikns: {picture.note}.\n")
+    if animation is not None and moving is not None:
+        write_bytes(animation, moving, force=force)
     if open_page:
         webbrowser.open(out.resolve().as_uri())
     given = 0 if frames is None else len(frames.time)
@@ -152,6 +174,7 @@ def view(
             "method": method,
             "html": out,
             "png": png,
+            "animation": animation,
             "points": len(learned.centers_),
             "frames_of_the_recording": given,
             "frames_played": len(scene.times),
@@ -164,8 +187,23 @@ def view(
             {"quantity": "s", "value": "s"},
             _rows(scene, points=len(learned.centers_), given=given, size=size),
         ),
-        f"Wrote {out}" if png is None else f"Wrote {out} and {png}",
+        f"Wrote {' and '.join(map(str, (out, *pictures)))}",
         as_json=as_json,
+    )
+
+
+def _animation(scene: Scene, person: ikns.Subject, path: Path, *, held: bool) -> bytes:
+    """Draw the moving picture of a map's self-motion, or of a recording."""
+    from ikns.view.animation import FORMATS, animation_bytes
+
+    return animation_bytes(
+        scene,
+        person.skeleton,
+        person.chain,
+        caption="The elbow swivels with the hand held; the finger bends with c."
+        if held
+        else "The finger bends with c.",
+        format=FORMATS[path.suffix.lower()],
     )
 
 

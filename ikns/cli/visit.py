@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import ikns
-from ikns.cli.live_session import publishing, software
+from ikns.cli.live_session import publishing, say_undriven, software
 from ikns.cli.output import show, table
 from ikns.cli.stop_notice import watch_stops
 from ikns.cli.visit_drivers import (
@@ -25,8 +25,9 @@ from ikns.cli.visit_drivers import (
     arm_is_simulated,
     arm_subject,
     describe_input,
-    finger_opener,
+    fingers_opener,
     open_arm_source,
+    ring_finger,
 )
 from ikns.cli.visit_identity import VisitIdentity
 from ikns.endings import signal_exit_code, stop_on_signals
@@ -141,7 +142,7 @@ def conduct(
         if "ring" in conditions:
             from ikns.experiments.conduct.ring import ring_driver
 
-            drivers["ring"] = lambda: ring_driver(presses, finger_opener(arm))
+            drivers["ring"] = lambda: ring_driver(presses, ring_finger(arm))
         shown_about = {
             "participant": identity.participant,
             "simulated": simulated,
@@ -213,7 +214,10 @@ def _checked(
             f"{', '.join(conditions)}."
         )
     subject = arm_subject(arm) if "ikns" in conditions else None
-    finger_opener(arm)
+    n_dof = None if subject is None else subject.null_space_map.n_dof
+    opener = fingers_opener(arm, n_dof)
+    if n_dof is not None and opener is not None:
+        say_undriven(n_dof, opener().dofs)
     if arm.publish:
         from ikns.live.publish import check_publish
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -10,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import ikns
-from ikns.cli.live_session import Timeline, live_session, software
+from ikns.cli.live_session import Timeline, live_session, software, written
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Driver
-    from ikns.finger import Finger
+    from ikns.finger import Finger, FingerGroup
     from ikns.live.publish import Publishers
     from ikns.live.runtime import LoopStatus
     from ikns.live.session import RunWriter
@@ -37,7 +36,8 @@ class ArmOptions:
     Parameters
     ----------
     subject : Path or None
-    source, finger : str or None
+    source : str or None
+    fingers : tuple of str
         Addresses; without a finger nothing moves.
     session : Path or None
         Folder of its runs; by default in the visit's folder.
@@ -62,7 +62,7 @@ class ArmOptions:
 
     subject: Path | None
     source: str | None
-    finger: str | None
+    fingers: tuple[str, ...]
     session: Path | None
     smooth: bool
     safe_state: Literal["limp", "hold", "open"]
@@ -155,10 +155,13 @@ def arm_driver(
     from ikns.experiments.conduct.live import live_driver
     from ikns.live.control.settings import ControlSettings
 
+    n_dof = subject.null_space_map.n_dof
+    fingers = fingers_opener(arm, n_dof)
     settings = ControlSettings(
         hold_speed=arm.hold_speed,
         method=arm.method,
         max_uncertainty=arm.max_uncertainty,
+        dofs=fingers().dofs if fingers else (1,),
     )
 
     def open_session(source: Source) -> AbstractContextManager[RunWriter]:
@@ -172,10 +175,10 @@ def arm_driver(
                 "source": arm.source,
                 "source_labels": list(source.labels),
                 "renamed": arm.names,
-                "finger": arm.finger,
+                "finger": written(arm.fingers),
                 "safe_state": arm.safe_state,
                 "publish": arm.publish,
-                "settings": dataclasses.asdict(settings),
+                "settings": settings.table(),
             },
             rate=source.rate,
             participant=participant,
@@ -190,7 +193,7 @@ def arm_driver(
     return live_driver(
         lambda: open_arm_source(arm, subject),
         subject,
-        finger=finger_opener(arm),
+        finger=fingers,
         open_session=open_session,
         settings=settings,
         smooth=arm.smooth,
@@ -200,18 +203,27 @@ def arm_driver(
     )
 
 
-def finger_opener(arm: ArmOptions) -> Callable[[], Finger] | None:
-    """Return a callable that opens the finger, or None without one.
+def fingers_opener(
+    arm: ArmOptions, n_dof: int | None = None
+) -> Callable[[], FingerGroup] | None:
+    """Return a callable that opens the fingers, or None without any.
 
-    Nothing is connected yet, but the address is checked.
+    Nothing is connected yet, but the addresses are checked, against the freedoms of a
+    map where one is known.
     """
-    from ikns.finger import Safety, open_finger
+    from ikns.finger import Safety, open_fingers
 
-    if arm.finger is None:
+    if not arm.fingers:
         return None
-    address, safety = arm.finger, Safety(safe_state=arm.safe_state)
-    open_finger(address, safety=safety)
-    return lambda: open_finger(address, safety=safety)
+    safety = Safety(safe_state=arm.safe_state)
+    open_fingers(arm.fingers, n_dof=n_dof, safety=safety)
+    return lambda: open_fingers(arm.fingers, n_dof=n_dof, safety=safety)
+
+
+def ring_finger(arm: ArmOptions) -> Callable[[], Finger] | None:
+    """Return a callable that opens the finger of the ring button: the first."""
+    opener = fingers_opener(arm)
+    return None if opener is None else lambda: opener().fingers[0]
 
 
 def describe_input(condition: str, arm: ArmOptions, pages: PageOptions) -> str:

@@ -9,23 +9,30 @@ import typer
 
 VisitFolder = Annotated[
     Path | None,
-    typer.Argument(help="Folder of the visit; an existing one is continued."),
+    typer.Argument(help="Folder of the visit. An existing visit is continued."),
 ]
 FromStudy = Annotated[
     Path | None,
-    typer.Option(help="Study folder: sets design and folder of the visit."),
+    typer.Option(
+        help="Study folder, which sets the design and the folder of the visit."
+    ),
 ]
 Participant = Annotated[
-    str | None, typer.Option(help="Pseudonym, letters and digits.", show_default="01")
+    str | None,
+    typer.Option(help="Participant's code: letters and digits.", show_default="01"),
 ]
 Number = Annotated[
     int | None,
-    typer.Option(help="Participant's number, from 0; sets the order.", min=0, max=9999),
+    typer.Option(
+        help="Participant's number, counted from 0; it sets the order of conditions.",
+        min=0,
+        max=9999,
+    ),
 ]
 Rest = Annotated[
     float | None,
     typer.Option(
-        help="Seconds between conditions.", show_default="120", min=0.0, max=3600.0
+        help="Rest between conditions, s.", show_default="120", min=0.0, max=3600.0
     ),
 ]
 ForIkns = Annotated[
@@ -40,17 +47,19 @@ SourceAddress = Annotated[
 ]
 SessionFolder = Annotated[
     Path | None,
-    typer.Option(help="For ikns: where its runs go.", show_default="in the visit"),
+    typer.Option(
+        help="For ikns: folder for its sessions.", show_default="in the visit"
+    ),
 ]
 SafeState = Annotated[
     Literal["limp", "hold", "open"],
-    typer.Option(help="State of the finger when poses stop coming."),
+    typer.Option(help="State of the finger when poses stop arriving."),
 ]
 LiveMethod = Annotated[
     Literal["paper", "intent"],
     typer.Option(
-        help="For ikns: what reads c off the posture, the paper's map or the departure "
-        "from the natural posture."
+        help="For ikns: how c is read from the posture, by the paper's map "
+        "or the departure from the natural posture."
     ),
 ]
 MaxUncertainty = Annotated[
@@ -62,25 +71,25 @@ MaxUncertainty = Annotated[
     ),
 ]
 View = Annotated[
-    bool, typer.Option("--view/--no-view", help="Show the body on the panel.")
+    bool, typer.Option("--view/--no-view", help="Show the body in 3-D on the panel.")
 ]
 Realtime = Annotated[
     bool,
     typer.Option(
         "--realtime",
-        help="For ikns: real-time priority for the control loop, if allowed.",
+        help="For ikns: run the control loop at real-time priority, if allowed.",
     ),
 ]
 Host = Annotated[
     str,
     typer.Option(
-        help="Address to serve the pages at. They need the token in the printed "
-        "address; to other machines they are sent unencrypted."
+        help="Network address of the pages. Opening them needs the token in "
+        "the printed address; other machines get them unencrypted."
     ),
 ]
 Port = Annotated[
-    int, typer.Option(help="Port of the pages; 0 takes a free one.", min=0, max=65535)
+    int, typer.Option(help="Port of the pages; 0 chooses a free one.", min=0, max=65535)
 ]
 Browser = Annotated[
-    bool, typer.Option("--browser/--no-browser", help="Open the pages.")
+    bool, typer.Option("--browser/--no-browser", help="Open the pages in a browser.")
 ]

@@ -8,9 +8,10 @@ safe state of a finger, :class:`Finger` is the interface of every finger, and
 from ikns.finger.check import FingerReport, check_finger
 from ikns.finger.dynamixel import DynamixelFinger
 from ikns.finger.errors import FingerError
+from ikns.finger.group import FingerGroup
 from ikns.finger.guard import Safety
 from ikns.finger.limiter import Limiter, Limits
-from ikns.finger.opening import open_finger
+from ikns.finger.opening import open_finger, open_fingers
 from ikns.finger.ros import RosFinger
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import MODES, SAFE_STATES, Finger, FingerState
@@ -21,6 +22,7 @@ __all__ = [
     "DynamixelFinger",
     "Finger",
     "FingerError",
+    "FingerGroup",
     "FingerReport",
     "FingerState",
     "Limiter",
@@ -30,4 +32,5 @@ __all__ = [
     "SimulatedFinger",
     "check_finger",
     "open_finger",
+    "open_fingers",
 ]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import termios
 import time
 from typing import Any
 
 from ikns.finger.control_table import Register
 from ikns.finger.errors import FingerError, NoResponse, PortLost, Rejected
+from ikns.finger.line import Line, join_line
 from ikns.finger.models import Model, alert_text
-from ikns.finger.serial_port import load_sdk, port_error_text, port_errors
+from ikns.finger.serial_port import load_sdk, port_errors
 
 #: Bit rates and ids to try when the servo does not respond, most common first.
 _BAUDS = (57600, 1000000, 115200, 2000000, 3000000, 4000000, 9600)
@@ -51,32 +51,22 @@ class Bus:
         self.alert = False
         self.tries = 1
         self._bits = 0
-        self._port: Any = None
-        self._settings: list[Any] = []
+        self._line: Line | None = None
 
     def open(self) -> None:
-        """Open the port for this program alone.
+        """Open the port for this program alone, or share it with servos of its own.
 
         Raises
         ------
         FingerError
             When it is missing, in use or cannot be opened.
         """
-        sdk, port_type = load_sdk()
+        sdk, _ = load_sdk()
         self._packets = sdk.PacketHandler(float(self.model.protocol))
         self._success = sdk.COMM_SUCCESS
-        port = port_type(self.port)
-        if port.getCFlagBaud(self.baud) <= 0:
-            raise FingerError(f"{self.port}: no serial port runs at {self.baud} baud.")
-        port.baudrate = self.baud
-        try:
-            port.openPort()
-            self._settings = termios.tcgetattr(port.ser.fileno())
-        except port_errors() as error:
-            if port.is_open:
-                port.closePort()
-            raise FingerError(self._lost(error)) from None
-        self._port = port
+        self._line = join_line(
+            self.port, self.id, baud=self.baud, protocol=self.model.protocol
+        )
 
     def restore_settings(self) -> bool:
         """Undo what another program changed of rate and format; return whether it had.
@@ -85,26 +75,13 @@ class Bus:
         ------
         PortLost
         """
-        if self._port is None:
-            raise PortLost(f"{self.port}: the port is closed.")
-        serial = self._port.ser
-        try:
-            if termios.tcgetattr(serial.fileno()) == self._settings:
-                return False
-            serial.baudrate = self.baud  # sets everything else as well
-            self._settings = termios.tcgetattr(serial.fileno())
-        except port_errors() as error:
-            raise PortLost(self._lost(error)) from None
-        return True
+        return self._opened().restore_settings(self.id)
 
     def close(self) -> None:
-        """Close the port; harmless when repeated."""
-        port, self._port = self._port, None
-        if port is not None:
-            try:
-                port.closePort()
-            except port_errors():
-                pass
+        """Close the port, unless others share it; harmless when repeated."""
+        line, self._line = self._line, None
+        if line is not None:
+            line.leave(self.id)
 
     def check(self, *, diagnose: bool = True) -> None:
         """Check that the servo responds and is of the model that was named.
@@ -183,30 +160,35 @@ class Bus:
             bits = self._bits
         return alert_text(bits, self.model.protocol) if bits else ""
 
-    def _lost(self, error: Exception) -> str:
-        return f"{self.port}: {port_error_text(error, self.port)}."
+    def _opened(self) -> Line:
+        if self._line is None:
+            raise PortLost(f"{self.port}: the port is closed.")
+        return self._line
 
-    def _responds(self, number: int) -> bool:
+    def _responds(self, port: Any, number: int) -> bool:
         try:
-            _, result, _ = self._packets.ping(self._port, number)
+            _, result, _ = self._packets.ping(port, number)
         except port_errors() as error:
-            raise PortLost(self._lost(error)) from None
+            raise self._opened().lost(error) from None
         except IndexError:  # raised by the SDK when a response is too short
-            self._port.is_using = False
+            port.is_using = False
             return False
         return bool(result == self._success)
 
     def _diagnosis(self) -> str:
         """Say what responds instead."""
         start = f"{self.port}: servo {self.id} does not answer at {self.baud} baud"
-        for number in _IDS:
-            if number != self.id and self._responds(number):
-                return f"{start}, but servo {number} does."
-        for baud in _BAUDS:
-            if baud != self.baud:
-                self._port.setBaudRate(baud)
-                if self._responds(self.id):
-                    return f"{start}, but at {baud}."
+        line = self._opened()
+        with line.turn(self.id) as port:
+            for number in _IDS:
+                if number not in line.servos and self._responds(port, number):
+                    return f"{start}, but servo {number} does."
+            # Others on the port would not be heard at another rate.
+            for baud in _BAUDS if len(line.servos) == 1 else ():
+                if baud != self.baud:
+                    port.setBaudRate(baud)
+                    if self._responds(port, self.id):
+                        return f"{start}, but at {baud}."
         return f"{start}; check its power, cable, id and baud rate."
 
     def _encode(self, *numbers: int) -> bytes:
@@ -231,8 +213,6 @@ class Bus:
         A response of another length is a late one to an earlier instruction; the SDK's
         own readTxRx would take its checksum for data.
         """
-        if self._port is None:
-            raise PortLost(f"{self.port}: the port is closed.")
         wide, content = self.model.protocol == 2, len(data)
         if wide:
             packet = [0, 0, 0, 0, self.id, *(content + 3).to_bytes(2, "little")]
@@ -242,29 +222,30 @@ class Bus:
         no_response = NoResponse(
             f"{self.port}: servo {self.id} did not respond when {doing}."
         )
-        try:
-            response, result, error = self._packets.txRxPacket(self._port, packet)
-        except port_errors() as lost:
-            self._port.is_using = False
-            if "timeout" in type(lost).__name__.lower():  # of pyserial, for a write
+        line = self._opened()
+        with line.turn(self.id) as port:
+            try:
+                response, result, error = self._packets.txRxPacket(port, packet)
+            except port_errors() as lost:
+                port.is_using = False
+                if "timeout" in type(lost).__name__.lower():  # of pyserial, for a write
+                    raise no_response from None
+                raise line.lost(lost) from None
+            except IndexError:  # raised by the SDK when a response is too short
+                port.is_using = False
                 raise no_response from None
-            raise PortLost(self._lost(lost)) from None
-        except IndexError:  # raised by the SDK when a response is too short
-            self._port.is_using = False
-            raise no_response from None
-        if result != self._success:
-            self._port.is_using = False
-            raise no_response
-        self._check_status(doing, error)
-        start = 9 if wide else 5
-        length = (
-            int.from_bytes(response[5:7], "little") - 4 if wide else response[3] - 2
-        )
-        if length != count:
-            time.sleep(
-                _RESPONSE_TIMEOUT
-            )  # the right response, if it comes, will be late too
-            raise no_response
+            if result != self._success:
+                port.is_using = False
+                raise no_response
+            self._check_status(doing, error)
+            start = 9 if wide else 5
+            length = (
+                int.from_bytes(response[5:7], "little") - 4 if wide else response[3] - 2
+            )
+            if length != count:
+                # The right response, if it comes, will be late too.
+                time.sleep(_RESPONSE_TIMEOUT)
+                raise no_response
         return bytes(response[start : start + count])
 
     def _check_status(self, doing: str, error: int) -> None:

@@ -104,6 +104,9 @@ class DynamixelFinger:
                 f"{self._model.highest} ticks, not {span[0]} and {span[1]}."
             )
         self.safety = Safety() if safety is None else safety
+        self.port, self.id = port, id
+        #: Baud rate and protocol, which all servos of a port share.
+        self.speech = baud, self._model.protocol
         self.resolution = 1.0 / abs(span[1] - span[0])
         self._configuration = ServoConfiguration(
             *span, effort, watchdog, self.safety.limits
@@ -229,6 +232,14 @@ class DynamixelFinger:
 
     def _run(self) -> None:
         """Own the bus from connecting until the torque is off, whatever happens."""
+        try:
+            self._serve()
+        except BaseException:
+            # On a shared port the other servo's packets keep this one's watchdog quiet.
+            self._close()
+            raise
+
+    def _serve(self) -> None:
         due = time.monotonic()
         while not self._stop.is_set():
             attempt, self._attempt = self._attempt, None

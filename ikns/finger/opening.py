@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 from urllib.parse import parse_qsl
 
 from ikns.errors import InvalidInput, naming
 from ikns.finger.dynamixel import DynamixelFinger
+from ikns.finger.group import FingerGroup
 from ikns.finger.guard import Safety
 from ikns.finger.ros import RosFinger
 from ikns.finger.simulated import SimulatedFinger
@@ -52,7 +54,7 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
         a robot under ROS 2 (``type=position`` for a plain number; also ``feedback``, a
         topic of joint states; ``rate``, Hz; ``router=HOST:PORT``; ``domain``). All take
         ``safe=limp``, but for ROS 2, ``safe=hold`` or ``safe=open``, which takes
-        precedence over `safety`.
+        precedence over `safety`, and ``dof=1``, which only :func:`open_fingers` heeds.
     safety : Safety, optional
 
     Returns
@@ -73,14 +75,97 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
     ikns.errors.InvalidInput: unknown finger 'gpio:7', expected sim:, dynamixel:PORT or
     ros2:TOPIC.
     """
-    scheme, colon, rest = address.partition(":")
+    return _opened(address, Safety() if safety is None else safety)[0]
+
+
+def open_fingers(
+    addresses: Sequence[str],
+    *,
+    n_dof: int | None = None,
+    safety: Safety | None = None,
+) -> FingerGroup:
+    """Make fingers that each follow a freedom of a map, not connected yet.
+
+    Parameters
+    ----------
+    addresses : sequence of str
+        As for :func:`open_finger`. ``dof=2`` is what drives a finger: the second
+        freedom of the map; without it, the first.
+    n_dof : int, optional
+        Freedoms of the map, where one is known.
+    safety : Safety, optional
+        Of each finger.
+
+    Returns
+    -------
+    FingerGroup
+
+    Raises
+    ------
+    InvalidInput
+        When an address is wrong, two fingers want one freedom or one servo, the servos
+        of a port have different rates or protocols, or the map lacks a freedom.
+
+    Examples
+    --------
+    >>> open_fingers(["sim:", "sim:dof=2"], n_dof=2).dofs
+    (1, 2)
+    >>> open_fingers(["sim:", "sim:"], n_dof=2)
+    Traceback (most recent call last):
+    ikns.errors.InvalidInput: 'sim:' and 'sim:' both want dof=1, expected one each.
+    """
     safety = Safety() if safety is None else safety
+    taken: dict[int, str] = {}
+    fingers: list[Finger] = []
+    for address in addresses:
+        finger, dof = _opened(address, safety)
+        if n_dof is not None and dof > n_dof:
+            raise InvalidInput(
+                f"'{address}' wants dof={dof}, but the map has {n_dof} "
+                f"freedom{'s' * (n_dof > 1)}."
+            )
+        if dof in taken:
+            raise InvalidInput(
+                f"'{taken[dof]}' and '{address}' both want dof={dof}, expected one "
+                "each."
+            )
+        taken[dof] = address
+        fingers.append(finger)
+    _check_ports(list(addresses), fingers)
+    return FingerGroup(fingers, list(taken))
+
+
+def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
+    """Refuse two fingers on one servo, and servos that cannot share their port."""
+    seen: dict[str, list[tuple[str, DynamixelFinger]]] = {}
+    for address, finger in zip(addresses, fingers, strict=True):
+        if not isinstance(finger, DynamixelFinger):
+            continue
+        others = seen.setdefault(os.path.realpath(finger.port), [])
+        for other, one in others:
+            if one.id == finger.id:
+                raise InvalidInput(
+                    f"'{other}' and '{address}' are one servo, expected another port "
+                    "or id."
+                )
+            if one.speech != finger.speech:
+                raise InvalidInput(
+                    f"'{other}' and '{address}' are on one port, expected one baud "
+                    "rate and protocol."
+                )
+        others.append((address, finger))
+
+
+def _opened(address: str, safety: Safety) -> tuple[Finger, int]:
+    """Make a finger; return it and the freedom that its address names."""
+    scheme, colon, rest = address.partition(":")
     if scheme == "sim" and colon:
         values = _options(address, rest.removeprefix("?"), _SIMULATED)
         safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
+        dof = _dof(address, values.pop("dof", 1))
         if "width" in values:
             values["object_width"] = values.pop("width") / 1000
-        return SimulatedFinger(safety=safety, **values)
+        return SimulatedFinger(safety=safety, **values), dof
     if scheme == "dynamixel" and colon:
         port, _, query = rest.partition("?")
         if not port:
@@ -89,16 +174,17 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
             )
         values = _options(address, query, _DYNAMIXEL)
         safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
+        dof = _dof(address, values.pop("dof", 1))
         for end in ("open", "closed"):
             if end in values:
                 values[f"{end}_ticks"] = values.pop(end)
-        return DynamixelFinger(port, safety=safety, **values)
+        return DynamixelFinger(port, safety=safety, **values), dof
     if scheme == "ros2" and colon:
         return _ros_finger(address, rest, safety)
     raise InvalidInput(f"unknown finger '{address}', expected {_KNOWN}.")
 
 
-def _ros_finger(address: str, rest: str, safety: Safety) -> RosFinger:
+def _ros_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
     topic, _, query = rest.partition("?")
     values = _options(address, query, _ROS)
     missing = [name for name in ("type", "open", "closed") if name not in values]
@@ -108,12 +194,13 @@ def _ros_finger(address: str, rest: str, safety: Safety) -> RosFinger:
             "ros2:/finger/joint_trajectory?type=joint_trajectory&joint=finger&open=0"
             "&closed=1.2."
         )
+    dof = _dof(address, values.pop("dof", 1))
     with naming(f"'{address}'"):
         safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
         where: dict[str, str] = {
             key: values.pop(key) for key in ROS_OPTIONS if key in values
         }
-        return RosFinger(
+        finger = RosFinger(
             ros_address(topic, where),
             command=values.pop("type"),
             open_position=values.pop("open"),
@@ -121,13 +208,20 @@ def _ros_finger(address: str, rest: str, safety: Safety) -> RosFinger:
             safety=safety,
             **values,
         )
+    return finger, dof
+
+
+def _dof(address: str, dof: int) -> int:
+    if dof < 1:
+        raise InvalidInput(f"'{address}' has dof={dof}, expected a number from 1 on.")
+    return dof
 
 
 def _options(
     address: str, query: str, known: dict[str, Callable[[str], Any]]
 ) -> dict[str, Any]:
-    types: dict[str, Callable[[str], Any]] = {**known, "safe": str}
-    values = {}
+    types: dict[str, Callable[[str], Any]] = {**known, "safe": str, "dof": int}
+    values: dict[str, Any] = {}
     try:
         pairs = parse_qsl(query, strict_parsing=True) if query else []
     except ValueError:
@@ -140,6 +234,8 @@ def _options(
                 f"'{address}' has an unknown option '{name}', "
                 f"expected {', '.join(types)}."
             )
+        if name in values:
+            raise InvalidInput(f"'{address}' gives {name} twice, expected it once.")
         try:
             values[name] = types[name](text)
         except ValueError:

@@ -101,7 +101,7 @@ def quadratic_terms(wrist_in_thorax: ArrayLike) -> Array:
 class NaturalPosture(EstimatorBase):
     """Ridge regression of the hinge swivel on the wrist center, toward a population.
 
-    ``s_nat(w) = phi(w) . beta`` with the terms of :func:`quadratic_terms` and
+    ``s_nat(w) = phi(w) . beta`` with the terms of :func:`quadratic_terms` and ::
 
         beta = argmin mean_t (s_t - phi(w_t) . beta)^2 + penalty |beta - beta_people|^2
 

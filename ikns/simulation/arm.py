@@ -8,16 +8,18 @@ used.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
-from scipy.linalg.lapack import dposv
 
+from ikns._kernels.body.paths import Paths
+from ikns._kernels.body.reach import reach_poses
+from ikns._kernels.body.self_motion import follow_self_motion
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.numerics.subspace import null_space
 
 Array = NDArray[np.float64]
 
@@ -29,6 +31,9 @@ _LONGEST_STEP = 0.3
 #: Step along the self-motion, rad of joint-space length. A cubic spline through the
 #: steps is then accurate to about stride^4 / 384 = 1e-8 rad.
 _STRIDE = 0.04
+#: A step that changes the swivel by less is the last one, rad; so there are no more.
+_LEAST_STEP = 0.1 * _STRIDE
+_MOST_STEPS = int(2 * np.pi / _LEAST_STEP) + 2
 #: Clavicle angle with the upper arm forward, rad. Sternoclavicular elevation of 6 to
 #: 10 deg and a protraction of the same order go with raising the arm to the front
 #: (recalled from Ludewig et al. 2009, J Bone Joint Surg Am 91:378; rounded).
@@ -53,8 +58,15 @@ class ArmKinematics:
         self.columns = [names.index(j) for j in chain_joints(f"{side}_arm_clavicle")]
         self.lower = skeleton.lower[self.columns]
         self.upper = skeleton.upper[self.columns]
-        self._seven = self.columns[2:]
+        self._seven = np.array(self.columns[2:])
+        joints = chain_joints(self.chain)
+        self._path = skeleton.paths((f"{side}_knuckle",), joints)
         self.outward = 1.0 if side == "right" else -1.0
+
+    @cached_property
+    def swivel_paths(self) -> tuple[Paths, Paths, int]:
+        """Paths to the hand and to both elbows, and which of these is this arm's."""
+        return self._path, self.skeleton.elbow_paths, SIDES.index(self.side)
 
     def put(self, angles: Array, posture: ArrayLike) -> Array:
         """Return joint angles of the body with this arm in a posture."""
@@ -85,24 +97,26 @@ class ArmKinematics:
         move along the self-motion and leave the clavicle as it is. The pose is in the
         thorax frame.
         """
-        angles = np.array(angles)
-        for _ in range(50):
-            p, R = self.hand(angles)
-            D = rotation @ R.T
-            turn = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
-            error = np.concatenate([position - p, turn / 2])
-            if np.abs(error).max() < POSE_TOLERANCE:
-                return angles
-            J = self.skeleton.chain_jacobian(angles, self.chain)
-            # Cholesky without the checks of SciPy's solvers, for speed.
-            _, weights, failed = dposv(J @ J.T, error)
-            if failed:
-                break
-            step = J.T @ weights
-            angles[self._seven] += step * min(1.0, _LONGEST_STEP / np.abs(step).max())
+        return self.to_poses(angles[None], position[None], rotation[None])[0]
+
+    def to_poses(self, angles: Array, position: Array, rotation: Array) -> Array:
+        """Do so for T postures (T, 18), and poses (T, 3) m and (T, 3, 3)."""
+        found = np.array(angles, dtype=np.float64, order="C")
+        missed = reach_poses(
+            self._path,
+            self._seven,
+            np.array(position, dtype=np.float64),
+            np.array(rotation, dtype=np.float64),
+            POSE_TOLERANCE,
+            _LONGEST_STEP,
+            found,
+        )
+        if missed < 0:
+            return found
+        place = np.round(position[missed], 3)
         raise InvalidInput(
-            f"the {self.side} hand cannot be brought to {np.round(position, 3)} m "
-            "(thorax frame) in the orientation asked for; choose a nearer point."
+            f"the {self.side} hand cannot be brought to {place} m (thorax frame) in "
+            "the orientation asked for; choose a nearer point."
         )
 
 
@@ -145,32 +159,31 @@ def self_motion(
     to the hand pose of the start. It ends before a joint comes near its limit, or at
     the swivels `lowest` and `highest`, rad; `girdle_follow` as in :func:`girdle`.
     """
-    position, rotation = arm.hand(angles)
+    angles = np.array(angles, dtype=np.float64)
     start = angles[arm.columns]
     rest = start[:2] - girdle(start, np.zeros(2), follow=girdle_follow)
-    swivels, postures = [arm.swivel(angles)], [start]
-    for sign in (1.0, -1.0):
-        current, swivel = angles, swivels[0 if sign < 0 else -1]
-        ahead: Array | None = None
-        while lowest < swivel < highest:
-            null = np.append(
-                np.zeros(2),
-                null_space(arm.skeleton.chain_jacobian(current, arm.chain))[0],
+    swivels, postures = [np.array([arm.swivel(angles)])], [start[None]]
+    for sign in (-1.0, 1.0):
+        found = np.empty(_MOST_STEPS), np.empty((_MOST_STEPS, len(arm.columns)))
+        count = follow_self_motion(
+            *arm.swivel_paths,
+            np.array(arm.columns),
+            np.array([arm.lower + _MARGIN, arm.upper - _MARGIN]),
+            arm.hand(angles),
+            sign,
+            (float(lowest), float(highest)),
+            (float(rest[0]), float(rest[1]), float(girdle_follow)),
+            (_STRIDE, POSE_TOLERANCE, _LONGEST_STEP, _LEAST_STEP),
+            angles,
+            *found,
+        )
+        if count < 0:
+            raise InvalidInput(
+                f"the {arm.side} hand cannot be kept where it is while the elbow "
+                "swivels; choose a nearer point."
             )
-            if ahead is None:
-                posture = current[arm.columns]
-                turned = arm.swivel(arm.put(current, posture + 1e-4 * null)) - swivel
-                ahead = null * np.sign(turned) * sign
-            ahead = null * np.sign(null @ ahead)
-            posture = current[arm.columns] + _STRIDE * ahead
-            posture[:2] = girdle(posture, rest, follow=girdle_follow)
-            current = arm.to_pose(arm.put(current, posture), position, rotation)
-            before, swivel = swivel, arm.swivel(current)
-            posture = current[arm.columns]
-            stopped = np.minimum(posture - arm.lower, arm.upper - posture) < _MARGIN
-            if stopped[2:].any() or sign * (swivel - before) < 0.1 * _STRIDE:
-                break
-            end = len(swivels) if sign > 0 else 0
-            swivels.insert(end, swivel)
-            postures.insert(end, posture)
-    return SelfMotion(np.array(swivels), np.array(postures))
+        at = len(swivels) if sign > 0 else 0
+        order = slice(None, None, int(sign))
+        swivels.insert(at, found[0][:count][order])
+        postures.insert(at, found[1][:count][order])
+    return SelfMotion(np.concatenate(swivels), np.concatenate(postures))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ikns._kernels.body.tree import place_joints
+from ikns._kernels.body.simulated_markers import write_markers, write_posture
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.simulation.arm import ArmKinematics, SelfMotion
@@ -49,7 +49,8 @@ class BodyFrames:
         frames, worn = len(drift), arm.skeleton.marker_set
         self.columns = subject.skeleton.marker_set.columns(worn.labels)
         links = np.array([worn.markers[i].link for i in self.columns])
-        self._arm, self._drift = arm, drift
+        self._tree, self._arm_columns = arm.skeleton.tree, np.array(arm.columns)
+        self._drift = np.array(drift, dtype=np.float64)
         self._q = place_in_room(
             still_joints(angles, frames, rate=rate, rng=of_body),
             height=_HEIGHT,
@@ -77,19 +78,26 @@ class BodyFrames:
         if frame >= len(self._drift):
             raise InvalidInput(f"expected {len(self._drift)} frames, found one more.")
         q = self._q[frame].copy()
-        q[7:][self._arm.columns] = row[:9]
-        q[7:][self._arm.columns[2:]] += row[9:51].reshape(7, 6) @ self._drift[frame]
+        write_posture(self._arm_columns, row, self._drift[frame], q)
         return q
 
     def markers(self, frame: int, row: Array) -> Array:
         """Return the markers that the cameras record, (M, 3) m; see :meth:`posture`."""
         q = self.posture(frame, row)
-        place_joints(self._arm.skeleton.tree, q, self._rotation, self._translation)
-        markers = np.einsum("mij,mj->mi", self._rotation[self._joint], self._in_joint)
-        markers += self._translation[self._joint]
-        skin = row[51:].reshape(-1, 3)
-        moved = skin @ self._to_world[frame].T
-        return np.asarray(markers + moved + self._noise[frame])
+        markers = np.empty(self._in_joint.shape)
+        write_markers(
+            self._tree,
+            q,
+            self._joint,
+            self._in_joint,
+            row[51:],
+            self._to_world[frame],
+            self._noise[frame],
+            self._rotation,
+            self._translation,
+            markers,
+        )
+        return markers
 
 
 def arm_rows(
@@ -107,12 +115,10 @@ def arm_rows(
     those of the rest of the body.
     """
     bodies = np.array([arm.put(angles, posture) for posture in motion.postures])
-    inverse = [
-        np.linalg.pinv(arm.skeleton.chain_jacobian(body, arm.chain)).ravel()
-        for body in bodies
-    ]
+    inverse = np.linalg.pinv(arm.skeleton.chain_jacobian(bodies, arm.chain))
     q = np.hstack([np.tile(arm.skeleton.neutral()[:7], (len(bodies), 1)), bodies])
     shift = np.zeros((len(q), len(columns), 3))
     if skin is not None:
         shift = skin.in_world(q, skin.with_posture(q))[:, columns]
-    return np.hstack([motion.postures, inverse, shift.reshape(len(q), -1)])
+    flat = [inverse.reshape(len(q), -1), shift.reshape(len(q), -1)]
+    return np.hstack([motion.postures, *flat])

@@ -198,11 +198,9 @@ def execute_plan(
     tilt += tremor(rng, n, 3, sd=u.tremor_tilt, rate=rate)
     position = plan.position + shift
     rotation = Rotation.from_rotvec(tilt).as_matrix() @ plan.rotation
-    solved = np.array(angles)
-    for i in range(n):
-        body = arm.put(angles[i], plan.postures[i])
-        solved[i] = arm.to_pose(body, position[i], rotation[i])
-    return solved
+    near = np.array(angles)
+    near[:, arm.columns] = plan.postures
+    return arm.to_poses(near, position, rotation)
 
 
 def hand_drift(

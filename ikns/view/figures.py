@@ -8,6 +8,7 @@ InvalidInput.
 from ikns.view.body import arm_points
 from ikns.view.comparison import comparison_figure
 from ikns.view.directions import directions_figure, principal_angle_figure
+from ikns.view.hand_places import hand_places_figure
 from ikns.view.methods import methods_figure
 from ikns.view.residuals import residual_figure
 from ikns.view.signals import control_figure, swivel_figure
@@ -19,6 +20,7 @@ __all__ = [
     "comparison_figure",
     "control_figure",
     "directions_figure",
+    "hand_places_figure",
     "methods_figure",
     "principal_angle_figure",
     "residual_figure",

@@ -1,4 +1,4 @@
-"""The independent servo in a process of its own, on a pseudo-terminal.
+"""The independent servo, or several, in a process of its own on a pseudo-terminal.
 
     python -m independent_servo.process --link PORT --log FILE --control SOCKET
 
@@ -6,7 +6,8 @@ It goes on while the program under test is stopped or killed. What happens to it
 into a file as JSON lines with ``t``, s of CLOCK_MONOTONIC, which all processes share:
 torque, watchdog, goals, writes to the EEPROM, alerts, and the speed of the terminal. A
 socket answers requests, a JSON object per line: its registers, or a fault to begin. It
-ends when its standard input is closed.
+ends when its standard input is closed. Of several servos requests and events have the
+``id``; a fault without one is all servos'.
 """
 
 import argparse
@@ -20,6 +21,7 @@ import sys
 import termios
 import time
 import tty
+from functools import partial
 from pathlib import Path
 from typing import Any, Self, TextIO
 
@@ -43,19 +45,24 @@ SPEEDS = {
 
 
 class Bus:
-    """A pseudo-terminal with one servo behind it."""
+    """A pseudo-terminal with servos behind it."""
 
     def __init__(self, options: argparse.Namespace, log: TextIO) -> None:
         self._log, self._options = log, options
-        self.servo = Servo(
-            options.model,
-            id=options.id,
-            baud=options.baud,
-            clears_profile=options.clears_profile,
-            log=self.note,
-        )
+        several = len(options.id) > 1
+        self.servos = {
+            number: Servo(
+                options.model,
+                id=number,
+                baud=options.baud,
+                clears_profile=options.clears_profile,
+                log=partial(self.note, id=number) if several else self.note,
+            )
+            for number in options.id
+        }
+        self.baud = self.servos[options.id[0]].baud
         self.link = Path(options.link)
-        self.faults = dict.fromkeys(FAULTS, False)
+        self.faults: dict[str, set[int]] = {name: set() for name in FAULTS}
         self._arriving: list[tuple[float, bytes]] = []
         self._leaving: list[tuple[float, bytes]] = []
         self._free = [0.0, 0.0]  # when the line is free again: to and from the servo
@@ -91,7 +98,7 @@ class Bus:
         """When so many bytes have passed that are given to the line now."""
         if not self._options.byte_time:
             return now
-        self._free[way] = max(self._free[way], now) + 10 * count / self.servo.baud
+        self._free[way] = max(self._free[way], now) + 10 * count / self.baud
         return self._free[way]
 
     def read(self) -> None:
@@ -101,27 +108,31 @@ class Bus:
 
     def turn(self) -> float:
         """Do what is due; return how long nothing else is, s."""
-        servo = self.servo
-        servo.pass_time()
+        for servo in self.servos.values():
+            servo.pass_time()
         if self.master >= 0 and (speed := self._terminal()) != self._speed:
             self._speed = speed
             self.note(event="terminal", baud=speed)
         while self._arriving and self._arriving[0][0] <= time.monotonic():
             due, data = self._arriving.pop(0)
-            wrong = abs(self._speed / servo.baud - 1) > TOLERANCE
-            if wrong or self.faults["silence"]:
+            if abs(self._speed / self.baud - 1) > TOLERANCE:
                 continue
-            for delay, answer in servo.hear(data):
-                if not self.faults["mute"]:
-                    self._answer(due + delay + self._options.answer_delay, answer)
+            for number, servo in self.servos.items():
+                if number in self.faults["silence"]:
+                    continue
+                for delay, answer in servo.hear(data):
+                    if number not in self.faults["mute"]:
+                        wrong = number in self.faults["crc"]
+                        late = self._options.answer_delay
+                        self._answer(due + delay + late, answer, wrong=wrong)
         while self._leaving and self._leaving[0][0] <= time.monotonic():
             with contextlib.suppress(BlockingIOError):
                 os.write(self.master, self._leaving.pop(0)[1])
         soonest = [queue[0][0] for queue in (self._arriving, self._leaving) if queue]
         return min([TICK, *(max(due - time.monotonic(), 0.0) for due in soonest)])
 
-    def _answer(self, due: float, answer: bytes) -> None:
-        if self.faults["crc"]:
+    def _answer(self, due: float, answer: bytes, *, wrong: bool) -> None:
+        if wrong:
             answer = answer[:-1] + bytes([answer[-1] ^ 0xFF])
         size = PIECE if self._options.byte_time else len(answer)
         for at in range(0, len(answer), size):
@@ -131,9 +142,13 @@ class Bus:
     def request(self, line: str) -> dict[str, Any]:
         """Do what a test asks for."""
         asked = json.loads(line)
-        what, servo = asked.get("do", "look"), self.servo
+        what, number = asked.get("do", "look"), asked.get("id")
+        servo = next(iter(self.servos.values())) if number is None else None
+        servo = servo or self.servos[number]
         if what in FAULTS:
-            self.faults[what] = asked["on"]
+            whose = set(self.servos) if number is None else {number}
+            self.faults[what] -= whose
+            self.faults[what] |= whose if asked["on"] else set()
             self.note(event=what, on=asked["on"])
         elif what == "power":
             servo.start()
@@ -186,14 +201,14 @@ def serve(options: argparse.Namespace) -> None:
 
 
 class ServoProcess:
-    """Starts the servo, asks it, and ends it; `port` is what a program opens."""
+    """Starts servos, asks them, and ends them; `port` is what a program opens."""
 
     def __init__(
         self,
         folder: Path,
         *,
         model: str = "xl430",
-        id: int = 1,
+        id: int | tuple[int, ...] = 1,
         baud: int = 57600,
         answer_delay: float = 0.0,
         byte_time: bool = False,
@@ -204,7 +219,6 @@ class ServoProcess:
         control = folder / "servo.socket"
         options = {
             "--model": model,
-            "--id": id,
             "--baud": baud,
             "--answer-delay": answer_delay,
             "--link": self.port,
@@ -214,6 +228,7 @@ class ServoProcess:
         words = [str(word) for pair in options.items() for word in pair]
         # Without site-packages: whatever it needs of others it would not find.
         argv = [sys.executable, "-S", "-E", "-m", "independent_servo.process", *words]
+        argv += ["--id", *map(str, id if isinstance(id, tuple) else (id,))]
         argv += ["--byte-time"] * byte_time + ["--clears-profile"] * clears_profile
         self._process = subprocess.Popen(
             argv,
@@ -246,6 +261,10 @@ class ServoProcess:
         found = [json.loads(line) for line in lines]
         return [e for e in found if kind in ("", e["event"])]
 
+    def servo(self, number: int) -> "OneServo":
+        """One of several servos."""
+        return OneServo(self, number)
+
     def close(self) -> None:
         """End it."""
         if hasattr(self, "_socket"):
@@ -264,10 +283,28 @@ class ServoProcess:
         self.close()
 
 
+class OneServo:
+    """One of the servos of a process: its registers and events."""
+
+    def __init__(self, process: ServoProcess, number: int) -> None:
+        self.port, self._process, self._number = process.port, process, number
+
+    def request(self, **asked: Any) -> dict[str, Any]:
+        return self._process.request(**asked, id=self._number)
+
+    def __getitem__(self, name: str) -> int:
+        return int(self.request()["registers"][name])
+
+    def events(self, kind: str = "") -> list[dict[str, Any]]:
+        """What has happened to it, of one kind or all."""
+        found = self._process.events(kind)
+        return [e for e in found if e.get("id", self._number) == self._number]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", choices=list(MODELS), default="xl430")
-    parser.add_argument("--id", type=int, default=1)
+    parser.add_argument("--id", type=int, nargs="+", default=[1])
     parser.add_argument("--baud", type=int, default=57600)
     parser.add_argument("--answer-delay", type=float, default=0.0, metavar="SECONDS")
     parser.add_argument("--byte-time", action="store_true")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from ikns._kernels.body.elbow import write_swivels
 from ikns._kernels.body.paths import Paths, place_frames, write_jacobians
 from ikns._kernels.body.tree import Tree
 from ikns.arrays import Array
@@ -68,25 +70,18 @@ class LinkFrames:
         write_jacobians(self.paths(links, joints), angles, rows, jacobian)
         return jacobian.reshape(*batch, *jacobian.shape[1:])
 
+    @cached_property
+    def elbow_paths(self) -> Paths:
+        """Paths to the right and left shoulder, then the elbows, then the wrists."""
+        ends = ("upper_arm", "forearm", "hand")
+        return self.paths(tuple(f"{side}_{end}" for end in ends for side in SIDES))
+
     def swivel(self, q: ArrayLike) -> Array:
         """Elbow angle about the line from shoulder to wrist, (..., 2) rad."""
-        links = [
-            f"{s}_{link}" for link in ("upper_arm", "forearm", "hand") for s in SIDES
-        ]
-        position = self.place(q, links)[0]
-        position = position.reshape(*position.shape[:-2], 3, len(SIDES), 3)
-        shoulder, elbow, wrist = np.moveaxis(position, -3, 0)
-        lx, ly, lz = np.moveaxis(wrist - shoulder, -1, 0)
-        ex, ey, ez = np.moveaxis(elbow - shoulder, -1, 0)
-        # The downward direction is -Y less its part along the line; the outward one is
-        # its cross product with the line. Both have length hypot(lx, lz) / |line|,
-        # which cancels in the ratio.
-        length = np.sqrt(lx * lx + ly * ly + lz * lz)
-        along = (ex * lx + ey * ly + ez * lz) / length**2
-        down = along * ly - ey
-        outward = (ez * lx - ex * lz) / length * [1.0, -1.0]
-        straight = (down == 0) & (outward == 0)
-        return np.where(straight, np.nan, np.arctan2(outward, down))
+        angles, batch = self._angles(q)
+        swivels = np.empty((len(angles), len(SIDES)))
+        write_swivels(self.elbow_paths, angles, swivels)
+        return swivels.reshape(*batch, len(SIDES))
 
     def _angles(self, q: ArrayLike) -> tuple[Array, tuple[int, ...]]:
         """Joint angles as rows, and the shape of the batch."""

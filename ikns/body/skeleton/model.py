@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -42,8 +43,12 @@ def build_model(urdf: str) -> pin.Model:
         raise FileError(f"the URDF cannot be read: {reason}.") from None
 
 
+@lru_cache(maxsize=8)
 def upper_body_model(urdf: str) -> pin.Model:
-    """Build the model of an upper body; other links and joints are a FileError."""
+    """Build the model of an upper body; other links and joints are a FileError.
+
+    Nobody changes it, so bodies that differ in their markers share it.
+    """
     model = build_model(urdf)
     joints = set(tuple(model.names)[2:])
     bodies = {f.name for f in model.frames if f.type == pin.FrameType.BODY}

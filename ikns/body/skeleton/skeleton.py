@@ -208,9 +208,17 @@ class Skeleton:
         """From the thorax to the right and the left knuckle frame."""
         return self._frames.paths(tuple(f"{side}_knuckle" for side in SIDES))
 
-    def paths(self, links: tuple[str, ...]) -> Paths:
-        """Return the paths from the thorax to links, for a kernel."""
-        return self._frames.paths(links)
+    @property
+    def elbow_paths(self) -> Paths:
+        """From the thorax to the right and left shoulder, elbow and wrist."""
+        return self._frames.elbow_paths
+
+    def paths(self, links: tuple[str, ...], columns: tuple[str, ...] = ()) -> Paths:
+        """Return the paths from the thorax to links, for a kernel.
+
+        `columns` are the joints of a Jacobian's columns.
+        """
+        return self._frames.paths(links, columns)
 
     @cached_property
     def _along(self) -> Array:

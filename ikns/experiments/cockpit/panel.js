@@ -89,6 +89,11 @@ function facts() {
   if (source.finger !== "") add("finger", "Finger", String, (finger) => (finger.startsWith("stopped") ? "bad" : ""));
   add("flexion", "Flexion commanded", (value) => number(value, 2));
   add("measured", "Flexion measured", (value) => number(value, 2));
+  for (const key of Object.keys(source).filter((name) => /^(c|flexion|measured)_\d+$/.test(name))) {
+    const [what, dof] = key.split("_");
+    const words = { c: "c", flexion: "Flexion commanded", measured: "Flexion measured" };
+    add(key, `${words[what]}, finger ${dof}`, (value) => number(value, 2));
+  }
   add("rate", "Frames", (value) => number(value, 0, " /s"));
   add("latency", "Receipt to command, p99", (value) => milli(value, 2, " ms"));
   add("misses", "Late frames", String, (count) => (count ? "" : "good"));

@@ -13,7 +13,7 @@ from ikns.calibration.subject import Subject
 from ikns.errors import IknsError
 from ikns.experiments.conduct.inputs import Sample, SampleQueue
 from ikns.experiments.conduct.measured import recent_values
-from ikns.finger import Finger
+from ikns.finger import Finger, FingerGroup
 from ikns.live.control.controller import Decision
 from ikns.live.control.settings import ControlSettings
 from ikns.live.runtime import LoopStatus, Report, run
@@ -35,7 +35,8 @@ class LiveDriver:
 
     Parameters
     ----------
-    finger : Finger or None
+    finger : Finger, FingerGroup or None
+        Of several, the first one's signal is what the experiment reads.
     writer : RunWriter or None
         Session, which events are written to as well.
     smooth : bool
@@ -54,7 +55,7 @@ class LiveDriver:
 
     def __init__(
         self,
-        finger: Finger | None,
+        finger: Finger | FingerGroup | None,
         writer: RunWriter | None,
         *,
         smooth: bool = False,
@@ -66,6 +67,7 @@ class LiveDriver:
         self._on_status = on_status
         self._samples = SampleQueue()
         self._status: LoopStatus | None = None
+        self._signal = 0  # which freedom the experiment reads
         self._finger_state = self._stopped = ""
         self._status_at = self._frame_at = self._finger_at = math.nan
         self._start = math.nan
@@ -84,6 +86,7 @@ class LiveDriver:
         realtime: bool = False,
     ) -> None:
         """Start the loop."""
+        self._signal = settings.dofs[0] - 1
 
         def loop() -> None:
             try:
@@ -150,6 +153,10 @@ class LiveDriver:
             "latency": status.latency,
             "misses": status.misses,
         }
+        for axis in status.axes[1:]:
+            loop[f"c_{axis.dof}"] = axis.c
+            loop[f"flexion_{axis.dof}"] = axis.flexion
+            loop[f"measured_{axis.dof}"] = axis.measured
         finger = {"finger": self._finger_state, "measured": status.measured}
         pose = {
             "residual": status.residual,
@@ -178,7 +185,7 @@ class LiveDriver:
         self, received: float, flexion: float, decision: Decision
     ) -> None:
         self._frame_at = received
-        c = flexion if self._smooth else float(decision.solved.c[0])
+        c = flexion if self._smooth else float(decision.solved.c[self._signal])
         self._samples.put(Sample(received, c if decision.valid else math.nan))
 
     def _take_status(self, status: LoopStatus) -> None:
@@ -209,7 +216,7 @@ def live_driver(
     open_source: Callable[[], AbstractContextManager[Source]],
     subject: Subject,
     *,
-    finger: Callable[[], Finger] | None = None,
+    finger: Callable[[], Finger | FingerGroup] | None = None,
     open_session: Callable[[Source], AbstractContextManager[RunWriter]] | None = None,
     settings: ControlSettings | None = None,
     smooth: bool = False,
@@ -225,7 +232,7 @@ def live_driver(
         Opens the source of marker frames.
     subject : Subject
     finger : callable, optional
-        Makes the finger; without it nothing moves.
+        Makes the finger, or several; without it nothing moves.
     open_session : callable, optional
         Opens the next run of a session for a source.
     settings : ControlSettings, optional

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, Literal
 
@@ -211,7 +212,7 @@ def virtual_pick(
         Grasp(solid, rate=rate, side=side, **model),
         person,
         drive,
-        lambda s: (_in_world(route.hand(s) - route.start), route.turn(s)),
+        _way(route),
         drift=np.hstack([_in_world(drift[:, :3]), _in_world(drift[:, 3:])]),
         limit=step.limit,
     )
@@ -239,6 +240,16 @@ class _ByIdentity:
 @lru_cache(maxsize=8)
 def _route(key: _ByIdentity, height: float) -> Route:
     return hand_route(key.participant, height=height)
+
+
+def _way(route: Route) -> Callable[[float], tuple[Array, float]]:
+    """Return shift and turn of the hand by its position on the route."""
+
+    @lru_cache(maxsize=1)  # it stays where it is in most frames
+    def way(s: float) -> tuple[Array, float]:
+        return _in_world(route.hand(s) - route.start), route.turn(s)
+
+    return way
 
 
 def _in_world(v: Array) -> Array:

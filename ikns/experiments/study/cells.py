@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import platform
 import tempfile
+import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,6 +19,7 @@ from ikns.experiments.picking.schedule import PickStep
 from ikns.experiments.study.declaration import Study
 from ikns.experiments.study.design import Parameters, PickingDesign, TrackingDesign
 from ikns.experiments.study.people import study_participant
+from ikns.experiments.study.versions import library_versions
 from ikns.experiments.tracking.profiles import draw_profile
 from ikns.experiments.tracking.schedule import TrackingStep
 from ikns.experiments.tracking.virtual import virtual_step
@@ -75,12 +75,16 @@ class SimulatedVisit:
     others : dict of str to bytes
         Other files, by their names in the folder: the subject of the first participant,
         for the report.
+    seconds : dict of str to float
+        How long it took to draw and calibrate the "person", in the first visit of a
+        task, and to simulate the experiment, by its name. Not written.
     """
 
     name: str
     about: dict[str, Any]
     attempts: bytes
     others: dict[str, bytes] = field(default_factory=dict, repr=False)
+    seconds: dict[str, float] = field(default_factory=dict, compare=False)
 
 
 def visit_name(experiment: str, number: int, variation: str = "") -> str:
@@ -101,15 +105,11 @@ def check_libraries(study: Study) -> None:
     InvalidInput
         When one is missing.
     """
-    needed = {"pyarrow": "visits are written"}
-    if study.picking is not None:
-        needed["mujoco"] = "picking is simulated"
-    for name, what in needed.items():
-        if find_spec(name) is None:
-            raise InvalidInput(
-                f"{what} with {name}, found none; install it with pip install "
-                "'ikns[study]'."
-            )
+    if study.picking is not None and find_spec("mujoco") is None:
+        raise InvalidInput(
+            "picking is simulated with mujoco, found none; install it with pip install "
+            "'ikns[study]'."
+        )
 
 
 def simulate(task: Task) -> list[SimulatedVisit]:
@@ -120,13 +120,20 @@ def simulate(task: Task) -> list[SimulatedVisit]:
     """
     study, parameters = task.study, task.study.parameters_of(task.variation)
     check_libraries(study)  # a worker on another machine may lack one
-    person, fault = None, ""
+    person, fault, began = None, "", time.perf_counter()
     try:
-        person = study_participant(task.number, seed=study.seed, parameters=parameters)
+        person = study_participant(
+            task.number,
+            seed=study.seed,
+            parameters=parameters,
+            other_methods=task.number == 0,  # whose subject is saved
+        )
     except _FAULTS as error:
         fault = str(error)
     visits = []
+    seconds = {"person": time.perf_counter() - began}
     for experiment in task.experiments:
+        began = time.perf_counter()
         rows: list[dict[str, Any]] = []
         reason = fault
         try:
@@ -140,7 +147,9 @@ def simulate(task: Task) -> list[SimulatedVisit]:
         if person is not None and task.number == 0:
             others = _subject_files(person.subject)
         attempts = table_bytes(experiment, rows)
-        visits.append(SimulatedVisit(name, about, attempts, others))
+        seconds[experiment] = time.perf_counter() - began
+        visits.append(SimulatedVisit(name, about, attempts, others, seconds))
+        seconds = {}
     return visits
 
 
@@ -240,7 +249,7 @@ def _about(
         "training": "counted in practised, not simulated",
         "session": None,
         "subject": {},
-        "versions": _versions(experiment),
+        "versions": library_versions(picking=experiment == "picking"),
         "redrawn": 0,
         "reason": reason,
     }
@@ -256,9 +265,3 @@ def _about(
             },
         }
     return about
-
-
-def _versions(experiment: str) -> dict[str, str]:
-    names = ["ikns", "numpy", "scipy", "numba", "pin"]
-    names += ["mujoco"] if experiment == "picking" else []
-    return {"python": platform.python_version()} | {n: version(n) for n in names}

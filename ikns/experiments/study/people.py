@@ -18,8 +18,12 @@ from ikns.simulation.protocol import Protocol
 _OF_CALIBRATION = ("max_hand_speed", "layout", "outside", "interpolation")
 
 
-def study_participant(number: int, *, seed: int, parameters: Parameters) -> Participant:
+def study_participant(
+    number: int, *, seed: int, parameters: Parameters, other_methods: bool = True
+) -> Participant:
     """Draw a participant and calibrate it with the parameters.
+
+    Without `other_methods` only the paper's map is learned, which the experiments use.
 
     The same number and seed give the same body, ability, habits and noise for all
     parameters, with one exception: where the number of points decides whether a person
@@ -42,6 +46,7 @@ def study_participant(number: int, *, seed: int, parameters: Parameters) -> Part
         marker_noise=parameters.marker_noise,
         occluded=parameters.occluded,
         rate=parameters.rate,
+        other_methods=other_methods,
     )
     return recalibrated(person, parameters)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 from ikns.errors import FileError, InvalidInput
 from ikns.experiments.study.cells import Task, visit_name
 from ikns.experiments.study.declaration import FILE, Study
-from ikns.experiments.visits import EXPERIMENTS, has_attempts, list_visits
+from ikns.experiments.visits import EXPERIMENTS, list_visits
 from ikns.output.file import write_text
 from ikns.output.lock import hold_lock
 
@@ -62,6 +63,12 @@ def save_declaration(folder: Path, study: Study) -> None:
     write_text(place, json.dumps(kept, indent=1) + "\n")
 
 
+def restore_declaration(folder: Path, study: Study) -> None:
+    """Save the declaration again if there are results, and it is gone."""
+    if list_visits(folder) and not (folder / "visits" / _DECLARED).exists():
+        save_declaration(folder, study)
+
+
 @contextmanager
 def run_lock(folder: Path) -> Iterator[None]:
     """Hold the lock of a study; that of a killed run is taken over.
@@ -79,46 +86,47 @@ def run_lock(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise FileError(f"{visits}: cannot be made: {error.strerror}.") from None
     with hold_lock(visits / _LOCK, "to run a study"):
+        for left in visits.glob(f".{_DECLARED}.*.part"):  # by a run that was killed
+            left.unlink(missing_ok=True)
         yield
 
 
+def visit_names(study: Study, *, participants: int) -> Iterator[str]:
+    """Yield the names of all visits of the first participants."""
+    for number in range(participants):
+        for variation in ("", *study.variations):
+            for experiment in study.designs:
+                yield visit_name(experiment, number, variation)
+
+
 def missing_tasks(folder: Path, study: Study, *, participants: int) -> Iterator[Task]:
-    """Yield the missing visits, participant by participant.
+    """Yield the missing visits: the first task of each kind, then the others.
 
-    Lazily: each visit is looked for when its turn comes.
-
-    Raises
-    ------
-    FileError
-        When a visit's folder exists without its ``visit.json`` or any attempts.
+    Tasks of one kind have the same variation and experiments. So the first results tell
+    what everything costs. Lazily: a visit is looked for when its turn comes.
     """
-    for variation in ("", *study.variations):
-        for number in range(participants):
+    first: dict[tuple[str, tuple[str, ...]], Task] = {}
+    for task in _missing(folder, study, participants):
+        first.setdefault((task.variation, task.experiments), task)
+    yield from first.values()
+    begun = {(task.number, task.variation) for task in first.values()}
+    for task in _missing(folder, study, participants):
+        if (task.number, task.variation) not in begun:
+            yield task
+
+
+def _missing(folder: Path, study: Study, participants: int) -> Iterator[Task]:
+    for number in range(participants):
+        for variation in ("", *study.variations):
             missing = tuple(
                 experiment
                 for experiment in study.designs
-                if not _done(
+                if not os.path.lexists(
                     folder / "visits" / visit_name(experiment, number, variation)
                 )
             )
             if missing:
                 yield Task(study, number, variation, missing)
-
-
-def _done(visit: Path) -> bool:
-    if not visit.exists():
-        return False
-    if not (visit / "visit.json").is_file():
-        raise FileError(
-            f"{visit}: expected a visit with visit.json, found none; move the folder "
-            "away."
-        )
-    if not has_attempts(visit):
-        raise FileError(
-            f"{visit}: expected a visit with attempts, found none; move the folder "
-            "away."
-        )
-    return True
 
 
 def _saved_declaration(folder: Path) -> dict[str, Any] | None:
@@ -133,7 +141,10 @@ def _saved_declaration(folder: Path) -> dict[str, Any] | None:
     except OSError as error:
         raise FileError(f"{place}: cannot be read: {error.strerror}.") from None
     except (ValueError, LookupError, TypeError):
-        raise FileError(f"{place}: cannot be read as a declaration.") from None
+        raise FileError(
+            f"{place}: cannot be read as the declaration from before the first result; "
+            f"delete it if {FILE} has not been changed since."
+        ) from None
     return dict(table)
 
 

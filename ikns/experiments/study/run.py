@@ -4,21 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ikns.errors import InvalidInput
-from ikns.experiments.study.cells import check_libraries, simulate
+from ikns.experiments.study.cells import (
+    SimulatedVisit,
+    Task,
+    check_libraries,
+    simulate,
+)
+from ikns.experiments.study.damage import set_damaged_aside
 from ikns.experiments.study.declaration import FILE, read_study
 from ikns.experiments.study.results import (
     check_declaration,
     missing_tasks,
+    restore_declaration,
     run_lock,
     save_declaration,
 )
+from ikns.experiments.study.time_left import Kind, TimeLeft
 from ikns.experiments.study.workers import compute, processes
 from ikns.experiments.visits import write_visit
 from ikns.live.warm_up import compiled_before, warm_up
+
+#: Longest time to wait for workers, s.
+_DAY = 86400.0
 
 
 @dataclass(frozen=True)
@@ -35,6 +46,9 @@ class StudyRun:
         Why visits of this run have no attempts, by folder.
     seconds : float
         Duration of the run.
+    damaged : dict of str to str
+        What was wrong with visits that were found damaged and simulated again, by
+        folder. What was left of each is beside it, as ``.sub-01_tracking.damaged``.
     """
 
     cells: int
@@ -42,6 +56,7 @@ class StudyRun:
     simulated: int
     failed: dict[str, str]
     seconds: float
+    damaged: dict[str, str] = field(default_factory=dict)
 
 
 def run_study(
@@ -49,14 +64,17 @@ def run_study(
     *,
     n_jobs: int = -1,
     scheduler: str | None = None,
+    worker_timeout: float = 60.0,
     on_progress: Callable[[str, int, int], None] | None = None,
+    on_time_left: Callable[[TimeLeft], None] | None = None,
     participants: int | None = None,
 ) -> StudyRun:
     """Simulate the missing visits of a study.
 
     A run that was killed at any time continues where it stopped: each visit is there
-    whole or not at all. The same study gives the same bits, independent of workers and
-    order. Memory does not grow with the cohort.
+    whole or not at all. Visits that were damaged since (files cut off, changed, empty
+    or gone) are renamed and simulated again. The same study gives the same bits,
+    independent of workers and order. Memory does not grow with the cohort.
 
     Parameters
     ----------
@@ -66,21 +84,27 @@ def run_study(
         Processes, as in joblib: -1 is one for each core.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers are used instead; they need only this
-        package.
+        package. The tasks of a worker that dies are given to another one.
+    worker_timeout : float
+        Longest time that the scheduler may be without any worker, s.
     on_progress : callable, optional
-        Called with ("simulating", visits done, visits in total).
+        Called with (step, visits done, visits in total); the steps are "checking", for
+        visits that are there, and "simulating".
+    on_time_left : callable, optional
+        Called once, with what tells at any time how long the rest takes.
     participants : int, optional
         Simulate only the first ones. Default: all.
 
     Raises
     ------
     FileError
-        When the study file is missing, or a visit is damaged.
+        When the study file is missing, or its saved copy or a file is unreadable.
     InvalidInput
         When the study is of people, changed since the first result, or is running
         already, or a library is missing.
     StreamError
-        When the scheduler does not answer or a worker dies.
+        When the scheduler does not answer or has no workers, a process dies, or several
+        workers do with the same participant.
     """
     top, began = Path(folder), time.perf_counter()
     study = read_study(top)
@@ -93,6 +117,10 @@ def run_study(
     most = study.participants
     if participants is not None and not 1 <= participants <= most:
         raise InvalidInput(f"expected 1 to {most} participants, found {participants}.")
+    if not 1.0 <= worker_timeout <= _DAY:
+        raise InvalidInput(
+            f"expected a worker timeout of 1 to {_DAY:g} s, found {worker_timeout:g}."
+        )
     processes(n_jobs)  # checked before anything is written
     people = participants or most
     cells = people * len(study.designs) * (1 + len(study.variations))
@@ -103,18 +131,23 @@ def run_study(
         warm_up(on_progress)  # once, instead of in every worker
     with run_lock(top):
         check_declaration(top, study)
-        left = sum(
-            len(task.experiments)
-            for task in missing_tasks(top, study, participants=people)
+        restore_declaration(top, study)
+        found, damaged = set_damaged_aside(
+            top, study, participants=people, report=report
         )
-        found = cells - left
+        left = TimeLeft(map(_kind, missing_tasks(top, study, participants=people)))
+        if on_time_left is not None:
+            on_time_left(left)
         report("simulating", found, cells)
         for finished in compute(
             simulate,
             missing_tasks(top, study, participants=people),
             n_jobs=n_jobs,
             scheduler=scheduler,
+            worker_timeout=worker_timeout,
+            on_workers=left.take_workers,
         ):
+            left.done(_kind_of_visits(finished), _seconds(finished))
             if not done:
                 save_declaration(top, study)
             for visit in finished:
@@ -124,4 +157,18 @@ def run_study(
                 if visit.about["reason"]:
                     failed[visit.name] = visit.about["reason"]
                 report("simulating", found + done, cells)
-    return StudyRun(cells, found, done, failed, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return StudyRun(cells, found, done, failed, seconds, damaged)
+
+
+def _kind(task: Task) -> Kind:
+    return task.variation, ("person", *task.experiments)
+
+
+def _kind_of_visits(visits: list[SimulatedVisit]) -> Kind:
+    experiments = (str(visit.about["experiment"]) for visit in visits)
+    return str(visits[0].about["variation"]), ("person", *experiments)
+
+
+def _seconds(visits: list[SimulatedVisit]) -> dict[str, float]:
+    return {part: took for visit in visits for part, took in visit.seconds.items()}

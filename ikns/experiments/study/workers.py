@@ -10,22 +10,20 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError
-from itertools import islice
-from typing import Any, TypeVar
+from concurrent.futures import BrokenExecutor
+from typing import TypeVar
 
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from ikns.errors import InvalidInput, StreamError
+from ikns.experiments.study.cluster import compute_on_cluster
+from ikns.experiments.study.single_thread import RESUMES, single_threaded
 
 T = TypeVar("T")
 R = TypeVar("R")
 
-#: A scheduler must answer within this time, s.
-_CONNECT_TIMEOUT = 10.0
 #: How often a worker checks that the run is alive, s.
 _POLL_INTERVAL = 0.5
-_RESUMES = "finished visits are kept, and the same command continues from there"
 
 
 def compute(
@@ -34,6 +32,8 @@ def compute(
     *,
     n_jobs: int = -1,
     scheduler: str | None = None,
+    worker_timeout: float = 60.0,
+    on_workers: Callable[[int], None] = lambda n: None,
 ) -> Iterator[R]:
     """Yield results as they finish, in any order.
 
@@ -48,17 +48,29 @@ def compute(
         Processes; as in joblib, -1 is one per core. 1 is this process.
     scheduler : str, optional
         Address of a Dask scheduler to use instead, such as ``tcp://10.0.0.1:8786``.
+    worker_timeout : float
+        Longest time that the Dask scheduler may be without any worker, s.
+    on_workers : callable
+        Called with the number of workers, again when it changes.
 
     Raises
     ------
     InvalidInput
         Without workers, or without Dask.
     StreamError
-        When the scheduler does not answer, or a worker dies.
+        When the scheduler does not answer or has no workers, a process dies, or several
+        workers do with one task.
     """
     if scheduler is not None:
-        return _on_cluster(work, tasks, scheduler)
+        return compute_on_cluster(
+            work,
+            tasks,
+            scheduler,
+            worker_timeout=worker_timeout,
+            on_workers=on_workers,
+        )
     n = processes(n_jobs)
+    on_workers(n)
     if n == 1:
         return _in_this_process(work, tasks)
     return _in_processes(work, tasks, n)
@@ -93,54 +105,14 @@ def _in_processes(work: Callable[[T], R], tasks: Iterable[T], n: int) -> Iterato
     try:
         with parallel_config("loky", n_jobs=n, inner_max_num_threads=1, **begin):
             yield from Parallel(return_as="generator_unordered", batch_size=1)(
-                delayed(_single_threaded)(work, task) for task in tasks
+                delayed(single_threaded)(work, task) for task in tasks
             )
     except BrokenExecutor:
         raise StreamError(
-            f"a worker process died, perhaps out of memory; {_RESUMES}."
+            f"a worker process died, perhaps out of memory; {RESUMES}."
         ) from None
     finally:
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
-
-
-def _on_cluster(
-    work: Callable[[T], R], tasks: Iterable[T], scheduler: str
-) -> Iterator[R]:
-    try:
-        from distributed import Client, KilledWorker, as_completed
-    except ImportError:
-        raise InvalidInput(
-            "a cluster is reached with Dask, found none; install it with "
-            "pip install 'ikns[cluster]'."
-        ) from None
-    try:
-        client = Client(scheduler, timeout=_CONNECT_TIMEOUT)
-    except (OSError, ValueError) as error:
-        raise StreamError(
-            f"{scheduler}: no Dask scheduler answers ({_first_line(error)})."
-        ) from None
-    with client:
-        threads = sum(client.nthreads().values())
-        if not threads:
-            raise StreamError(f"{scheduler}: the Dask scheduler has no workers.")
-        waiting = iter(tasks)
-
-        def submit(task: T) -> Any:
-            return client.submit(_single_threaded, work, task, pure=False)
-
-        running = as_completed([submit(t) for t in islice(waiting, 2 * threads)])
-        for future in running:
-            try:
-                result = future.result()
-            except (KilledWorker, CancelledError, OSError) as error:
-                raise StreamError(
-                    f"{scheduler}: the Dask cluster failed ({_first_line(error)}); "
-                    f"{_RESUMES}."
-                ) from None
-            future.release()
-            for task in islice(waiting, 1):
-                running.add(submit(task))
-            yield result
 
 
 def _exit_with_parent(parent: int) -> None:
@@ -156,13 +128,3 @@ def _exit_with_parent(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def _single_threaded(work: Callable[[T], R], task: T) -> R:
-    """Run a task in a worker; the thread limit may stay, as the worker is ours."""
-    threadpool_limits(limits=1)
-    return work(task)
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error) or type(error).__name__).splitlines()[0].rstrip(".")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -133,19 +134,32 @@ class TrackingTrial:
 
         A sample that is not later than the last one is not recorded.
         """
-        before = self._rows[-1][0] if self._rows else -math.inf
-        running = self.state in ("align", "track")
-        view = self.update(now)
-        if not running or view.time > self.profile.seconds + _ROUNDING:
-            return view
-        if math.isfinite(c):
-            self._y = 100.0 * min(max(c, 0.0), 1.0)
-        if view.time > before:
-            self._rows.append((view.time, float(c)))
-        return view._replace(y=self._y)
+        self._take(now, c)
+        return self._view()
+
+    def add_samples(self, times: Iterable[float], c: Iterable[float]) -> None:
+        """Take many samples, for which nobody looks at the screen."""
+        for now, each in zip(times, c, strict=True):
+            self._take(now, each)
 
     def update(self, now: float) -> TrackingView:
         """Let time pass without a sample."""
+        self._advance(now)
+        return self._view()
+
+    def _take(self, now: float, c: float) -> None:
+        before = self._rows[-1][0] if self._rows else -math.inf
+        running = self.state in ("align", "track")
+        time = self._advance(now)
+        if not running or time > self.profile.seconds + _ROUNDING:
+            return
+        if math.isfinite(c):
+            self._y = 100.0 * min(max(c, 0.0), 1.0)
+        if time > before:
+            self._rows.append((time, float(c)))
+
+    def _advance(self, now: float) -> float:
+        """Let time pass; return the time since the profile began, s."""
         if now > self._now and self.state in ("align", "track"):
             self._now = now
             time = now - self._zero
@@ -153,6 +167,9 @@ class TrackingTrial:
                 self.state = "done"
             elif time >= 0:
                 self.state = "track"
+        return self._now - self._zero if self.state != "waiting" else -self.align
+
+    def _view(self) -> TrackingView:
         time = self._now - self._zero if self.state != "waiting" else -self.align
         seconds = self.profile.seconds
         return TrackingView(

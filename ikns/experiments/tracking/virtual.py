@@ -52,8 +52,7 @@ def virtual_trial(
     )
     trial = TrackingTrial(profile, align=align)
     trial.start(float(done.time[0]))
-    for time, c in zip(done.time.tolist(), done.c.tolist(), strict=True):
-        trial.add_sample(time, c)
+    trial.add_samples(done.time.tolist(), done.c.tolist())
     return trial.record
 
 

@@ -5,6 +5,7 @@ A visit is a folder ``visits/[<variation>/]sub-<NN>_<experiment>`` of a study::
     visit.json             participant, design, simulated or not, versions
     attempt-0001.parquet   one row: an attempt of a person, written when it ends
     attempts.parquet       or all rows at once: a virtual participant
+    sums.sha256            then also checksums, for `sha256sum --check`
 
 Attempts are numbered from 1 in the order in which they were made. None is ever removed;
 repeating one adds another. Times are in s, c from 0 to 1. Reading and writing needs

@@ -130,12 +130,8 @@ def _floats(pa: Any, schema: Any) -> list[str]:
 
 
 def _arrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as parquet
-    except ImportError:
-        raise InvalidInput(
-            "visits are read and written with pyarrow, found none; install it with "
-            "pip install 'ikns[study]'."
-        ) from None
+    """Return both modules, imported by the first visit: a tenth of a second."""
+    import pyarrow as pa
+    import pyarrow.parquet as parquet
+
     return pa, parquet

@@ -9,6 +9,7 @@ from typing import Any
 from ikns.errors import FileError
 from ikns.experiments.visits.header import HEADER, read_header
 from ikns.experiments.visits.parquet import read_rows
+from ikns.experiments.visits.sums import check_sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,11 @@ def read_visit(folder: str | Path, *, experiment: str | None = None) -> VisitRec
     found = about["experiment"]
     if experiment is not None and found != experiment:
         raise FileError(f"{path}: expected a visit of {experiment}, found {found}.")
+    try:
+        check_sums(path)
+    except FileError as error:
+        reason = str(error).rstrip(".")
+        raise FileError(f"{reason}; ikns study run simulates it again.") from None
     attempts = [row for file in _attempt_files(path) for row in read_rows(file, found)]
     attempts.sort(key=lambda row: row["number"])
     for expected, row in enumerate(attempts, start=1):

@@ -12,6 +12,7 @@ from ikns.errors import FileError, InvalidInput
 from ikns.experiments.visits.header import FORMAT, HEADER, header_fault, read_header
 from ikns.experiments.visits.lock import LOCK
 from ikns.experiments.visits.parquet import table_bytes
+from ikns.experiments.visits.sums import SUMS, sums_bytes
 from ikns.output.file import create_bytes, sync
 
 _ALL_ATTEMPTS = "attempts.parquet"
@@ -38,16 +39,7 @@ def create_visit(folder: str | Path, about: Mapping[str, Any]) -> Path:
         When it cannot be written.
     """
     path = Path(folder)
-    table = {"format": FORMAT} | dict(about) | {"format": FORMAT}
-    fault = header_fault(table)
-    if fault:
-        raise InvalidInput(f"{path}: {fault}.")
-    try:
-        text = json.dumps(table, indent=1, allow_nan=False) + "\n"
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(
-            f"{path}: expected text, numbers and lists in {HEADER} ({error})."
-        ) from None
+    header = _header_bytes(path, about)
     if path.exists() and not path.is_dir():
         raise InvalidInput(f"{path}: expected the name of a folder, found a file.")
     held = [p.name for p in path.iterdir()] if path.exists() else []
@@ -61,7 +53,7 @@ def create_visit(folder: str | Path, about: Mapping[str, Any]) -> Path:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"{path}: cannot be made: {error.strerror}.") from None
-    _write(path / HEADER, text.encode())
+    _write(path / HEADER, header)
     return path
 
 
@@ -110,6 +102,8 @@ def write_visit(
 ) -> Path:
     """Write a finished visit: the folder appears whole or not at all.
 
+    With it goes ``sums.sha256``, by which damage is noticed later.
+
     Parameters
     ----------
     folder : str or Path
@@ -135,8 +129,9 @@ def write_visit(
     part = path.with_name(f".{path.name}{_PART}")
     shutil.rmtree(part, ignore_errors=True)
     create_visit(part, about)
-    _write(part / _ALL_ATTEMPTS, attempts)
-    for name, content in (others or {}).items():
+    files = {_ALL_ATTEMPTS: attempts} | dict(others or {})
+    sums = sums_bytes({HEADER: _header_bytes(path, about)} | files)
+    for name, content in (files | {SUMS: sums}).items():
         (part / name).parent.mkdir(exist_ok=True)
         _write(part / name, content)
     try:
@@ -145,6 +140,19 @@ def write_visit(
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
     return path
+
+
+def _header_bytes(visit: Path, about: Mapping[str, Any]) -> bytes:
+    table = {"format": FORMAT} | dict(about) | {"format": FORMAT}
+    fault = header_fault(table)
+    if fault:
+        raise InvalidInput(f"{visit}: {fault}.")
+    try:
+        return (json.dumps(table, indent=1, allow_nan=False) + "\n").encode()
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(
+            f"{visit}: expected text, numbers and lists in {HEADER} ({error})."
+        ) from None
 
 
 def _write(path: Path, content: bytes) -> Path:

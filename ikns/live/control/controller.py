@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.errors import InvalidInput
 from ikns.live.control.frame import ControlFrame, FrameSolver
 from ikns.live.control.rejection import (
     NONE_EXCHANGED,
@@ -42,11 +43,14 @@ class Decision(NamedTuple):
     rejection : str
         Why the frame is rejected, in words; empty if it is valid.
     flexion : float
-        Commanded flexion, 0 to 1; NaN before the first valid pose.
+        Commanded flexion, 0 to 1; NaN before the first valid pose. Of the first of
+        several fingers.
     state : str
         State of the safety machine after the frame.
     changes : tuple of Transition
         State changes caused by the frame.
+    flexions : tuple of d float
+        Commanded flexion by freedom of the map; NaN where a freedom drives nothing.
     """
 
     solved: ControlFrame
@@ -54,6 +58,7 @@ class Decision(NamedTuple):
     flexion: float
     state: State
     changes: Changes
+    flexions: tuple[float, ...]
 
     @property
     def valid(self) -> bool:
@@ -62,22 +67,30 @@ class Decision(NamedTuple):
 
 
 class Controller:
-    """Turns markers into a commanded flexion, frame by frame.
+    """Turns markers into commanded flexions, frame by frame.
 
     Parameters
     ----------
     solver : FrameSolver
-        Finds pose and control signal; the first degree of freedom drives the finger.
+        Finds pose and control signals.
     settings : ControlSettings, optional
+        Its `dofs` say which signals drive a finger.
 
     Attributes
     ----------
     machine : SafetyMachine
-        Armed, activated and stopped by the caller.
+        Armed, activated and stopped by the caller; one for all fingers.
     flexion : float
-        Commanded flexion.
+        Commanded flexion of the first finger.
+    flexions : list of d float
+        Commanded flexion by freedom of the map; NaN where a freedom drives nothing.
     smoothing_delay : float
-        Delay of the smoothed control signal at the last frame, s.
+        Delay of the first smoothed control signal at the last frame, s.
+
+    Raises
+    ------
+    InvalidInput
+        When the map lacks one of the freedoms.
     """
 
     def __init__(
@@ -86,8 +99,16 @@ class Controller:
         self.solver = solver
         self.settings = s = ControlSettings() if settings is None else settings
         self.machine = SafetyMachine(hold_after=s.hold_after, safe_after=s.safe_after)
-        self.flexion = math.nan
-        self._smooth = OneEuro(cutoff=s.cutoff, beta=s.beta)
+        n_dof = solver.null_space_map.directions_.shape[1]
+        if max(s.dofs) > n_dof:
+            raise InvalidInput(
+                f"expected dofs up to the map's {n_dof}, found {max(s.dofs)}."
+            )
+        self.flexions = [math.nan] * n_dof
+        self._first = s.dofs[0] - 1
+        self._axes = [
+            (dof - 1, OneEuro(cutoff=s.cutoff, beta=s.beta)) for dof in s.dofs
+        ]
         self._speed = OneEuro(cutoff=_SPEED_CUTOFF, beta=0.0)
         self._device_time = -math.inf
         self._hand = (math.nan,) * 3
@@ -98,9 +119,14 @@ class Controller:
         self._counted: tuple[float, NDArray[np.float64] | None] = (-math.inf, None)
 
     @property
+    def flexion(self) -> float:
+        """Commanded flexion of the first finger."""
+        return self.flexions[self._first]
+
+    @property
     def smoothing_delay(self) -> float:
-        """Delay of the smoothed control signal at the last frame, s."""
-        return self._smooth.delay
+        """Delay of the first smoothed control signal at the last frame, s."""
+        return self._axes[0][1].delay
 
     def frame(
         self, markers: NDArray[np.float64], device_time: float, receive_time: float
@@ -148,23 +174,34 @@ class Controller:
             changes = machine.pose(receive_time, self._why)
             self._why = _SILENCE
             self._counted = receive_time, solved.q
-            self._follow(float(solved.c[0]), solved.hand_in_thorax, dt)
-        return Decision(solved, rejection, self.flexion, machine.state, changes)
+            self._follow(solved.c.tolist(), solved.hand_in_thorax, dt)
+        flexions = tuple(self.flexions)
+        return Decision(
+            solved,
+            rejection,
+            flexions[self._first],
+            machine.state,
+            changes,
+            flexions,
+        )
 
     def check(self, now: float) -> Changes:
         """Check the watchdog while no frame comes."""
         return self.machine.check(now, self._why)
 
-    def _follow(self, c: float, hand: NDArray[np.float64], dt: float) -> None:
+    def _follow(self, c: list[float], hand: NDArray[np.float64], dt: float) -> None:
         place = tuple(hand.tolist())
         step = math.dist(place, self._hand)
         speed = self._speed.step(step / dt if math.isfinite(dt) else math.nan, dt)
         self._hand = place
-        wanted = min(max(self._smooth.step(c, dt), 0.0), 1.0)
-        if math.isnan(self.flexion):
-            self.flexion = wanted
-        held = self.settings.hold_speed
-        if self.machine.state in ("holding", "safe") or (held and speed > held):
-            return
-        if abs(wanted - self.flexion) > self.settings.dead_band or wanted in (0.0, 1.0):
-            self.flexion = wanted
+        settings, flexions = self.settings, self.flexions
+        limit = settings.hold_speed
+        held = self.machine.state in ("holding", "safe") or (limit and speed > limit)
+        for k, smooth in self._axes:
+            wanted = min(max(smooth.step(c[k], dt), 0.0), 1.0)
+            now = flexions[k]
+            if math.isnan(now) or (
+                not held
+                and (abs(wanted - now) > settings.dead_band or wanted in (0.0, 1.0))
+            ):
+                flexions[k] = wanted

@@ -16,6 +16,7 @@ from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.map.interpolator import NearestPoint
 from ikns.nullspace.readout import Method, Readout
+from ikns.nullspace.signal_names import signal_names
 from ikns.numerics.median import finite_median
 from ikns.recording.recording import Recording
 
@@ -92,7 +93,7 @@ def control_table(
         inside = within & np.isfinite(raw.reshape(n, -1)[:, 0])
     raw = raw.reshape(n, -1)
     c = np.clip(raw, 0.0, 1.0)
-    names = ["c"] if c.shape[1] == 1 else [f"c_{k + 1}" for k in range(c.shape[1])]
+    names = signal_names(c.shape[1])
     known_worth = uncertainty[:, : c.shape[1]]
     speed = motion.hand_speed(chain)
     rows = np.column_stack(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,7 @@ from ikns.motion.marker_ik.rejection import (
     say_exchanged,
 )
 from ikns.motion.marker_ik.visibility import sight_needs
+from ikns.nullspace.signal_names import signal_names
 
 NONE_EXCHANGED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
 
@@ -53,12 +56,17 @@ def rejection_reason(
     """
     if not new:
         return "the same picture again"
-    limit = solver.max_uncertainty
-    certain = solved.in_sight if limit is None else solved.uncertainty[0] <= limit
+    limit, worth = solver.max_uncertainty, solved.uncertainty.tolist()
+    doubtful = 0
+    for dof in settings.dofs:
+        # A deviation that is NaN is not certain either.
+        if not (solved.in_sight if limit is None else worth[dof - 1] <= limit):
+            doubtful = dof
+            break
     fits = fits_markers(solved, settings)
     # A marker that is wrong matters more than one that is hidden.
-    hides = fits or not np.isfinite(solved.residual)
-    if not certain and not solved.in_sight and hides:
+    hides = fits or not math.isfinite(solved.residual)
+    if doubtful and not solved.in_sight and hides:
         return f"the {_hidden(solver, markers)} is not in sight"
     if len(exchanged):
         labels = solver.skeleton.marker_set.labels
@@ -72,24 +80,29 @@ def rejection_reason(
             solved.residual,
             settings.limits,
         )
-    if not certain and np.isfinite(solved.uncertainty[0]):
-        return uncertain_reason(solver.skeleton, solver.chain, markers)
-    if not np.isfinite(solved.c[0]):
-        return "the hand is outside the map"
+    if doubtful and math.isfinite(worth[doubtful - 1]):
+        names = signal_names(len(worth))
+        return uncertain_reason(
+            solver.skeleton, solver.chain, markers, names[doubtful - 1]
+        )
+    c = solved.c.tolist()
+    for dof in settings.dofs:
+        if not math.isfinite(c[dof - 1]):
+            return "the hand is outside the map"
     return ""
 
 
 def uncertain_reason(
-    skeleton: Skeleton, chain: str, markers: NDArray[np.float64]
+    skeleton: Skeleton, chain: str, markers: NDArray[np.float64], signal: str = "c"
 ) -> str:
-    """Say which hidden markers of a chain leave c uncertain, the first three."""
+    """Say which hidden markers of a chain leave a signal uncertain, the first three."""
     columns = chain_columns(skeleton, chain)
     hidden = columns[~np.isfinite(markers[columns]).all(axis=1)]
     if not hidden.size:
-        return "c is uncertain"
+        return f"{signal} is uncertain"
     named = [skeleton.marker_set.labels[column] for column in hidden[:3]]
     more = " and others" if len(hidden) > 3 else ""
-    return f"c is uncertain without {', '.join(named)}{more}"
+    return f"{signal} is uncertain without {', '.join(named)}{more}"
 
 
 def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from ikns.errors import InvalidInput
 from ikns.live.control.frame import MAX_UNCERTAINTY
@@ -39,6 +40,9 @@ class ControlSettings:
         What reads c off the posture, see :mod:`ikns.nullspace.readout`.
     hold_after, safe_after : float
         See :class:`ikns.live.control.safety.SafetyMachine`, s.
+    dofs : tuple of int
+        Freedoms of the map that drive a finger, from 1 on. A frame is valid when the
+        signals of all of them are known: an axis without a signal holds the others.
     """
 
     cutoff: float = 2.0
@@ -52,12 +56,19 @@ class ControlSettings:
     method: Method = "paper"
     hold_after: float = 0.1
     safe_after: float = 0.5
+    dofs: tuple[int, ...] = (1,)
 
     def __post_init__(self) -> None:
         """Reject values out of range."""
         if not 0 <= self.dead_band < 1:
             raise InvalidInput(
                 f"expected a dead band from 0 to below 1, found {self.dead_band:g}."
+            )
+        object.__setattr__(self, "dofs", tuple(self.dofs))
+        if not self.dofs or min(self.dofs) < 1 or len(set(self.dofs)) < len(self.dofs):
+            raise InvalidInput(
+                "expected different dofs from 1 on, found "
+                f"{', '.join(map(str, self.dofs)) or 'none'}."
             )
         if self.method not in ("paper", "intent"):
             raise InvalidInput(
@@ -74,6 +85,13 @@ class ControlSettings:
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:
                 raise InvalidInput(f"expected a positive {name}, found {value:g}.")
+
+    def table(self) -> dict[str, Any]:
+        """Return what a session keeps; `dofs` where it is not the first alone."""
+        kept = asdict(self)
+        if self.dofs == (1,):
+            del kept["dofs"]
+        return kept
 
     @property
     def limits(self) -> GateLimits:

@@ -17,6 +17,7 @@ from ikns.live.session.channels import STATES
 from ikns.live.stream.loopback import only_from_this_machine
 from ikns.live.stream.lsl_library import lsl, only_this_machine
 from ikns.live.stream.lsl_search import describe_stream, quoted
+from ikns.nullspace.signal_names import signal_names
 
 #: What is added to the name for the stream of events.
 EVENTS = "-events"
@@ -142,10 +143,9 @@ class LslSink:
 
 def _channels(n_dof: int) -> list[tuple[str, str]]:
     """Labels and units, in the order of a sample."""
-    signals = ["c"] if n_dof == 1 else [f"c{k + 1}" for k in range(n_dof)]
+    names = [*signal_names(n_dof), *signal_names(n_dof, "flexion")]
     return [
-        *((name, "normalized") for name in signals),
-        ("flexion", "normalized"),
+        *((name, "normalized") for name in names),
         ("state", "index of states"),
         ("residual", "meters"),
     ]

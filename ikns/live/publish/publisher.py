@@ -34,10 +34,15 @@ class Sample(NamedTuple):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Every c, the flexion, the index of the state, and the residual in m."""
+        """Every c, every flexion, the index of the state, and the residual in m."""
         solved = self.decision.solved
         state = float(STATES.index(self.decision.state))
-        return (*solved.c.tolist(), self.decision.flexion, state, solved.residual)
+        return (
+            *solved.c.tolist(),
+            *self.decision.flexions,
+            state,
+            solved.residual,
+        )
 
 
 Item = tuple[float, Sample | str]

@@ -17,6 +17,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.model import NQ_ROOT
 from ikns.errors import StreamError
 from ikns.live.publish.publisher import Sample
+from ikns.nullspace.signal_names import signal_names
 from ikns.ros2.address import RosAddress
 from ikns.ros2.node import RosNode, stamp
 
@@ -48,12 +49,14 @@ class RosSink:
 
     ========================  =============================  ==========================
     NAMESPACE/joint_states    sensor_msgs/msg/JointState     rad, of frames that count
-    NAMESPACE/c, or c1, c2    std_msgs/msg/Float64           of every frame
+    NAMESPACE/c               std_msgs/msg/Float64           of every frame
     NAMESPACE/flexion         std_msgs/msg/Float64           of every frame
     NAMESPACE/events          std_msgs/msg/String            safety and trials
     /diagnostics              diagnostic_msgs/msg/           on a change of state, and
                               DiagnosticArray                every second
     ========================  =============================  ==========================
+
+    Of several freedoms they are c_1, c_2, flexion_1 and flexion_2.
 
     A Float64 has no stamp of its own; its source time, which ROS shows as
     ``message_info.source_timestamp``, is that of the joint states.
@@ -94,12 +97,11 @@ class RosSink:
         # This thread may wait, and what does not fit into its queue is counted.
         publisher = partial(node.publisher, wait=True)
         self._events = publisher(f"{space}/events", "std_msgs/msg/String")
-        self._c, self._flexion, self._joints, self._state = [], None, None, None
+        self._numbers, self._joints, self._state = [], None, None
         if n_dof:
-            names = ["c"] if n_dof == 1 else [f"c{k + 1}" for k in range(n_dof)]
-            number = "std_msgs/msg/Float64"
-            self._c = [publisher(f"{space}/{name}", number) for name in names]
-            self._flexion = publisher(f"{space}/flexion", number)
+            names = [*signal_names(n_dof), *signal_names(n_dof, "flexion")]
+            kind = "std_msgs/msg/Float64"
+            self._numbers = [publisher(f"{space}/{name}", kind) for name in names]
             self._state = publisher(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray")
             if joints:
                 self._joints = publisher(
@@ -110,10 +112,9 @@ class RosSink:
         """Publish a frame, received at a time of `time.monotonic`."""
         self._check_router()
         decision, ns = sample.decision, self._ns(at)
-        for publisher, value in zip(self._c, decision.solved.c.tolist(), strict=False):
+        values = (*decision.solved.c.tolist(), *decision.flexions)
+        for publisher, value in zip(self._numbers, values, strict=True):
             publisher.put({"data": value}, at=ns)
-        if self._flexion:
-            self._flexion.put({"data": decision.flexion}, at=ns)
         if self._joints and decision.valid:
             message = {
                 "header": {"stamp": stamp(ns), "frame_id": ""},

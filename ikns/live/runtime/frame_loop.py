@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import IknsError
-from ikns.finger import Finger
+from ikns.finger import FingerGroup
 from ikns.live.control.controller import Controller, Decision
 from ikns.live.control.safety import Changes
 from ikns.live.runtime.cache_warmer import CacheWarmer
 from ikns.live.runtime.listener import LoopListener
 from ikns.live.runtime.notices import Notices
-from ikns.live.runtime.report import LoopStatus, Report
+from ikns.live.runtime.report import AxisStatus, LoopStatus, Report
 from ikns.live.runtime.session_log import write_event, write_frame
 from ikns.live.session import RunWriter, micro
 from ikns.live.stream import Frame, Source
@@ -25,8 +25,6 @@ from ikns.motion.marker_ik.rejection_count import RejectionCount
 
 #: Longest time between two commands to the finger and checks of the watchdog, s.
 _KEEP_ALIVE = 0.02
-#: Command with which the finger brakes and stays where it is.
-_HOLD = math.nan
 
 
 class FrameLoop:
@@ -36,12 +34,13 @@ class FrameLoop:
     ----------
     source : Source
     controller : Controller
-        Drives the finger.
+        Drives the fingers.
     twin : Controller
         One like it, for warming the caches.
     columns : (M,) integer array
         Where the markers of the subject's set are among the source's; -1 where missing.
-    finger : Finger, optional
+    fingers : FingerGroup, optional
+        One for each of the freedoms that the controller's settings name.
     session : RunWriter, optional
     on_notice : callable, optional
         See :func:`ikns.live.runtime.run`.
@@ -59,7 +58,7 @@ class FrameLoop:
         controller: Controller,
         twin: Controller,
         columns: NDArray[np.int64],
-        finger: Finger | None,
+        fingers: FingerGroup | None,
         session: RunWriter | None,
         on_notice: Callable[[str], None] | None = None,
         listener: LoopListener | None = None,
@@ -67,12 +66,15 @@ class FrameLoop:
         self._listener = listener
         self._source, self._controller = source, controller
         self._columns, self._absent = columns, np.flatnonzero(columns < 0)
-        self._finger, self._session = finger, session
+        self._fingers, self._session = fingers, session
+        self._driven = [dof - 1 for dof in controller.settings.dofs]
         pace = source.rate * source.speed
         self._period = 1 / pace if pace else math.inf
         self._warmer = CacheWarmer(twin, self._period)
         self._unknown_q = np.full(len(controller.solver.skeleton.neutral()), np.nan)
-        self._measured = math.nan
+        self._in_order = self._driven == [*range(len(controller.flexions))]
+        self._unknown = [math.nan] * len(controller.flexions)
+        self._measured = self._unknown
         self._first_device_time = math.nan
         self._last: Decision | None = None
         self._status_time, self._status_frames = 0.0, 0
@@ -99,9 +101,9 @@ class FrameLoop:
         """
         if self._controller.machine.state != "safe":
             return
-        if self._finger is not None:
+        if self._fingers is not None:
             try:
-                self._finger.connect()
+                self._fingers.connect()
             except (IknsError, OSError) as error:
                 self._refusal = f"; arming again failed: {str(error).rstrip('.')}"
                 return
@@ -134,7 +136,7 @@ class FrameLoop:
             self._apply(self._controller.machine.activate(receive_time, "poses come"))
         sent = self._command()
         done = time.monotonic()
-        self._check_finger(receive_time)
+        self._check_fingers(receive_time)
         if decision.rejection:
             self._rejections.add(decision.rejection)
         self._notices.frame(receive_time, decision.rejection)
@@ -178,7 +180,7 @@ class FrameLoop:
         now = time.monotonic() - self._start
         self._apply(self._controller.check(now))
         self._command()
-        self._check_finger(now)
+        self._check_fingers(now)
         self._notices.check(now)
 
     def disarm(self, reason: str) -> None:
@@ -204,6 +206,7 @@ class FrameLoop:
         new_frames = report.frames - self._status_frames
         rate = new_frames / max(now - self._status_time, 1e-9)
         self._status_time, self._status_frames = now, report.frames
+        axes = self._axes()
         return LoopStatus(
             time=now,
             rate=rate,
@@ -214,48 +217,82 @@ class FrameLoop:
             worst_residual=math.nan if last is None else last.solved.worst_residual,
             rejection="" if last is None else last.rejection,
             inside=last is not None and last.solved.inside,
-            c=math.nan if last is None else float(last.solved.c[0]),
-            flexion=self._controller.flexion,
-            measured=self._measured,
-            uncertainty=math.nan if last is None else float(last.solved.uncertainty[0]),
+            c=axes[0].c,
+            flexion=axes[0].flexion,
+            measured=axes[0].measured,
+            uncertainty=axes[0].uncertainty,
             state=self._controller.machine.state,
             q=self._unknown_q if last is None else last.solved.q,
             stopped=self._stop_reason(),
+            axes=axes,
+        )
+
+    def _axes(self) -> tuple[AxisStatus, ...]:
+        """Return the status of each freedom that drives a finger, the first first."""
+        solved = None if self._last is None else self._last.solved
+        return tuple(
+            AxisStatus(
+                dof=k + 1,
+                c=math.nan if solved is None else float(solved.c[k]),
+                uncertainty=math.nan
+                if solved is None
+                else float(solved.uncertainty[k]),
+                flexion=self._controller.flexions[k],
+                measured=self._measured[k],
+            )
+            for k in self._driven
         )
 
     def _stop_reason(self) -> str:
-        """Return why the finger is stopped; what it says itself is more recent."""
-        if self._finger is None or self._controller.machine.state != "safe":
+        """Return why the fingers are stopped; what they say is more recent."""
+        if self._fingers is None or self._controller.machine.state != "safe":
             return ""
         return (self._alert or self._stopped) + self._refusal
 
-    def _command(self) -> float:
-        """Command the finger, which limits what it does; return what was sent."""
-        if self._finger is None:
-            return math.nan
-        moving = self._controller.machine.state in ("active", "holding")
-        return self._finger.command(self._controller.flexion if moving else _HOLD)
+    def _command(self) -> list[float]:
+        """Command the fingers, which limit what they do; return what was sent."""
+        if self._fingers is None:
+            return self._unknown
+        wanted = self._controller.flexions
+        if self._controller.machine.state not in ("active", "holding"):
+            wanted = self._unknown  # NaN: brake and stay
+        if self._in_order:
+            return self._fingers.command(wanted)
+        return self._by_dof(self._fingers.command([wanted[k] for k in self._driven]))
 
-    def _check_finger(self, now: float) -> None:
-        """Stop when the finger has gone to its safe state by itself."""
-        if self._finger is None:
+    def _check_fingers(self, now: float) -> None:
+        """Stop when a finger has gone to its safe state by itself."""
+        if self._fingers is None:
             return
-        state = self._finger.state()
-        self._measured, self._alert = state.flexion, state.alert
-        if state.mode == "safe" and self._controller.machine.state != "safe":
-            # A replay repeats it.
-            self._event(now, "stop", state.alert)
-            self._apply(self._controller.machine.stop(now, f"finger: {state.alert}"))
+        states = self._fingers.states()
+        measured = []
+        for state in states:
+            measured.append(state.flexion)
+        self._measured = measured if self._in_order else self._by_dof(measured)
+        self._alert = self._fingers.alert(states)
+        for state in states:
+            if state.mode == "safe" and self._controller.machine.state != "safe":
+                # A replay repeats it.
+                self._event(now, "stop", self._alert)
+                reason = f"finger: {self._alert}" if len(states) == 1 else self._alert
+                self._apply(self._controller.machine.stop(now, reason))
+
+    def _by_dof(self, values: list[float]) -> list[float]:
+        """Return the values of the fingers by freedom; NaN without a finger."""
+        placed = list(self._unknown)
+        for k, value in zip(self._driven, values, strict=True):
+            placed[k] = value
+        return placed
 
     def _apply(self, changes: Changes) -> None:
-        """Report state transitions, and make the finger safe where they say so."""
+        """Report state transitions, and make the fingers safe where they say so."""
         for change in changes:
             self.report.transitions.append(change)
             del self.report.transitions[:-1000]
             if change.after == "safe":
                 self._stopped, self._refusal = change.reason, ""
-                if self._finger is not None:
-                    self._finger.make_safe(change.reason)
+                if self._fingers is not None:
+                    self._fingers.make_safe(change.reason)
             self._notices.transition(change)
             words = f"{change.before} to {change.after}: {change.reason}"
             self._event(change.time, change.after, words)

@@ -15,8 +15,8 @@ from contextlib import contextmanager
 import numpy as np
 
 from ikns.calibration.subject import Subject
-from ikns.errors import MarkerMismatch
-from ikns.finger import Finger
+from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.finger import Finger, FingerGroup
 from ikns.live.control.controller import Controller, Decision
 from ikns.live.control.frame import FrameSolver
 from ikns.live.control.settings import ControlSettings
@@ -32,7 +32,7 @@ from ikns.live.stream.subjects import check_one_subject
 def run(
     source: Source,
     subject: Subject,
-    finger: Finger | None = None,
+    finger: Finger | FingerGroup | None = None,
     *,
     settings: ControlSettings | None = None,
     session: RunWriter | None = None,
@@ -46,7 +46,7 @@ def run(
     listener: LoopListener | None = None,
     realtime: bool = False,
 ) -> Report:
-    """Drive a finger with a person's null space until the source ends.
+    """Drive a finger, or several, with a person's null space until the source ends.
 
     Parameters
     ----------
@@ -54,10 +54,11 @@ def run(
         Open, with the markers of the subject's marker set among its labels.
     subject : Subject
         Calibrated.
-    finger : Finger, optional
-        Not connected yet. Without a finger everything runs but nothing moves.
+    finger : Finger or FingerGroup, optional
+        Not connected yet. Without a finger everything runs but nothing moves. Several
+        are safe together: what stops one stops all.
     settings : ControlSettings, optional
-        Smoothing, dead band, watchdog.
+        Smoothing, dead band, watchdog, and which freedoms of the map drive a finger.
     session : RunWriter, optional
         From :func:`ikns.live.session.open_run` with the labels of the subject's marker
         set; gets one row per frame and is left open.
@@ -93,8 +94,9 @@ def run(
     Raises
     ------
     InvalidInput
-        When the system does not allow real-time priority, or the subject was
-        calibrated without the method of the settings.
+        When the system does not allow real-time priority, the subject was calibrated
+        without the method of the settings, or the fingers follow other freedoms than
+        the settings name.
     MarkerMismatch
         When the source has none of the subject's markers, or those of several people.
     FingerError
@@ -127,6 +129,7 @@ def run(
             f"{', '.join(source.labels[:6])}."
         )
     settings = ControlSettings() if settings is None else settings
+    fingers = _group(finger, settings)
     controller, twin = (
         Controller(
             FrameSolver(
@@ -141,13 +144,13 @@ def run(
         for _ in range(2)
     )
     loop = FrameLoop(
-        source, controller, twin, columns, finger, session, on_notice, listener
+        source, controller, twin, columns, fingers, session, on_notice, listener
     )
     # Compile or load everything before the finger is connected.
     controller.solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     controller.solver.reset()
     stopped = threading.Event() if stop is None else stop
-    with realtime_priority(realtime=realtime), connected(finger):
+    with realtime_priority(realtime=realtime), connected(fingers):
         loop.arm()
         try:
             while not (stopped.is_set() or source.ended or loop.elapsed() >= duration):
@@ -170,11 +173,28 @@ def run(
     return loop.report
 
 
-@contextmanager
-def connected(finger: Finger | None) -> Iterator[None]:
-    """Connect a finger, if there is one, and relax it at the end."""
+def _group(
+    finger: Finger | FingerGroup | None, settings: ControlSettings
+) -> FingerGroup | None:
+    """Return the fingers as a group, one for each freedom of the settings."""
     if finger is None:
+        return None
+    given = finger
+    if not isinstance(given, FingerGroup):
+        given = FingerGroup([given], settings.dofs[:1])
+    if given.dofs != settings.dofs:
+        raise InvalidInput(
+            f"expected fingers for the dofs of the settings, {settings.dofs}, found "
+            f"fingers for {given.dofs}."
+        )
+    return given
+
+
+@contextmanager
+def connected(fingers: FingerGroup | None) -> Iterator[None]:
+    """Connect the fingers, if there are any, and relax them at the end."""
+    if fingers is None:
         yield
         return
-    with finger:
+    with fingers:
         yield

@@ -14,6 +14,7 @@ from ikns.live.control.frame import FrameSolver
 from ikns.live.control.settings import ControlSettings
 from ikns.live.session import Run
 from ikns.live.session.channels import STATES
+from ikns.nullspace.signal_names import signal_names
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +23,12 @@ class Replayed:
 
     Parameters
     ----------
-    c, flexion : (T,) array
-        Raw control signal and commanded flexion.
+    c, flexion : (T,) or (T, d) array
+        Raw control signal and commanded flexion; by freedom where the map has several.
     state : (T,) integer array
         State of the safety machine, an index into
         :data:`ikns.live.session.channels.STATES`.
-    uncertainty : (T,) array
+    uncertainty : (T,) or (T, d) array
         Standard deviation of c.
     different : dict of str to int
         Number of frames that differ from the recorded values in any bit, by column.
@@ -60,7 +61,7 @@ def replay_run(run: Run) -> Replayed:
     Raises
     ------
     FileError
-        When the settings or the subject are missing or damaged.
+        When the settings, the subject or a column are missing or damaged.
 
     Examples
     --------
@@ -96,7 +97,9 @@ def replay_run(run: Run) -> Replayed:
     controller = Controller(solver, settings)
     machine = controller.machine
     rows = len(run.frame)
-    c, flexion, uncertainty = np.empty((3, rows))
+    n_dof = len(controller.flexions)
+    columns = _columns(run, n_dof)
+    c, flexion, uncertainty = np.empty((3, rows, n_dof))
     state = np.empty(rows, dtype=np.int64)
     # The watchdog's transitions follow from the frames' times; what else stopped the
     # finger, and who armed it again, do not.
@@ -110,8 +113,8 @@ def replay_run(run: Run) -> Replayed:
         made = controller.frame(
             run.markers[i], float(run.device_time[i]), float(run.receive_time[i])
         )
-        c[i], flexion[i] = made.solved.c[0], made.flexion
-        uncertainty[i] = made.solved.uncertainty[0]
+        c[i], flexion[i] = made.solved.c, made.flexions
+        uncertainty[i] = made.solved.uncertainty
         state[i] = STATES.index(made.state)
         if made.valid and made.state == "armed":
             machine.activate(float(run.receive_time[i]))
@@ -121,16 +124,48 @@ def replay_run(run: Run) -> Replayed:
             machine.stop(onset, "recorded")  # its watchdog may have, without a frame
             if what == "armed":
                 machine.arm_again(onset)
-    first = "c" if "c" in run.model else "c1"
-    recorded = {
-        "c": (c, run.model[first]),
-        "flexion_asked": (flexion, run.model["flexion_asked"]),
-        "state": (state.astype(float), run.model["state"]),
-    }
-    if first + "_uncertainty" in run.model:
-        recorded["uncertainty"] = uncertainty, run.model[first + "_uncertainty"]
+    computed = {"c": c, "flexion_asked": flexion, "uncertainty": uncertainty}
+    recorded = {}
+    for shown, kind, k, name in columns:
+        ours = state.astype(float) if kind == "state" else computed[kind][:, k]
+        recorded[shown] = ours, run.model[name]
     different = {
         name: int(np.sum(~((ours == theirs) | (np.isnan(ours) & np.isnan(theirs)))))
         for name, (ours, theirs) in recorded.items()
     }
+    if n_dof == 1:
+        c, flexion, uncertainty = c[:, 0], flexion[:, 0], uncertainty[:, 0]
     return Replayed(c, flexion, state, uncertainty, different)
+
+
+def _columns(run: Run, n_dof: int) -> list[tuple[str, str, int, str]]:
+    """Return what to compare: how to call it, its kind, the freedom, and the column.
+
+    Raises
+    ------
+    FileError
+        When the session lacks a column.
+    """
+    model = run.model
+    signals, flexions = signal_names(n_dof), signal_names(n_dof, "flexion")
+    if (
+        "c1" in model
+    ):  # from before several fingers: the first signal drove the only one
+        signals, flexions = [f"c{k + 1}" for k in range(n_dof)], ["flexion"]
+    found = [(name, "c", k, name) for k, name in enumerate(signals)]
+    found += [
+        (f"{name}_asked", "flexion_asked", k, f"{name}_asked")
+        for k, name in enumerate(flexions)
+    ]
+    found.append(("state", "state", 0, "state"))
+    found += [
+        ("uncertainty" if n_dof == 1 else name, "uncertainty", k, name)
+        for k, name in enumerate(f"{name}_uncertainty" for name in signals)
+        if name in model  # older sessions lack it
+    ]
+    missing = [name for *_, name in found if name not in model]
+    if missing:
+        raise FileError(
+            f"{run.session}: run {run.number} has no column '{missing[0]}'."
+        )
+    return found

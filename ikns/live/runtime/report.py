@@ -4,13 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ikns.live.control.safety import Transition
 from ikns.live.stream.delays import Delays
+
+
+class AxisStatus(NamedTuple):
+    """Status of one freedom that drives a finger.
+
+    Parameters
+    ----------
+    dof : int
+        Which freedom of the map, from 1 on.
+    c, uncertainty : float
+        Raw control signal and its standard deviation.
+    flexion, measured : float
+        Commanded and measured.
+    """
+
+    dof: int
+    c: float
+    uncertainty: float
+    flexion: float
+    measured: float
 
 
 @dataclass(frozen=True)
@@ -34,7 +54,8 @@ class LoopStatus:
     inside : bool
         Whether the hand is inside the hull of the map's points.
     c, flexion, measured : float
-        Raw control signal, commanded flexion, measured flexion.
+        Raw control signal, commanded flexion, measured flexion; of the first of several
+        fingers.
     uncertainty : float
         Standard deviation of c.
     state : str
@@ -43,6 +64,8 @@ class LoopStatus:
         Configuration of the last frame; NaN before the first.
     stopped : str
         Why the finger is in its safe state; empty unless it is, or without a finger.
+    axes : tuple of AxisStatus
+        Each freedom that drives a finger.
     """
 
     time: float
@@ -61,6 +84,7 @@ class LoopStatus:
     state: str
     q: NDArray[np.float64]
     stopped: str = ""
+    axes: tuple[AxisStatus, ...] = ()
 
 
 @dataclass

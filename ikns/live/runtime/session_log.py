@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,8 +18,8 @@ def write_frame(
     markers: NDArray[np.float64],
     decision: Decision,
     *,
-    sent: float,
-    measured: float,
+    sent: Sequence[float],
+    measured: Sequence[float],
     durations: tuple[float, float],
 ) -> None:
     """Write the two rows of a frame: what came in, and the results.
@@ -30,8 +32,9 @@ def write_frame(
     markers : (M, 3) array
         m in the world.
     decision : Decision
-    sent, measured : float
-        Flexion that was sent to the finger, and that it measured.
+    sent, measured : sequence of d float
+        Flexion that was sent to the finger of each freedom, and that it measured; NaN
+        without one.
     durations : (float, float)
         Of solving, and from receipt to command, s.
     """
@@ -44,9 +47,9 @@ def write_frame(
             *np.degrees(solved.q[7:]).tolist(),
             *solved.hand_in_thorax.tolist(),
             *solved.c.tolist(),
-            decision.flexion,
-            sent,
-            measured,
+            *decision.flexions,
+            *sent,
+            *measured,
             solved.residual,
             solved.worst_residual,
             solved.intermarker_error,

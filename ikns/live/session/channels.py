@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.nullspace.signal_names import signal_names
+
 #: States of the safety machine; the column ``state`` has their index.
 STATES = ("disarmed", "armed", "active", "holding", "safe")
 
@@ -91,7 +93,8 @@ def model_channels(joint_names: Sequence[str], n_dof: int = 1) -> list[Channel]:
 
     Thorax pose, joint angles, hand, control signal, flexion commanded, sent and
     measured, and the quality and timing of the frame: ``c_uncertainty`` is the standard
-    deviation of c.
+    deviation of c. With several freedoms these are ``c_1``, ``flexion_1_asked``,
+    ``c_1_uncertainty`` and so on.
     """
     body = [
         Channel(f"thorax_{axis}", "POS", "m", axis, "thorax", "world") for axis in "xyz"
@@ -107,17 +110,16 @@ def model_channels(joint_names: Sequence[str], n_dof: int = 1) -> list[Channel]:
     hand = [
         Channel(f"hand_{axis}", "POS", "m", axis, "hand", "thorax") for axis in "xyz"
     ]
-    signal = [
-        Channel("c" if n_dof == 1 else f"c{k + 1}", "MISC", "n/a", form=_EXACT)
-        for k in range(n_dof)
-    ]
+    signal = [Channel(name, "MISC", "n/a", form=_EXACT) for name in signal_names(n_dof)]
     uncertainty = [
         Channel(f"{channel.name}_uncertainty", "MISC", "n/a", form=_EXACT)
         for channel in signal
     ]
+    fingers = signal_names(n_dof, "finger")
     finger = [
-        Channel(name, "MISC", "n/a", tracked_point="finger", form=_EXACT)
-        for name in ("flexion_asked", "flexion_sent", "flexion_measured")
+        Channel(f"{name}_{what}", "MISC", "n/a", tracked_point=point, form=_EXACT)
+        for what in ("asked", "sent", "measured")
+        for name, point in zip(signal_names(n_dof, "flexion"), fingers, strict=True)
     ]
     health = [
         Channel("residual", "MISC", "m"),

@@ -99,10 +99,10 @@ def _faults(run: Run) -> list[str]:
             found.append(f"{name} is missing in {np.sum(~np.isfinite(time))} rows.")
     if not (np.diff(run.receive_time) >= 0).all():
         found.append("receive_time runs back.")
-    sent = run.model["flexion_sent"]
-    beyond = np.sum((sent < 0) | (sent > 1))
-    if beyond:
-        found.append(f"flexion_sent is outside 0 to 1 in {beyond} rows.")
+    for name, sent in run.model.items():
+        beyond = np.sum((sent < 0) | (sent > 1)) if name.endswith("_sent") else 0
+        if beyond:
+            found.append(f"{name} is outside 0 to 1 in {beyond} rows.")
     early = [onset for onset, *_ in run.events if not onset >= 0]
     if early:
         found.append(f"{len(early)} events have no onset.")

@@ -195,7 +195,8 @@ class NullSpaceMap(EstimatorBase):
             When a parameter is out of range, or samples are not finite or do not match.
         NotEnoughData
             With fewer samples than points, too few usable points, or points in a plane;
-            when a point does not show one of the motions.
+            when more than a third of the points do not show every motion; fewer are
+            left out with a warning.
         """
         from ikns.nullspace.clustering import BoundingBoxKMeans
 
@@ -210,7 +211,6 @@ class NullSpaceMap(EstimatorBase):
         ).fit(x, groups=groups)
         used = usable_points(found, settings.min_samples)
         centers = found.cluster_centers_[used]
-        interpolator = make_interpolator(centers, self.outside, self.interpolation)
         rows = [np.flatnonzero(found.labels_ == k) for k in used]
 
         parts = [principal_components(moves[r], centered=centered) for r in rows]
@@ -223,7 +223,7 @@ class NullSpaceMap(EstimatorBase):
         samples = [q[r] for r in rows]
         if motions is not None:
             keep = np.where(moving, np.maximum(n_components, self.n_dof), 0)
-            self.directions_, self.lower_, self.upper_ = assemble_dual(
+            shown, self.directions_, self.lower_, self.upper_ = assemble_dual(
                 centers,
                 [part[:k] for (part, _), k in zip(parts, keep, strict=True)],
                 samples,
@@ -231,7 +231,11 @@ class NullSpaceMap(EstimatorBase):
                 n_dof=self.n_dof,
                 quantiles=settings.quantiles,
             )
-        else:
+            centers, used = centers[shown], [used[k] for k in shown]
+            rows, ratios = [rows[k] for k in shown], ratios[shown]
+            n_components = n_components[shown]
+        interpolator = make_interpolator(centers, self.outside, self.interpolation)
+        if motions is None:
             keep = n_components if self.n_dof == 1 else np.where(moving, self.n_dof, 0)
             self.directions_, self.lower_, self.upper_ = assemble(
                 centers,

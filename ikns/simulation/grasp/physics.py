@@ -79,7 +79,11 @@ class Grasp:
         self._dt = constant("timestep")
         self.guard = Guard(Safety())
         self.guard.start(0.0, 0.0)
-        self._home = self.data.mocap_pos[0].copy()
+        # Views: MuJoCo's Python makes new ones whenever it is asked.
+        self._guide, self._control = self.data.mocap_pos[0], self.data.ctrl
+        self._warnings = self.data.warning.number
+        self._shares = np.arange(1, self.steps + 1)[:, None] / self.steps
+        self._home = self._guide.copy()
         self._middle = np.array([0.0, 0.0, self._home[2]])
         self._facing = self.data.mocap_quat[0].copy()
         self._hand = self.model.body("hand").id
@@ -112,19 +116,20 @@ class Grasp:
         now = self.time
         self.guard.command(now, flexion)
         goal = self.guard.goal
-        start = data.mocap_pos[0].copy()
+        start = self._guide.copy()
         end, facing = self._hand_pose(np.asarray(shift), np.asarray(turn))
         if self.frames == 0:  # the hand starts there, without a jump
             start = end
             data.qpos[7:10] = end
             data.qpos[10:14] = facing
         data.mocap_quat[0] = facing
-        for k in range(self.steps):
-            data.mocap_pos[0] = start + (end - start) * ((k + 1) / self.steps)
-            data.ctrl[0] = self._advance_motor(goal)
+        places = start + (end - start) * self._shares
+        for place, motor in zip(places, self._motor_path(goal), strict=True):
+            self._guide[:] = place
+            self._control[0] = motor
             self._step(self.model, data)
         self.frames += 1
-        if data.warning.number.any():
+        if self._warnings.any():
             raise InvalidInput(
                 f"the simulated contact came apart after {self.time:g} s, expected an "
                 f"object and a hand that 2 ms resolve, found {self.solid}."
@@ -174,12 +179,17 @@ class Grasp:
             total[self._kind[other if one == self._thing else one]] += wrench[0]
         return [float(force) for force in total]
 
-    def _advance_motor(self, goal: float) -> float:
-        dt = self._dt
+    def _motor_path(self, goal: float) -> list[float]:
+        """Return the motor's positions in the steps of a frame."""
         if math.isnan(goal):  # without a command the gear holds the motor
             self._spin = 0.0
-        else:
-            wanted = min(max((goal - self._motor) / FOLLOW, -SPEED), SPEED)
-            self._spin += (wanted - self._spin) * min(dt / SPIN, 1.0)
-            self._motor += self._spin * dt
-        return self._motor
+            return [self._motor] * self.steps
+        motor, spin, dt = self._motor, self._spin, self._dt
+        share, path = min(dt / SPIN, 1.0), []
+        for _ in range(self.steps):
+            wanted = min(max((goal - motor) / FOLLOW, -SPEED), SPEED)
+            spin += (wanted - spin) * share
+            motor += spin * dt
+            path.append(motor)
+        self._motor, self._spin = motor, spin
+        return path

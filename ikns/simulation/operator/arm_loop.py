@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from ikns._kernels.body.simulated_markers import write_cubic
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.live.control.controller import Controller
@@ -94,7 +95,9 @@ class ArmLoop:
         rows = arm_rows(
             arm, angles, place.motion, skin=skin, columns=self._frames.columns
         )
-        self._row = CubicSpline(place.motion.swivel, rows)
+        spline = CubicSpline(place.motion.swivel, rows)
+        self._knots, self._cubics = np.array(spline.x), np.array(spline.c)
+        self._row = np.empty(rows.shape[1])
         self._low, self._high = place.motion.swivel[[0, -1]]
         limit = MAX_UNCERTAINTY if settings is None else settings.max_uncertainty
         self._solver = FrameSolver(
@@ -137,4 +140,6 @@ class ArmLoop:
 
     def _arm_row(self, limb: float) -> Array:
         share = min(max(limb, 0.0), 1.0)
-        return np.asarray(self._row(self._low + share * (self._high - self._low)))
+        swivel = self._low + share * (self._high - self._low)
+        write_cubic(self._knots, self._cubics, swivel, self._row)
+        return self._row

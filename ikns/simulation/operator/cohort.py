@@ -87,6 +87,7 @@ def draw_participant(
     seed: int,
     soft_tissue: float = 3e-3,
     latency: float = 0.05,
+    other_methods: bool = True,
     **protocol: Any,
 ) -> Participant:
     """Draw a person, simulate the protocol, and calibrate.
@@ -101,6 +102,8 @@ def draw_participant(
         Displacement of markers over bones, m, root mean square.
     latency : float
         See :func:`ikns.simulation.operator.sample_abilities`, s.
+    other_methods : bool
+        See :func:`ikns.calibrate`: experiments use the paper's map alone.
     **protocol
         Passed to :func:`ikns.simulate_protocol`. Free exploration, which calibration
         does not use, is left out by default.
@@ -137,6 +140,7 @@ def draw_participant(
             ),
             chain=f"{run.side}_arm",
             n_points=len(run.places),
+            other_methods=other_methods,
         )
         abilities = {
             name: sample_abilities(

@@ -68,11 +68,10 @@ def track(
             f"expected an end after the start, found {start:g} to {end:g}."
         )
     time = start + np.arange(n) / operator.rate
-    ahead = target(time + operator.preview)
-    limb, c = np.empty(n), np.empty(n)
-    limb[0] = operator.limb
-    c[0] = element.step(limb[0])
+    ahead = target(time + operator.preview).tolist()
+    limb = [operator.limb]
+    c = [element.step(limb[0])]
     for k in range(1, n):
-        limb[k] = operator.step(float(ahead[k - 1]), float(c[k - 1]))
-        c[k] = element.step(limb[k])
-    return TrackingTrace(time, target(time), limb, c)
+        limb.append(operator.step(ahead[k - 1], c[-1]))
+        c.append(element.step(limb[-1]))
+    return TrackingTrace(time, target(time), np.array(limb), np.array(c))

@@ -67,8 +67,10 @@ class Operator:
         self.ability, self.rate = ability, rate
         self._limits = limits
         self._rng = np.random.default_rng(seed)
-        self._A, self._B0, self._B1 = discrete_step(ability, rate)
-        self._x = np.array([start, start, 0.0])
+        # Plain numbers: for three of them arrays take most of the time.
+        A, before, now = discrete_step(ability, rate)
+        self._rows = list(np.column_stack([A, before, now]).tolist())
+        self._x = (float(start), float(start), 0.0)
         whole = int(ability.delay * rate + 1e-9)
         self._part = max(0.0, ability.delay * rate - whole)
         # Errors of the last samples; before the start they are 0.
@@ -77,10 +79,10 @@ class Operator:
         keep = [
             math.exp(-w / rate) for w in (ability.remnant_bandwidth, _SIGNAL_BANDWIDTH)
         ]
-        self._keep = np.array(keep)
-        self._fresh = np.sqrt(1 - self._keep**2)
-        self._noise = self._rng.normal(size=2)
-        self._drawn: list[Array] = []
+        self._keep = keep
+        self._fresh = [math.sqrt(1 - k**2) for k in keep]
+        self._noise: list[float] = self._rng.normal(size=2).tolist()
+        self._drawn: list[list[float]] = []
 
     @property
     def preview(self) -> float:
@@ -106,16 +108,24 @@ class Operator:
         old, new = self._errors[0], self._errors[1]
         a = self.ability
         if not self._drawn:  # many at a time, for speed
-            self._drawn = list(self._rng.normal(size=(_BLOCK, 2)))
-        self._noise = self._keep * self._noise + self._fresh * self._drawn.pop()
+            self._drawn = self._rng.normal(size=(_BLOCK, 2)).tolist()
+        (slow, slower), (fresh, fresher) = self._keep, self._fresh
+        first, second = self._drawn.pop()
+        of_eye = self._noise[0] = slow * self._noise[0] + fresh * first
+        of_signal = self._noise[1] = slower * self._noise[1] + fresher * second
         late = (1 - self._part) * new + self._part * old
-        late += a.remnant * self._noise[0]
-        late *= 1 + a.signal_noise * self._noise[1]
-        self._x = self._A @ self._x + self._B0 * self._before + self._B1 * late
-        self._before = late
+        late += a.remnant * of_eye
+        late *= 1 + a.signal_noise * of_signal
+        x, y, z = self._x
+        before, self._before = self._before, late
+        command, place, speed = [
+            A0 * x + A1 * y + A2 * z + B0 * before + B1 * late
+            for A0, A1, A2, B0, B1 in self._rows
+        ]
         low, high = self._limits
-        self._x[0] = min(max(self._x[0], low - _WINDUP), high + _WINDUP)
-        return self.limb
+        command = min(max(command, low - _WINDUP), high + _WINDUP)
+        self._x = (command, place, speed)
+        return min(max(place, low), high)
 
 
 def discrete_step(ability: Ability, rate: float) -> tuple[Array, Array, Array]:

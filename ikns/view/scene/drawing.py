@@ -65,27 +65,7 @@ def scene_drawing(scene: Scene, *, width: int, height: int) -> bytes:
     with figure_style():
         figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
         axes: Any = figure.add_axes((0, 0, 1, 1), projection="3d")
-        triangles, colors = [], []
-        for _, pose, drawn in visible_nodes(scene):
-            if drawn["object"]["type"] == "Sprite":
-                place = pose[:3, 3][_TO_DRAWING]
-                text = drawn["textures"][0]["text"]
-                axes.text(*place, text, ha="center", va="center", zorder=10)
-                continue
-            corners = _triangles(drawn["geometries"][0])
-            placed = corners @ pose[:3, :3].T + pose[:3, 3]
-            material = drawn["materials"][0]
-            triangles.append(placed[..., _TO_DRAWING])
-            colors.append(_shaded(placed, material, scene.camera - scene.target))
-        axes.add_collection3d(
-            Poly3DCollection(
-                np.concatenate(triangles),
-                facecolors=np.concatenate(colors),
-                linewidths=0,
-                antialiaseds=False,
-            )
-        )
-        _look(axes, scene)
+        draw_scene(axes, scene)
         word = " (simulated subject)" if scene.simulated else ""
         figure.text(0.015, 0.965, scene.title + word, fontweight="bold", size=11)
         figure.text(0.015, 0.935, scene.caption, color=GREY)
@@ -97,6 +77,31 @@ def scene_drawing(scene: Scene, *, width: int, height: int) -> bytes:
         stream = io.BytesIO()
         figure.savefig(stream, format="png", dpi=_DPI, metadata={"Software": None})
     return stream.getvalue()
+
+
+def draw_scene(axes: Any, scene: Scene) -> None:
+    """Draw what a scene shows at its start into axes of three dimensions."""
+    triangles, colors = [], []
+    for _, pose, drawn in visible_nodes(scene):
+        if drawn["object"]["type"] == "Sprite":
+            place = pose[:3, 3][_TO_DRAWING]
+            text = drawn["textures"][0]["text"]
+            axes.text(*place, text, ha="center", va="center", zorder=10)
+            continue
+        corners = _triangles(drawn["geometries"][0])
+        placed = corners @ pose[:3, :3].T + pose[:3, 3]
+        material = drawn["materials"][0]
+        triangles.append(placed[..., _TO_DRAWING])
+        colors.append(_shaded(placed, material, scene.camera - scene.target))
+    axes.add_collection3d(
+        Poly3DCollection(
+            np.concatenate(triangles),
+            facecolors=np.concatenate(colors),
+            linewidths=0,
+            antialiaseds=False,
+        )
+    )
+    _look(axes, scene)
 
 
 def _look(axes: Any, scene: Scene) -> None:

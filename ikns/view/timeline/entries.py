@@ -67,7 +67,7 @@ def frame_entries(
     ['world/markers', 'world/arms', 'world/residuals', 'signal/c']
     """
     seen = np.flatnonzero(np.isfinite(markers).all(axis=1))
-    names = tuple(labels[k] for k in seen)
+    names = tuple(labels[k] for k in seen.tolist())
     shown: dict[str, Entry] = {"world/markers": Points(markers[seen], names)}
     if np.isfinite(q).all():
         placed = skeleton.markers_in_world(q)

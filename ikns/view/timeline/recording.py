@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ikns.body.skeleton import Skeleton
 from ikns.motion.motion import Motion
+from ikns.nullspace.signal_names import signal_names
 from ikns.recording.recording import Recording
 from ikns.view.timeline.entries import frame_entries
 from ikns.view.timeline.rerun import RerunLog
@@ -40,7 +41,7 @@ def log_recording(
     worn = skeleton.marker_set
     markers = worn.pick(recording.labels, recording.markers)
     signals = np.reshape(np.asarray(c, dtype=np.float64), (len(motion.time), -1))
-    names = ["c"] if signals.shape[1] == 1 else _numbered(signals.shape[1])
+    names = signal_names(signals.shape[1])
     for k, at in enumerate((motion.time - motion.time[0]).tolist()):
         numbers = {
             f"signal/{name}": float(value)
@@ -51,7 +52,3 @@ def log_recording(
             at, frame_entries(skeleton, worn.labels, markers[k], motion.q[k], numbers)
         )
     return len(motion.time)
-
-
-def _numbered(count: int) -> list[str]:
-    return [f"c{k + 1}" for k in range(count)]

@@ -8,6 +8,7 @@ import numpy as np
 
 from ikns.body.skeleton import Skeleton
 from ikns.live.publish import Sample
+from ikns.nullspace.signal_names import signal_names
 from ikns.view.timeline.entries import frame_entries
 from ikns.view.timeline.rerun import RerunLog
 
@@ -34,15 +35,11 @@ class RerunSink:
         assert self._skeleton is not None
         decision = sample.decision
         solved = decision.solved
-        names = (
-            ["c"] if len(solved.c) == 1 else [f"c{k + 1}" for k in range(len(solved.c))]
-        )
-        numbers = {
-            f"signal/{name}": value
-            for name, value in zip(names, solved.c.tolist(), strict=True)
-        }
+        n = len(solved.c)
+        names = [*signal_names(n), *signal_names(n, "flexion")]
+        values = (*solved.c.tolist(), *decision.flexions)
+        numbers = {f"signal/{name}": v for name, v in zip(names, values, strict=True)}
         numbers |= {
-            "signal/flexion": decision.flexion,
             "residual/rms_mm": 1e3 * solved.residual,
             "residual/worst_mm": 1e3 * solved.worst_residual,
         }

@@ -1,0 +1,124 @@
+"""Pages that are made when the documentation is built, so that nothing is copied."""
+
+import os
+import re
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import typer
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+MADE = HERE / "generated"
+#: Files of the repository that are pages too.
+INCLUDED = {
+    "CONTRIBUTING.md": "contributing",
+    "SAFETY.md": "safety",
+    "CHANGELOG.md": "changelog",
+    "benchmarks/README.md": "benchmarks",
+    "urdf/README.md": "body",
+}
+LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?://|#)([^)#\s]*)(#[^)\s]*)?\)")
+
+
+def make_pages() -> None:
+    """Write all of them."""
+    MADE.mkdir(exist_ok=True)
+    for source, name in INCLUDED.items():
+        text = (ROOT / source).read_text(encoding="utf-8")
+        text = lead_to_pages(text, (ROOT / source).parent, MADE)
+        _write(MADE / f"{name}.md", text)
+    _write(MADE / "commands.md", commands())
+    _write(MADE / "api.md", api())
+
+
+def _write(path: Path, text: str) -> None:
+    """Leave a file that is right alone: Sphinx reads again what is newer."""
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def lead_to_pages(text: str, source: Path, page: Path) -> str:
+    """Make links to files of the repository lead to the pages that are made of them.
+
+    Links in the text are from the folder `source`; the page is in the folder `page`.
+    What is no page is only named.
+    """
+    return LINK.sub(partial(_link, source=source, page=page), text)
+
+
+def _link(found: re.Match[str], *, source: Path, page: Path) -> str:
+    words, target, part = found[1], found[2], found[3] or ""
+    path = (source / target).resolve()
+    if not target or not path.is_relative_to(ROOT):
+        return found[0]
+    inside = path.relative_to(ROOT).as_posix()
+    if inside in INCLUDED:
+        path = MADE / f"{INCLUDED[inside]}.md"
+    elif inside == "README.md":
+        path = HERE / "index.md"
+    elif not path.is_relative_to(HERE) or path.is_dir():
+        return f"{words} (`{inside}`)"
+    return f"[{words}]({os.path.relpath(path, page)}{part})"
+
+
+def commands() -> str:
+    """Make a page of every command with its arguments and options, from the program."""
+    from ikns.cli.app import make_app
+
+    app = typer.main.get_command(make_app())
+    parts = [
+        "# Commands\n",
+        "Exit codes: 0 done, 1 something recorded is not on disk, 2 bad input, 3 the "
+        "finger never moved or ended in its safe state, 128 + n signal n.\n",
+    ]
+    for name in app.commands:
+        parts += _command(app.commands[name], f"ikns {name}", 2)
+    return "\n".join(parts)
+
+
+def _command(command: Any, name: str, level: int) -> list[str]:
+    own = [f"{'#' * level} {name}\n", _plain(command.help or ""), ""]
+    context = command.make_context(name, [], resilient_parsing=True)
+    rows = [_row(p, context) for p in command.params if p.name != "help"]
+    if rows:
+        own += ["| | |", "|---|---|", *rows, ""]
+    for inner, sub in getattr(command, "commands", {}).items():
+        own += _command(sub, f"{name} {inner}", level + 1)
+    return own
+
+
+def _row(option: Any, context: Any) -> str:
+    taken, words = option.get_help_record(context)
+    shown = taken.strip().replace("|", "\\|")
+    return f"| `{shown}` | {_plain(words)} |".replace("\n", " ")
+
+
+def _plain(text: str) -> str:
+    return (
+        re.sub(r"(?<!\n)[ \t]*\n(?!\n)", " ", text.strip())
+        .replace("<", "\\<")
+        .replace("|", "\\|")
+    )
+
+
+def api() -> str:
+    """Make a page of every public name, by the sections of the package's help."""
+    import ikns
+
+    stub = Path(ikns.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    parts = ["# Python\n", "Everything here is `from ikns import ...`.\n"]
+    for title, body in re.findall(
+        r"^# (\w+)\n((?:(?!^# ).*\n)*)", stub, flags=re.MULTILINE
+    ):
+        names = re.findall(r" as (\w+)", body)
+        parts += [f"## {title}\n", "```{eval-rst}", ".. currentmodule:: ikns\n"]
+        for name in names:
+            kind = (
+                "autoclass" if isinstance(getattr(ikns, name), type) else "autofunction"
+            )
+            parts += [f".. {kind}:: {name}"]
+            parts += ["   :members:\n" if kind == "autoclass" else ""]
+        parts += ["```\n"]
+    return "\n".join(parts)

@@ -1,0 +1,54 @@
+"""Sphinx: pages and notebooks. Build with ``sphinx-build -W notebooks build/docs``."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+
+from _pages import HERE, lead_to_pages, make_pages  # noqa: E402
+
+import ikns  # noqa: E402
+
+make_pages()
+
+project = "ikns"
+author = "The ikns developers"
+release = ikns.__version__
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "_mathml",
+]
+exclude_patterns = ["paper/**", "recordings/**", "**.ipynb_checkpoints"]
+root_doc = "index"
+
+# Notebooks hold their outputs, and the tests execute them.
+nb_execution_mode = "off"
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "dollarmath"]
+myst_heading_anchors = 4
+
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_validation_checks: set[str] = set()
+
+html_theme = "furo"
+html_title = f"ikns {release}"
+html_theme_options = {"navigation_with_keys": True}
+html_math_renderer = "mathml"
+html_show_copyright = False
+html_show_sphinx = False
+smartquotes = False  # two hyphens are an option
+
+
+def _lead_to_pages(app: Any, name: str, text: list[str]) -> None:
+    path = Path(app.env.doc2path(name))
+    if path.suffix == ".md" and path.parent != HERE / "generated":
+        text[0] = lead_to_pages(text[0], path.parent, path.parent)
+
+
+def setup(app: Any) -> None:
+    """Links in pages lead to files, as a reader of the repository needs them."""
+    app.connect("source-read", _lead_to_pages)
