@@ -85,7 +85,9 @@ def test_a_foreign_node_hears_what_the_session_has(subject, tmp_path):
     np.testing.assert_allclose(since, np.diff(kept.receive_time), rtol=0, atol=2e-6)
     clocks = time.time() - time.monotonic()
     at = [at for at, _, _ in heard["/arm/joint_states"]]
-    assert np.all(np.abs(stamps - clocks - at) < 1)
+    # A frame comes before it is heard of; an hour would be another clock.
+    since_receipt = np.array(at) - (stamps - clocks)
+    assert np.all((since_receipt > -0.01) & (since_receipt < 3600))
 
     # No message is missing, and each has the stamp as its source time.
     for topic in ("/arm/c", "/arm/joint_states"):
