@@ -22,6 +22,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import dask
 import tomli_w
 from distributed import Client, LocalCluster
 
@@ -118,6 +119,8 @@ def killing(cluster: Any, kills: int, seed: int) -> Iterator[list[int]]:
 def by_cluster(study: Path, workers: int, kills: int, seed: int) -> dict[str, Any]:
     """Simulate a study with so many workers on this computer."""
     with (
+        # Kills are not the fault of the task that a worker had.
+        dask.config.set({"distributed.scheduler.allowed-failures": 1000}),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,

@@ -11,7 +11,7 @@ PAGES = (
     *sorted(
         path
         for path in (ROOT / "notebooks").rglob("*.md")
-        if not {"generated", "recordings"} & set(path.parts)
+        if not {"generated", "paper", "recordings"} & set(path.parts)
     ),
 )
 #: Above a block that a test cannot run; the words say what it takes.

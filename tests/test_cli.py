@@ -230,6 +230,8 @@ def test_demo_runs_the_whole_line_and_says_that_it_is_simulated(
     assert summary.items() <= result.items()
     page = (out / "report.html").read_text()
     assert "imulated" in page
+    assert 'id="elbow-data"' in page
+    assert "data:image/png" not in page  # pictures are sharp at every size
     # One page shows all three methods, and what a turned hand does to each.
     turned = {
         name: row["turned_hand"] for name, row in result["methods"]["methods"].items()

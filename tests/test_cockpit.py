@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from accessible import judge
 
 from ikns.experiments.cockpit import Cockpit, page_socket
 from ikns.experiments.conduct import (
@@ -36,6 +37,10 @@ from ikns.experiments.visits import read_visit, tracking_record
 from ikns.finger import Safety, SimulatedFinger
 from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
 
+NEXT_WHILE_TRACKING = (
+    "The participant follows the line. Abort if something went wrong; the trial comes "
+    "again."
+)
 PAGES = ("gamepad", "keyboard", "mouse")
 #: A gamepad as browsers give it; the test moves its stick.
 GAMEPAD = """
@@ -339,6 +344,43 @@ def test_a_trial_with_the_keyboard_and_the_panel(chromium: Any, tmp_path: Path) 
     assert np.isnan(record.c[10:]).all()  # when the clock jumped it was too old
 
 
+def test_instructions_come_first_and_a_training_trial_tells_its_score(
+    chromium: Any, tmp_path: Path
+) -> None:
+    """And both pages fit a phone and are accessible, waiting and while a trial runs."""
+    with at_work(chromium, tmp_path / "v", ["ikns"], repeats=1, training=1) as visit:
+        panel, page = visit.panel(), visit.participant()
+        says(panel, "next", "Press Begin when the participant is ready.")
+        page.wait_for_selector("#card", state="visible")
+        assert "Lift your elbow" in page.inner_text("#card")
+        assert page.is_hidden("#score")
+        judge(page)
+        panel.click("#begin")
+        visit.until("align")
+        page.wait_for_selector("#card", state="hidden")
+        visit.let_pass(1.5)
+        visit.until("track")
+        says(panel, "next", NEXT_WHILE_TRACKING)
+        # The arm stays at 0.5, and tells so for longer than the second that is needed.
+        for _ in range(10):
+            visit.source.put(visit.clock.monotonic(), 0.5)
+            visit.let_pass(STEP)
+        visit.let_pass(25.0)
+        visit.until("waiting")
+        (row,) = visit.rows
+        assert row["kind"] == "training"
+        says(page, "points", f"{measure(tracking_record(row)).rmse:.1f}")
+        # Not again: the condition is known.
+        assert page.is_hidden("#how")
+        judge(panel)
+        # What a trial is worth is told in training only.
+        panel.click("#begin")
+        visit.until("align")
+        panel.click("#abort")
+        visit.until("waiting")
+        page.wait_for_selector("#card", state="hidden")
+
+
 def test_a_page_that_closes_and_one_that_watches(chromium: Any, tmp_path: Path) -> None:
     with at_work(chromium, tmp_path / "v", ["mouse"], repeats=1) as visit:
         first, second = visit.participant(), visit.participant()
@@ -409,7 +451,10 @@ def test_both_pages_say_which_gamepad_is_read(chromium: Any, tmp_path: Path) -> 
         page.evaluate("stick.mapping = ''")
         visit.wait(lambda shown: not shown["c"] == shown["c"])
         panel.wait_for_function(shown.format("Test is not understood: push"))
-        assert "not understood" in page.inner_text("#input")
+        page.wait_for_function(
+            "() => document.getElementById('input').textContent"
+            ".startsWith('Test is not understood')"
+        )
 
 
 @pytest.mark.parametrize("how", ["button", "panel key", "participant key"])
@@ -491,7 +536,8 @@ def test_old_values_are_shown_as_unknown(chromium: Any, tmp_path: Path) -> None:
         visit.clock.stop.set()
         try:
             says_news = "() => document.getElementById('lost').textContent"
-            panel.wait_for_function(f"{says_news}.startsWith('No news for ')")
+            said = "No update from the program for "
+            panel.wait_for_function(f"{says_news}.startsWith('{said}')")
             panel.wait_for_selector("#lost", state="visible")
         finally:
             visit.clock.stop.clear()

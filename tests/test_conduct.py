@@ -142,11 +142,11 @@ def test_a_trial_needs_a_signal_and_its_page(tmp_path: Path) -> None:
     at = conductor(tmp_path / "v")
     assert "page" in ask(at, 0.0, "begin")["message"]
     at.submit(Command("page_connected"))
-    assert "signal of keyboard" in ask(at, 0.1, "begin")["message"]
+    assert "signal from keyboard" in ask(at, 0.1, "begin")["message"]
     at.add_sample(1.0, math.nan)
-    assert "signal of keyboard" in ask(at, 1.0, "begin")["message"]
+    assert "signal from keyboard" in ask(at, 1.0, "begin")["message"]
     at.add_sample(1.0, 0.5)
-    assert "signal of keyboard" in ask(at, 2.1, "begin")["message"]
+    assert "signal from keyboard" in ask(at, 2.1, "begin")["message"]
     at.add_sample(3.0, 0.5)
     assert ask(at, 3.1, "begin")["state"] == "align"
 

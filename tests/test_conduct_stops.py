@@ -34,9 +34,7 @@ def test_no_trial_begins_while_the_finger_is_stopped(
     at = stopped(tmp_path / "v", experiment)
     shown = ask(at, 0.1, "begin")
     assert shown["state"] == "waiting"
-    assert shown["message"] == (
-        "Finger stopped (Too hot); connect again to begin a trial."
-    )
+    assert shown["message"] == ("Finger stopped (Too hot); press Connect again first.")
     assert shown["stopped"]["title"] == "Finger stopped"
     assert shown["stopped"]["reason"] == "Too hot."
     assert "Connect again" in shown["stopped"]["remedy"]
@@ -103,8 +101,8 @@ def test_after_an_emergency_stop_nothing_is_connected(tmp_path: Path) -> None:
 def test_a_refusal_disappears_when_it_no_longer_holds(tmp_path: Path) -> None:
     at = start(tmp_path / "v")
     at.add_sample(1.0, float("nan"))
-    assert "no control signal" in ask(at, 2.0, "begin")["message"]
-    assert "no control signal" in at.update(3.0)["message"]  # it still holds
+    assert "No control signal" in ask(at, 2.0, "begin")["message"]
+    assert "No control signal" in at.update(3.0)["message"]  # it still holds
     at.add_sample(4.0, 0.5)
     assert at.update(4.0)["message"] == ""
     ask(at, 4.0, "pause")

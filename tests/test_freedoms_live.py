@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 from command_line import check_refused
-from test_two_servos import servos_at
+from test_two_servos import BUSY, servos_at
 
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
@@ -41,6 +41,8 @@ READ = {
     "both_arms": ("right_shoulder_flexion", "left_shoulder_flexion"),
 }
 FRAMES = 60
+#: A busy machine may be late with its frames.
+UNHURRIED = {"hold_after": 20.0, "safe_after": 20.0}
 
 
 def subject(chain, n_dof=2):
@@ -104,9 +106,10 @@ def test_two_freedoms_drive_two_servos_of_a_port_and_replay_bit_for_bit(
             pass
 
     with Wire(*servos) as wire:
-        at = f"dynamixel:{wire.port}?baud=1000000"
-        group = open_fingers([f"{at}&id=1", f"{at}&id=2&dof=2"], n_dof=2)
-        settings = ControlSettings(dofs=group.dofs)
+        at = f"dynamixel:{wire.port}?baud=1000000&watchdog=2.5"
+        texts = [f"{at}&id=1", f"{at}&id=2&dof=2"]
+        group = open_fingers(texts, n_dof=2, safety=BUSY)
+        settings = ControlSettings(dofs=group.dofs, **UNHURRIED)
         report, session = recorded(
             person, tmp_path / "session", tmp_path, group, settings, listener=Hears()
         )
@@ -115,11 +118,14 @@ def test_two_freedoms_drive_two_servos_of_a_port_and_replay_bit_for_bit(
     model = session.model
     for k, servo in enumerate(servos, start=1):
         sent = model[f"flexion_{k}_sent"]
-        # What the session says was sent is what the servo accepted, to the tick.
+        # What the session says was sent is what the servo accepted, to the tick; it may
+        # have got more between two frames, on the way to what was asked.
         ticks = {round(1024 + 2048 * flexion) for flexion in sent[np.isfinite(sent)]}
         goals = {goal for _, goal in servo.goals}
-        assert len(goals) > 10
-        assert goals <= ticks | {2048}  # and the goal from which it began
+        assert len(goals & ticks) > 10
+        asked = 1024 + 2048 * model[f"flexion_{k}_asked"]
+        least, most = min(2048, np.nanmin(asked)), max(2048, np.nanmax(asked))
+        assert round(least) <= min(goals) <= max(goals) <= round(most)
         # Half the range of c is 0.6 rad; the kernel's pose is within a few tenths of a
         # milliradian of the body that the markers were drawn from.
         angle = np.sin(4 * session.device_time) if k == 1 else None
@@ -145,8 +151,8 @@ def test_two_freedoms_drive_two_servos_of_a_port_and_replay_bit_for_bit(
 @pytest.mark.parametrize("which", [1, 2])
 def test_a_servo_that_fails_in_the_loop_stops_both(which, tmp_path):
     with servos_at("one port", tmp_path) as (servos, texts):
-        group = open_fingers(texts, n_dof=2)
-        settings, torque = ControlSettings(dofs=group.dofs), []
+        group = open_fingers(texts, n_dof=2, safety=BUSY)
+        settings, torque = ControlSettings(dofs=group.dofs, **UNHURRIED), []
 
         def fail(received, flexion, decision):
             torque.append([servo["torque_enable"] for servo in servos])
@@ -164,7 +170,8 @@ def test_a_servo_that_fails_in_the_loop_stops_both(which, tmp_path):
         )
     assert torque[10] == [1, 1]
     assert torque[-1] == [0, 0]  # while the loop still ran
-    assert report.stopped == f"finger {which}: the servo reports overheating"
+    reasons = ("the servo reports overheating", "the servo has lost its torque")
+    assert report.stopped in [f"finger {which}: {reason}" for reason in reasons]
     assert replay_run(session).same
 
 

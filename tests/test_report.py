@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from ikns.errors import FileError, InvalidInput
 from ikns.view.directions import principal_angle_figure
 from ikns.view.parts import KeyNumber, NextStep, Picture, Section, Table
-from ikns.view.render import png, svg
+from ikns.view.render import svg
 from ikns.view.report import report_html, write_report
 from ikns.view.residuals import residual_figure
 from ikns.view.signals import control_figure, swivel_figure
@@ -104,7 +104,6 @@ def test_report_holds_every_part_in_order() -> None:
         "Simulated subject",
         "Calibration of one arm",
         "Everything worked.",
-        "Side",
         "Key numbers",
         "How far the hand drifts.",
         "What was learned",
@@ -115,10 +114,12 @@ def test_report_holds_every_part_in_order() -> None:
         "Only words",
         "Next steps",
         "ikns control --subject me/ trial.c3d",
+        "Side",
     ]
     body = text[text.index("Simulated subject") :]
-    places = [body.index(words) for words in order]
-    assert places == sorted(places)
+    place = 0
+    for words in order:
+        place = body.index(words, place)
 
 
 def test_report_has_one_main_heading_and_alternative_text_for_every_picture() -> None:
@@ -134,7 +135,7 @@ def test_report_loads_nothing_from_elsewhere() -> None:
     reader = Reader(usual_page())
     for _, attrs in reader.seen:
         for name in ("src", "href", "srcset", "data", "action", "poster"):
-            assert (attrs.get(name) or "data:").startswith("data:")
+            assert (attrs.get(name) or "data:").startswith(("data:", "#"))
     assert not reader.tags("script")
     assert not reader.tags("link")
     style = re.search(r"<style>(.*?)</style>", usual_page(), re.DOTALL)
@@ -148,11 +149,12 @@ def test_report_loads_nothing_from_elsewhere() -> None:
 
 def test_pictures_in_the_report_are_the_figures() -> None:
     images = [image["src"] or "" for image in Reader(usual_page()).tags("img")]
-    vector, pixels = (base64.b64decode(source.split(",")[1]) for source in images)
-    assert vector == svg(small_figure())
-    assert pixels == png(spatial_figure())
-    # Nothing inside a vector picture may point out of it either.
-    assert not re.search(rb'href="(?!#)', vector)
+    plain, spatial = (base64.b64decode(source.split(",")[1]) for source in images)
+    assert plain == svg(small_figure())
+    # Nothing inside a picture may point out of it either.
+    assert not re.search(rb'href="(?!#)', plain)
+    assert b"<image" in spatial
+    assert not re.search(rb'href="(?!#|data:image/png)', spatial)
 
 
 def test_simulated_is_said_in_header_and_every_caption_or_nowhere() -> None:

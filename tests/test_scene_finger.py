@@ -61,7 +61,9 @@ def test_it_is_worn_at_the_wrist_and_its_tip_is_the_opening_above_the_palm(
     # The URDF's tip is one module, 25 mm, beyond the last joint.
     tip = in_forearm @ in_base(flexion)[-1] @ [0.025, 0, 0, 1]
     hand = 0.028  # thickness in urdf/upper_body.urdf
-    assert tip[0] - hand / 2 == pytest.approx(opening(flexion), abs=ROUNDING)
+    # The palm of the hanging arm faces the thigh.
+    away = {"right": -tip[2], "left": tip[2]}[side]
+    assert away - hand / 2 == pytest.approx(opening(flexion), abs=ROUNDING)
     wrist = segment_lengths(person.skeleton.urdf)[f"{side}_forearm"]
     assert in_forearm[1, 3] == -wrist
     assert np.linalg.det(in_forearm[:3, :3]) == pytest.approx(1)

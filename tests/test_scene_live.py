@@ -15,7 +15,7 @@ import pytest
 import small_person
 
 from ikns.errors import FileError, InvalidInput
-from ikns.view.scene import LiveView, Scene, map_scene
+from ikns.view.scene import LiveView, Scene, body_view, map_scene
 from ikns.view.scene.body import drawn_links
 from ikns.view.scene.commands import ROOT
 
@@ -52,6 +52,13 @@ def next_frame(stream: IO[bytes]) -> dict[str, Any]:
         if line.startswith(b"data: "):
             return dict(json.loads(line[6:]))
     raise AssertionError("the stream ended")
+
+
+def test_the_page_of_a_person_is_titled_after_the_subject() -> None:
+    person = small_person.subject()
+    with body_view(person, simulated=True, name="ann & bo") as (view, _):
+        page = browser().open(view.url).read().decode()
+    assert "<title>ann &amp; bo, live (simulated)</title>" in page
 
 
 def test_a_posture_reaches_the_page(live: LiveView) -> None:

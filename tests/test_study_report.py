@@ -148,7 +148,8 @@ def test_the_answers_come_first_and_are_those_of_the_statistics(simulated):
     ]
     for each in answers:
         for sentence in (each["question"], *each["answer"]):
-            assert text.index(sentence) < text.index("What was done")
+            # The contents name it before.
+            assert text.index(sentence) < text.rindex("What was done")
     found = summary.groups[0].tracking.comparisons[0].analysis
     for sentence in (
         *(test.sentence() for test in found.paper),
@@ -165,6 +166,34 @@ def test_the_answers_come_first_and_are_those_of_the_statistics(simulated):
     ]
 
 
+def test_the_forest_plot_draws_the_tests_of_the_answers(simulated):
+    summary, _, drawn = simulated
+    name, forest = drawn[0]
+    assert name == "simulated_answers"
+    group = summary.groups[0]
+    tracked, picked = group.tracking.comparisons[0], group.picking.comparisons[0]
+    for axes, test, same in zip(
+        forest.figure.axes,
+        (tracked.analysis.subjects, picked.analysis.time.over_subjects),
+        (tracked.analysis.equivalence, picked.equivalence),
+        strict=True,
+    ):
+        lines = [list(line.get_xdata()) for line in axes.lines]
+        assert lines[1:] == [
+            [test.low, test.high],
+            [same.low, same.high],
+            [test.difference],
+        ]
+        (shade,) = axes.patches
+        assert shade.get_x() == -same.margin
+        assert shade.get_width() == 2 * same.margin
+        (said,) = axes.texts
+        assert same.verdict in said.get_text()
+        low, high = axes.get_xlim()
+        assert low < -same.margin
+        assert high > test.high
+
+
 def test_simulated_is_said_large_in_every_heading_caption_figure_and_file(simulated):
     summary, page, drawn = simulated
     reader = Reader(page)
@@ -178,7 +207,7 @@ def test_simulated_is_said_large_in_every_heading_caption_figure_and_file(simula
     assert "4 simulated participants" in text
     assert not re.findall(r"\d+ (?:participants|people|persons)", text)
     assert "What such a simulation can and cannot show" in page
-    assert len(drawn) == 7
+    assert len(drawn) == 8
     for name, each in drawn:
         assert name.startswith("simulated_")
         assert each.figure.get_suptitle().endswith("(simulated participants)")
@@ -224,7 +253,7 @@ def test_the_page_is_whole_and_loads_nothing(simulated, mixed):
         reader = Reader(page)
         for _, attrs in reader.seen:
             for name in ("src", "href", "srcset", "data", "action", "poster"):
-                assert (attrs.get(name) or "data:").startswith("data:")
+                assert (attrs.get(name) or "data:").startswith(("data:", "#"))
         tags = {tag for tag, _ in reader.seen}
         assert not tags & {"script", "link", "iframe"}
         assert not re.search(r"(url\(|@import|https?:)", page.split("</style>")[0])

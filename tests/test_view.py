@@ -4,6 +4,7 @@ Numbers are compared with what the artists hold. A coordinate is only permuted o
 multiplied by a unit factor on its way there: 1e-12 relative is rounding.
 """
 
+import base64
 import re
 import subprocess
 import sys
@@ -227,12 +228,22 @@ def test_the_same_input_gives_the_same_bytes(name: str) -> None:
     assert data_uri(figure) == data_uri(DRAW[name](True))
 
 
-def test_few_shapes_become_svg_and_many_become_png() -> None:
-    assert data_uri(Figure(figsize=(1, 1))).startswith("data:image/svg+xml;base64,")
+def test_pictures_are_svg_whose_crowds_alone_are_pixels() -> None:
     crowd = np.random.default_rng(5).normal(size=(4000, 2))
     many = swivel_figure(*crowd.T, np.zeros(4000, int), [0.0], simulated=True)
-    assert data_uri(many).startswith("data:image/png;base64,")
-    assert data_uri(DRAW["workspace"](True)).startswith("data:image/png;base64,")
+    for figure, pixels in (
+        (Figure(figsize=(1, 1)), False),
+        (many, True),
+        (DRAW["workspace"](True), True),
+    ):
+        kind, _, data = data_uri(figure).partition(",")
+        assert kind == "data:image/svg+xml;base64"
+        picture = base64.b64decode(data)
+        assert (b"<image" in picture) == pixels
+        # 60 bytes a point would be more.
+        assert len(picture) < 240_000
+    # The figure itself is as it was: its PDF has no pixels.
+    assert b"<image" not in svg(many)
 
 
 def test_labels_are_drawn_as_they_are_not_as_formulas() -> None:

@@ -207,8 +207,8 @@ def test_the_browser_takes_the_picture() -> None:
     browser = find_browser()
     if browser is None:
         pytest.skip(HOW_TO_GET_ONE)
-    taken = screenshot(browser, scene_html(mapped()), width=400, height=300, scale=1.5)
+    taken = screenshot(browser, scene_html(mapped()), width=600, height=450, scale=1.0)
     assert taken is not None
     image = matplotlib.image.imread(io.BytesIO(taken))[..., :3]
     assert image.shape[:2] == (450, 600)
-    assert colors(image[100:350, 150:450]) > 500
+    assert colors(image[150:400, 260:560]) > 500

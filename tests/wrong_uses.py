@@ -86,6 +86,7 @@ FINGER = [
     "ros2:",
     "ros2:/f",
     "ros2:/f?type=position&open=0&closed=1",
+    "lerobot:x",
 ]
 TEXT = ["", "a\udcff"]
 FLAG: list[str] = []

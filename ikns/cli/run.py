@@ -198,7 +198,8 @@ def run(
         arm = threading.Event()
         shown = [stack.enter_context(_status_line(arm))]
         if view:
-            shown.append(_body(stack, calibrated, simulated=simulated))
+            name = subject.resolve().name
+            shown.append(_body(stack, calibrated, name, simulated=simulated))
         report = drive(
             stream,
             calibrated,
@@ -235,12 +236,13 @@ def _check_options(
 
 
 def _body(
-    stack: ExitStack, calibrated: ikns.Subject, *, simulated: bool
+    stack: ExitStack, calibrated: ikns.Subject, name: str, *, simulated: bool
 ) -> Callable[[LoopStatus], None]:
     """Open the window with the body, and return what draws it."""
     from ikns.view.scene import body_view
 
-    window, take = stack.enter_context(body_view(calibrated, simulated=simulated))
+    shown = body_view(calibrated, simulated=simulated, name=name)
+    window, take = stack.enter_context(shown)
     sys.stderr.write(f"ikns: the view is at {window.url} on this machine.\n")
     window.open()
     return take

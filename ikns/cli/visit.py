@@ -134,7 +134,9 @@ def conduct(
             )
             shown = [stack.enter_context(stops)]
             if arm.view:
-                address = _open_view(stack, subject, shown, simulated=simulated)
+                assert arm.subject is not None
+                name = arm.subject.resolve().name
+                address = _open_view(stack, subject, name, shown, simulated=simulated)
             drivers["ikns"] = lambda: arm_driver(
                 arm, subject, session, identity.participant, shown, losses, publisher
             )
@@ -281,6 +283,7 @@ def _page_drivers(held: Mapping[str, HeldInput]) -> Drivers:
 def _open_view(
     stack: ExitStack,
     subject: ikns.Subject,
+    name: str,
     shown: list[Callable[[LoopStatus], None]],
     *,
     simulated: bool,
@@ -288,7 +291,8 @@ def _open_view(
     """Serve the 3-D view; `shown` gets what draws a status. Returns its address."""
     from ikns.view.scene import body_view
 
-    window, draw = stack.enter_context(body_view(subject, simulated=simulated))
+    view = body_view(subject, simulated=simulated, name=name)
+    window, draw = stack.enter_context(view)
     shown.append(draw)
     return window.url
 

@@ -10,8 +10,10 @@ from ikns.finger.dynamixel import DynamixelFinger
 from ikns.finger.errors import FingerError
 from ikns.finger.group import FingerGroup
 from ikns.finger.guard import Safety
+from ikns.finger.lerobot import LeRobotFinger
 from ikns.finger.limiter import Limiter, Limits
 from ikns.finger.opening import open_finger, open_fingers
+from ikns.finger.relay import RelayFinger
 from ikns.finger.ros import RosFinger
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import MODES, SAFE_STATES, Finger, FingerState
@@ -25,8 +27,10 @@ __all__ = [
     "FingerGroup",
     "FingerReport",
     "FingerState",
+    "LeRobotFinger",
     "Limiter",
     "Limits",
+    "RelayFinger",
     "RosFinger",
     "Safety",
     "SimulatedFinger",

@@ -12,6 +12,8 @@ from ikns.errors import InvalidInput, naming
 from ikns.finger.dynamixel import DynamixelFinger
 from ikns.finger.group import FingerGroup
 from ikns.finger.guard import Safety
+from ikns.finger.lerobot import LeRobotFinger
+from ikns.finger.lerobot_robot import make_robot
 from ikns.finger.ros import RosFinger
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import Finger
@@ -38,7 +40,13 @@ _ROS: dict[str, Callable[[str], Any]] = {
     "router": str,
     "domain": str,
 }
-_KNOWN = "sim:, dynamixel:PORT or ros2:TOPIC"
+_KNOWN = "sim:, dynamixel:PORT, ros2:TOPIC or lerobot:TYPE"
+#: What else an address has is the robot's own configuration.
+_LEROBOT: dict[str, Callable[[str], Any]] = {
+    "joint": str,
+    "open": float,
+    "closed": float,
+}
 
 
 def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
@@ -52,9 +60,12 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
         ticks; ``effort``; ``watchdog``, s), or
         ``ros2:TOPIC?type=joint_trajectory&joint=NAME&open=0&closed=1.2`` for a joint of
         a robot under ROS 2 (``type=position`` for a plain number; also ``feedback``, a
-        topic of joint states; ``rate``, Hz; ``router=HOST:PORT``; ``domain``). All take
-        ``safe=limp``, but for ROS 2, ``safe=hold`` or ``safe=open``, which takes
-        precedence over `safety`, and ``dof=1``, which only :func:`open_fingers` heeds.
+        topic of joint states; ``rate``, Hz; ``router=HOST:PORT``; ``domain``), or a
+        joint of a robot of lerobot,
+        ``lerobot:TYPE?joint=gripper.pos&open=100&closed=0`` with the robot's own
+        options such as ``port`` and ``id``. All take ``safe=limp``, but for ROS 2,
+        ``safe=hold`` or ``safe=open``, which takes precedence over `safety`, and
+        ``dof=1``, which only :func:`open_fingers` heeds.
     safety : Safety, optional
 
     Returns
@@ -65,6 +76,8 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
     ------
     InvalidInput
         When the address is not one of these.
+    FingerError
+        When lerobot is needed and not installed.
 
     Examples
     --------
@@ -72,8 +85,8 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
     0.06
     >>> open_finger("gpio:7")  # doctest: +NORMALIZE_WHITESPACE
     Traceback (most recent call last):
-    ikns.errors.InvalidInput: unknown finger 'gpio:7', expected sim:, dynamixel:PORT or
-    ros2:TOPIC.
+    ikns.errors.InvalidInput: unknown finger 'gpio:7', expected sim:, dynamixel:PORT,
+    ros2:TOPIC or lerobot:TYPE.
     """
     return _opened(address, Safety() if safety is None else safety)[0]
 
@@ -136,9 +149,17 @@ def open_fingers(
 
 
 def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
-    """Refuse two fingers on one servo, and servos that cannot share their port."""
+    """Refuse two fingers on one servo or robot, and servos that cannot share a port."""
     seen: dict[str, list[tuple[str, DynamixelFinger]]] = {}
+    robots: dict[str, str] = {}
     for address, finger in zip(addresses, fingers, strict=True):
+        if isinstance(finger, LeRobotFinger) and finger.port:
+            port = os.path.realpath(finger.port)
+            if (other := robots.setdefault(port, address)) != address:
+                raise InvalidInput(
+                    f"'{other}' and '{address}' are one robot, of which one joint can "
+                    "be a finger."
+                )
         if not isinstance(finger, DynamixelFinger):
             continue
         others = seen.setdefault(os.path.realpath(finger.port), [])
@@ -181,6 +202,9 @@ def _opened(address: str, safety: Safety) -> tuple[Finger, int]:
         return DynamixelFinger(port, safety=safety, **values), dof
     if scheme == "ros2" and colon:
         return _ros_finger(address, rest, safety)
+    if scheme == "lerobot" and colon:
+        kind, _, query = rest.partition("?")
+        return _lerobot_finger(address, kind, query, safety)
     raise InvalidInput(f"unknown finger '{address}', expected {_KNOWN}.")
 
 
@@ -211,6 +235,24 @@ def _ros_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
     return finger, dof
 
 
+def _lerobot_finger(
+    address: str, kind: str, query: str, safety: Safety
+) -> tuple[Finger, int]:
+    pairs = _pairs(address, query)
+    ours = {*_LEROBOT, "safe", "dof"}
+    values = _values(address, [pair for pair in pairs if pair[0] in ours], _LEROBOT)
+    missing = [name for name in _LEROBOT if name not in values]
+    if not kind or missing:
+        raise InvalidInput(
+            f"'{address}' lacks {', '.join(missing) or 'the type of the robot'}, as in "
+            "lerobot:so101_follower?joint=gripper.pos&open=100&closed=0&port=PORT&id=ID."
+        )
+    safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
+    dof = _dof(address, values.pop("dof", 1))
+    robot = make_robot(kind, {name: text for name, text in pairs if name not in ours})
+    return LeRobotFinger(robot, safety=safety, **values), dof
+
+
 def _dof(address: str, dof: int) -> int:
     if dof < 1:
         raise InvalidInput(f"'{address}' has dof={dof}, expected a number from 1 on.")
@@ -220,14 +262,25 @@ def _dof(address: str, dof: int) -> int:
 def _options(
     address: str, query: str, known: dict[str, Callable[[str], Any]]
 ) -> dict[str, Any]:
-    types: dict[str, Callable[[str], Any]] = {**known, "safe": str, "dof": int}
-    values: dict[str, Any] = {}
+    return _values(address, _pairs(address, query), known)
+
+
+def _pairs(address: str, query: str) -> list[tuple[str, str]]:
     try:
-        pairs = parse_qsl(query, strict_parsing=True) if query else []
+        return parse_qsl(query, strict_parsing=True) if query else []
     except ValueError:
         raise InvalidInput(
             f"'{address}' should end in options like name=value&name=value."
         ) from None
+
+
+def _values(
+    address: str,
+    pairs: list[tuple[str, str]],
+    known: dict[str, Callable[[str], Any]],
+) -> dict[str, Any]:
+    types: dict[str, Callable[[str], Any]] = {**known, "safe": str, "dof": int}
+    values: dict[str, Any] = {}
     for name, text in pairs:
         if name not in types:
             raise InvalidInput(

@@ -6,6 +6,8 @@ import contextlib
 import errno
 import fcntl
 import os
+import re
+import sys
 import termios
 import time
 from pathlib import Path
@@ -19,6 +21,8 @@ _WAIT = 0.001
 _WRITE_TIMEOUT = 0.1
 #: Major device numbers of pseudo-terminals (Linux, Documentation/admin-guide/devices).
 _PSEUDO_TERMINALS = range(136, 144)
+#: Names of pseudo-terminals on macOS; its serial ports are tty.NAME and cu.NAME.
+_MACOS_PSEUDO_TERMINAL = re.compile(r"/dev/ttys\d+")
 
 
 def port_errors() -> tuple[type[Exception], ...]:
@@ -47,9 +51,11 @@ def port_error_text(error: Exception, port: str) -> str:
     """Say what is wrong with a port, and what to do about it."""
     number = error.args[0] if error.args else None
     if number == errno.ENOENT:
-        return "no such port, see ls /dev/serial/by-id"
+        places = "/dev/serial/by-id" if sys.platform == "linux" else "/dev/cu.*"
+        return f"no such port, see ls {places}"
     if number in (errno.EACCES, errno.EPERM):
-        return "not permitted, add yourself to its group (dialout) and log in again"
+        group = " (dialout)" if sys.platform == "linux" else ""
+        return f"not permitted, add yourself to its group{group} and log in again"
     if number in (errno.EAGAIN, errno.EBUSY):
         holder = port_holder(port)
         which = f" (process {holder})" if holder else ""
@@ -108,6 +114,12 @@ def _exclude_others(number: int) -> None:
     Root may nevertheless. A pseudo-terminal would stay closed to everyone after this
     program was killed, as the emulator keeps it open.
     """
-    if os.major(os.fstat(number).st_rdev) not in _PSEUDO_TERMINALS:
+    if not _is_pseudo_terminal(number):
         with contextlib.suppress(OSError):
             fcntl.ioctl(number, termios.TIOCEXCL)
+
+
+def _is_pseudo_terminal(number: int) -> bool:
+    if sys.platform == "linux":
+        return os.major(os.fstat(number).st_rdev) in _PSEUDO_TERMINALS
+    return _MACOS_PSEUDO_TERMINAL.fullmatch(os.ttyname(number)) is not None

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from ikns.body.chains import SIDES, chain_joints
 from ikns.experiments.demo import Demo
+from ikns.view.elbow import elbow_widget
 from ikns.view.figures import (
     arm_points,
     control_figure,
@@ -87,8 +88,10 @@ def write_demo_report(path: Path, demo: Demo, summary: Mapping[str, Any]) -> Non
         },
         key_numbers=_key_numbers(summary),
         sections=[
-            *_map_sections(figures),
+            _elbow_section(demo),
+            _signal_section(figures),
             _methods_section(figures, demo, summary),
+            *_map_sections(figures),
             _body_section(figures, demo, summary),
         ],
         next_steps=_NEXT_STEPS,
@@ -198,8 +201,47 @@ def _key_numbers(summary: Mapping[str, Any]) -> list[KeyNumber]:
     ]
 
 
+def _elbow_section(demo: Demo) -> Section:
+    """Let the reader move the elbow."""
+    return Section(
+        "Move the elbow yourself",
+        [
+            "The hand holds its place and its orientation; what is left to this arm is "
+            "to turn the elbow about the line from shoulder to wrist. Drag it: c "
+            "follows, and so does the finger. Everything is computed in this page from "
+            "the map's own numbers. The person is simulated.",
+        ],
+        widget=elbow_widget(demo.subject),
+    )
+
+
+def _signal_section(figures: Mapping[str, Figure]) -> Section:
+    """Show c against the truth, and over time."""
+    return Section(
+        "Control signal",
+        [
+            "While the hand reaches elsewhere c moves too (crosstalk): the map "
+            "only promises meaning while the hand is held."
+        ],
+        [
+            Picture(
+                figures["swivel"],
+                "c against the true elbow swivel while the hand is still. Same "
+                "slope everywhere: same sign.",
+                "Scatter plots, one per PCA point",
+            ),
+            Picture(
+                figures["control"],
+                "The free exploration, which the map has not seen; "
+                "`control.csv` holds it clipped to 0 to 1.",
+                "Time series of c and of the hand speed",
+            ),
+        ],
+    )
+
+
 def _map_sections(figures: Mapping[str, Figure]) -> list[Section]:
-    """Where the map was learned, its directions, and the control signal."""
+    """Where the map was learned, and its directions."""
     return [
         Section(
             "Where the null space was learned",
@@ -219,6 +261,7 @@ def _map_sections(figures: Mapping[str, Figure]) -> list[Section]:
         ),
         Section(
             "Directions",
+            folded=True,
             pictures=[
                 Picture(
                     figures["directions"],
@@ -230,27 +273,6 @@ def _map_sections(figures: Mapping[str, Figure]) -> list[Section]:
                     figures["angles"],
                     "Angle between learned and analytic direction.",
                     "Dots: one angle per PCA point",
-                ),
-            ],
-        ),
-        Section(
-            "Control signal",
-            [
-                "While the hand reaches elsewhere c moves too (crosstalk): the map "
-                "only promises meaning while the hand is held."
-            ],
-            [
-                Picture(
-                    figures["swivel"],
-                    "c against the true elbow swivel while the hand is still. Same "
-                    "slope everywhere: same sign.",
-                    "Scatter plots, one per PCA point",
-                ),
-                Picture(
-                    figures["control"],
-                    "The free exploration, which the map has not seen; "
-                    "`control.csv` holds it clipped to 0 to 1.",
-                    "Time series of c and of the hand speed",
                 ),
             ],
         ),
@@ -318,6 +340,7 @@ def _body_section(
     true = demo.protocol.subject.skeleton.segment_lengths
     return Section(
         "Body and tracking",
+        folded=True,
         pictures=[
             Picture(
                 figures["residual"],

@@ -5,20 +5,24 @@ All text is plain: it is escaped, except that `backticks` set code.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from ikns.errors import InvalidInput
+from ikns.view.cells import (
+    Cell,
+    cell_html,
+    inline,
+    is_number,
+    plain_cell,
+    shared_decimals,
+)
 from ikns.view.render import data_uri
 from ikns.view.style import PAGE_WIDTH
-
-Cell = str | int | float | bool | None
 
 
 @dataclass(frozen=True)
@@ -40,13 +44,28 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Widget:
+    """Part of a page that one can move: our own HTML, not escaped, and its script."""
+
+    html: str
+    script: str
+
+
+@dataclass(frozen=True)
 class Section:
-    """A heading with paragraphs, pictures and tables, in this order."""
+    """A heading with paragraphs, a widget, pictures and tables, in this order.
+
+    What is in `details` is folded away until it is asked for; a section that is
+    `folded` shows its heading only.
+    """
 
     title: str
     text: Sequence[str] = ()
     pictures: Sequence[Picture] = ()
     tables: Sequence[Table] = ()
+    details: Sequence[Picture | Table] = ()
+    widget: Widget | None = None
+    folded: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,14 +95,43 @@ class ReportPage:
         self.suffix = ' <span class="tag">Simulated.</span>' if simulated else ""
         self.figures = 0
         self.tables = 0
+        self.headings: dict[str, str] = {}  # title by its id, in order
+        self.section_tag = ""  # label of a section's heading
+
+    def anchor(self, title: str) -> str:
+        """Return an id for a heading, and list it in the contents."""
+        name = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:60] or "section"
+        unique, number = name, 1
+        while unique in self.headings:
+            number += 1
+            unique = f"{name}-{number}"
+        self.headings[unique] = title
+        return unique
 
     def section(self, section: Section) -> str:
-        """Heading, paragraphs, pictures, tables."""
-        parts = [f"<section><h2>{inline(section.title)}</h2>"]
-        parts += [f"<p>{inline(paragraph)}</p>" for paragraph in section.text]
+        """Heading, paragraphs, widget, pictures, tables, details."""
+        parts = [f"<p>{inline(paragraph)}</p>" for paragraph in section.text]
+        parts += [] if section.widget is None else [section.widget.html]
         parts += [self.picture(picture) for picture in section.pictures]
         parts += [self.table(table) for table in section.tables]
-        return "\n".join([*parts, "</section>"])
+        parts += [self.folded(detail) for detail in section.details]
+        head = f"<h2>{inline(section.title)}{self.section_tag}</h2>"
+        if section.folded:
+            head = f'<details class="whole"><summary>{head}</summary>'
+            parts.append("</details>")
+        opening = f'<section id="{self.anchor(section.title)}">{head}'
+        return "\n".join([opening, *parts, "</section>"])
+
+    def folded(self, detail: Picture | Table) -> str:
+        """Picture or table under a line that opens it."""
+        if isinstance(detail, Picture):
+            name, html = f"Figure {self.figures + 1}", self.picture(detail)
+        else:
+            name, html = f"Table {self.tables + 1}", self.table(detail)
+        # As far as the first clause: what is folded has its whole caption inside.
+        words = re.split(r"[.:;,]\s|\.$", detail.caption)[0]
+        summary = f"{name}: {words}" if words else name
+        return f"<details><summary>{inline(summary)}</summary>{html}</details>"
 
     def picture(self, picture: Picture) -> str:
         """Figure with its image inside and its caption."""
@@ -93,10 +141,14 @@ class ReportPage:
             )
         self.figures += 1
         share = min(100.0, 100 * picture.figure.get_figwidth() / PAGE_WIDTH)
+        # Text has one size in all pictures, so a narrow figure stays narrow; on a phone
+        # a wide one is scrolled.
         return (
-            f'<figure><img src="{data_uri(picture.figure)}" '
-            # Text has one size in all pictures, so a narrow figure stays narrow.
-            f'style="width: {share:.0f}%" alt="{escape(picture.alt)}">\n'
+            f'<figure><div class="scroll picture" tabindex="0" role="group" '
+            f'aria-label="Figure {self.figures}">'
+            f'<img src="{data_uri(picture.figure)}" '
+            f'style="width: {share:.0f}%; min-width: {0.4 * share:.0f}rem" '
+            f'alt="{escape(picture.alt)}"></div>\n'
             f"<figcaption><b>Figure {self.figures}.</b> {inline(picture.caption)}"
             f"{self.suffix}</figcaption></figure>"
         )
@@ -110,13 +162,13 @@ class ReportPage:
                     f"{len(row)} cells."
                 )
         self.tables += 1
-        rows = [[_plain(cell) for cell in row] for row in table.rows]
+        rows = [[plain_cell(cell) for cell in row] for row in table.rows]
         columns = [[row[k] for row in rows] for k in range(len(table.columns))]
         side = [
-            'class="number"' if cells and all(map(_is_number, cells)) else ""
+            'class="number"' if cells and all(map(is_number, cells)) else ""
             for cells in columns
         ]
-        decimals = [_decimals(cells) for cells in columns]
+        decimals = [shared_decimals(cells) for cells in columns]
         head = "".join(
             f'<th scope="col" {s}>{inline(name)}</th>'
             for name, s in zip(table.columns, side, strict=True)
@@ -124,7 +176,7 @@ class ReportPage:
         body = "\n".join(
             "<tr>"
             + "".join(
-                f"<td {s}>{_cell(cell, d)}</td>"
+                f"<td {s}>{cell_html(cell, d)}</td>"
                 for cell, s, d in zip(row, side, decimals, strict=True)
             )
             + "</tr>"
@@ -132,27 +184,36 @@ class ReportPage:
         )
         caption = f"<b>Table {self.tables}.</b> {inline(table.caption)}{self.suffix}"
         return (
-            f'<div class="scroll"><table><caption>{caption}</caption>'
+            f'<div class="scroll" tabindex="0" role="group" '
+            f'aria-label="Table {self.tables}"><table><caption>{caption}</caption>'
             f"<thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table></div>"
         )
 
     def key_numbers(self, numbers: Sequence[KeyNumber]) -> str:
-        """Table of results to see first."""
+        """Results to see first, large."""
         if not numbers:
             return ""
-        rows = "\n".join(
-            f'<tr><th scope="row">{inline(number.name)}</th>'
-            f'<td class="value">{inline(number.value)}</td>'
-            f"<td>{inline(number.meaning)}</td></tr>"
+        items = "\n".join(
+            f"<div><dt>{inline(number.name)}</dt>"
+            f'<dd class="value">{inline(number.value)}</dd>'
+            f"<dd>{inline(number.meaning)}</dd></div>"
             for number in numbers
         )
-        caption = f"<caption>{self.suffix}</caption>" if self.suffix else ""
+        anchor = self.anchor("Key numbers")
         return (
-            '<section><h2>Key numbers</h2><div class="scroll">'
-            f'<table class="key">{caption}<thead><tr><th scope="col">Quantity</th>'
-            '<th scope="col">Value</th><th scope="col">What it means</th></tr></thead>'
-            f"\n<tbody>{rows}</tbody></table></div></section>"
+            f'<section id="{anchor}"><h2>Key numbers{self.suffix}</h2>'
+            f'<dl class="keys">{items}</dl></section>'
         )
+
+    def contents(self) -> str:
+        """Links to all headings so far; none where there are only two."""
+        if len(self.headings) < 3:
+            return ""
+        items = "".join(
+            f'<li><a href="#{name}">{inline(title)}</a></li>'
+            for name, title in self.headings.items()
+        )
+        return f'<nav class="contents" aria-label="Contents"><ol>{items}</ol></nav>'
 
 
 def facts_html(facts: Mapping[str, Cell]) -> str:
@@ -160,8 +221,9 @@ def facts_html(facts: Mapping[str, Cell]) -> str:
     if not facts:
         return ""
     items = "".join(
-        f"<div><dt>{inline(name)}</dt><dd>{_cell(value, _decimals([value]))}</dd></div>"
-        for name, value in ((name, _plain(given)) for name, given in facts.items())
+        f"<div><dt>{inline(name)}</dt>"
+        f"<dd>{cell_html(value, shared_decimals([value]))}</dd></div>"
+        for name, value in ((name, plain_cell(given)) for name, given in facts.items())
     )
     return f'<dl class="facts">{items}</dl>'
 
@@ -171,43 +233,8 @@ def steps_html(steps: Sequence[NextStep]) -> str:
     if not steps:
         return ""
     items = "\n".join(
-        f"<li>{inline(step.does)}<pre><code>{escape(step.command)}</code></pre></li>"
+        f'<li>{inline(step.does)}<pre tabindex="0"><code>{escape(step.command)}'
+        "</code></pre></li>"
         for step in steps
     )
-    return f"<section><h2>Next steps</h2><ol>{items}</ol></section>"
-
-
-def inline(text: str) -> str:
-    """Return plain text as HTML; `backticks` set code.
-
-    >>> inline("`a < b`")
-    '<code>a &lt; b</code>'
-    """
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
-
-
-def _plain(value: Cell | np.generic) -> Cell:
-    plain: Cell = value.item() if isinstance(value, np.generic) else value
-    return plain
-
-
-def _cell(value: Cell, decimals: int) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.{decimals}f}"
-    return inline(str(value))
-
-
-def _decimals(cells: Sequence[Cell]) -> int:
-    """Return the decimals with which the largest number has three digits."""
-    sizes = [abs(c) for c in cells if isinstance(c, float) and math.isfinite(c) and c]
-    return min(6, max(0, 2 - math.floor(math.log10(max(sizes))))) if sizes else 0
-
-
-def _is_number(value: Cell) -> bool:
-    return value is None or (
-        isinstance(value, int | float) and not isinstance(value, bool)
-    )
+    return f'<section id="next"><h2>Next steps</h2><ol>{items}</ol></section>'

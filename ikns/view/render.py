@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,7 +16,7 @@ from ikns.view.style import figure_style
 
 #: Dots per inch of a PNG: about two per pixel of a page 900 pixels wide.
 _DPI = 170
-#: Points of a figure above which an SVG (60 bytes each) is larger than the PNG.
+#: Points of a figure's lines (60 bytes each in an SVG) above which they become pixels.
 _MOST_POINTS = 3000
 
 
@@ -33,22 +36,39 @@ def pdf(figure: Figure) -> bytes:
 
 
 def data_uri(figure: Figure) -> str:
-    """Return the picture for ``<img src>``: an SVG, or a PNG where that is smaller.
+    """Return the picture for ``<img src>``: an SVG, sharp at every size.
+
+    Long lines, and surfaces in space, are pixels within it, which are smaller; text and
+    axes are not.
 
     >>> data_uri(Figure(figsize=(1, 1)))[:26]
     'data:image/svg+xml;base64,'
     """
-    if _is_crowded(figure):
-        kind, picture = "image/png", png(figure)
-    else:
-        kind, picture = "image/svg+xml", svg(figure)
-    return f"data:{kind};base64,{base64.b64encode(picture).decode('ascii')}"
+    with _crowds_as_pixels(figure):
+        picture = svg(figure)
+    return f"data:image/svg+xml;base64,{base64.b64encode(picture).decode('ascii')}"
 
 
-def _is_crowded(figure: Figure) -> bool:
-    sizes = (np.size(line.get_xdata()) for axes in figure.axes for line in axes.lines)
-    # 3-D axes are used for surfaces and clouds of points.
-    return sum(sizes) > _MOST_POINTS or any(axes.name == "3d" for axes in figure.axes)
+@contextmanager
+def _crowds_as_pixels(figure: Figure) -> Iterator[None]:
+    """Draw what would make a large SVG as pixels, here only."""
+    lines = [line for axes in figure.axes for line in axes.lines]
+    sizes = [np.size(line.get_xdata()) for line in lines]
+    crowded = sum(sizes) > _MOST_POINTS
+    # The longest, which are those of measured time series.
+    long = [x for x, n in zip(lines, sizes, strict=True) if n > max(sizes) / 10]
+    solid = [axes for axes in figure.axes if axes.name == "3d"]
+    for line in long:
+        line.set_rasterized(crowded)
+    for axes in solid:  # all but its three axes
+        axes.set_rasterization_zorder(math.inf)
+    try:
+        yield
+    finally:
+        for line in long:
+            line.set_rasterized(False)
+        for axes in solid:
+            axes.set_rasterization_zorder(None)
 
 
 def _saved(figure: Figure, kind: str) -> bytes:

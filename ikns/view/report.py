@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -9,8 +11,8 @@ from pathlib import Path
 
 from ikns.errors import FileError
 from ikns.output.file import write_bytes
+from ikns.view.cells import Cell, inline
 from ikns.view.parts import (
-    Cell,
     KeyNumber,
     NextStep,
     Picture,
@@ -18,7 +20,6 @@ from ikns.view.parts import (
     Section,
     Table,
     facts_html,
-    inline,
     steps_html,
 )
 
@@ -77,35 +78,44 @@ def report_html(
     page = ReportPage(simulated)
     style = files("ikns.view").joinpath("report.css").read_text(encoding="utf-8")
     badge = '<p class="badge">Simulated subject</p>' if simulated else ""
+    found = [page.key_numbers(key_numbers), *map(page.section, sections)]
     body = [
         f"<header>{badge}<h1>{inline(title)}</h1>",
         f'<p class="lead">{inline(lead)}</p>' if lead else "",
-        facts_html(facts or {}),
+        page.contents(),
         "</header><main>",
-        page.key_numbers(key_numbers),
-        *(page.section(section) for section in sections),
+        *found,
         steps_html(next_steps),
         "</main>",
+        f"<footer>{facts_html(facts)}</footer>" if facts else "",
     ]
-    return html_document(title, style, body)
+    scripts = [s.widget.script for s in sections if s.widget is not None]
+    return html_document(title, style, body, scripts=scripts)
 
 
-def html_document(title: str, style: str, body: Iterable[str]) -> str:
+def html_document(
+    title: str, style: str, body: Iterable[str], *, scripts: Iterable[str] = ()
+) -> str:
     """Return a document; the browser itself refuses whatever it would load.
 
     Title is plain text, style CSS; body are HTML elements, of which empty ones are left
-    out.
+    out; no script runs but these.
     """
+    code = [f"\n{script}" for script in scripts]
+    digests = [hashlib.sha256(text.encode()).digest() for text in code]
+    allowed = "".join(f" 'sha256-{base64.b64encode(d).decode()}'" for d in digests)
+    policy = f"; script-src{allowed}" if allowed else ""
     parts = [
         "<!DOCTYPE html>",
         '<html lang="en"><head><meta charset="utf-8">',
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-        "img-src data:; style-src 'unsafe-inline'\">",
+        f"img-src data:; style-src 'unsafe-inline'{policy}\">",
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         '<meta name="color-scheme" content="light dark">',
         f"<title>{escape(title)}</title>",
         f"<style>\n{style}</style></head><body>",
         *body,
+        *(f"<script>{text}</script>" for text in code),
         "</body></html>",
     ]
     return "\n".join(part for part in parts if part) + "\n"

@@ -17,6 +17,7 @@ FILES = {
     "/cockpit.css": ("cockpit.css", "text/css"),
     "/link.js": ("link.js", "text/javascript"),
     "/plot.js": ("plot.js", "text/javascript"),
+    "/words.js": ("words.js", "text/javascript"),
     "/hands.js": ("hands.js", "text/javascript"),
     "/participant.js": ("participant.js", "text/javascript"),
     "/panel.js": ("panel.js", "text/javascript"),

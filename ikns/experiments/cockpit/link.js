@@ -11,7 +11,7 @@ export function connect(role, handlers) {
   const watch = () => {
     const age = performance.now() - told, open = socket.readyState === WebSocket.OPEN;
     find("lost").hidden = open && age <= KNOWN_FOR;
-    if (!find("lost").hidden) write("lost", open ? `No news for ${(age / 1000).toFixed(0)} s` : "No connection. If the command was started again, open the address that it printed.");
+    if (!find("lost").hidden) write("lost", open ? `No update from the program for ${(age / 1000).toFixed(0)} s` : "Connection lost. If the command was restarted, open the address that it printed.");
   };
   const open = () => {
     socket = new WebSocket(`ws://${location.host}/link?role=${role}`);

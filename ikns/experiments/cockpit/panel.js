@@ -1,5 +1,6 @@
 import { connect, find, known, write } from "/link.js";
 import { Plot } from "/plot.js";
+import { next, STATES } from "/words.js";
 
 let hello = { experiment: "tracking" }, shown = null, steps = "";
 const plot = new Plot(find("plot"));
@@ -15,6 +16,7 @@ const send = connect("panel", {
     find("plot").hidden = picking;
     if (message.view && find("view").src !== message.view) find("view").src = message.view;
     find("view").hidden = !message.view;
+    find("task").hidden = !picking;
   },
   plan(message) { showSteps(message.steps); },
   curve(message) { plot.begin(message); },
@@ -25,10 +27,6 @@ const send = connect("panel", {
 });
 
 const MARKS = { done: "\u2713", success: "\u2713", dropped: "\u2715", timeout: "\u23f1", skipped: "\u2013" };
-const STATES = {
-  waiting: "Waiting", align: "Align", track: "Tracking", ready: "Ready", running: "Running", judge: "How did it go?",
-  rest: "Rest", paused: "Paused", finished: "Finished", stopped: "STOPPED",
-};
 
 function item(name, ...parts) {
   const element = document.createElement("li");
@@ -74,9 +72,9 @@ const number = (value, digits, unit = "") => (known(value) ? `${value.toFixed(di
 function facts() {
   const source = shown.source, rows = [["c", number(shown.c, 3), known(shown.c) ? "" : "bad"]];
   if (source.kind === "page") {
-    rows.push(["Participant's page", shown.page_connected ? "connected" : "none", shown.page_connected ? "good" : "bad"]);
+    rows.push(["Participant's page", shown.page_connected ? "connected" : "not open", shown.page_connected ? "good" : "bad"]);
     if (source.device) rows.push(["Gamepad", source.device, known(shown.c) ? "" : "bad"]);
-    rows.push(["Screen to answer, p99", number(known(source.round_trip) ? 1000 * source.round_trip : null, 0, " ms")]);
+    rows.push(["Page round trip, p99", number(known(source.round_trip) ? 1000 * source.round_trip : null, 0, " ms")]);
   }
   const milli = (value, digits, unit) => number(known(value) ? 1000 * value : null, digits, unit);
   // A value that was measured too long ago is unknown, whatever it was.
@@ -165,6 +163,14 @@ function showControls() {
   write("end", state === "stopped" ? "Acknowledge and end the run" : "End the run");
 }
 
+// Object and clock, readable from where the object lies.
+function showTask(step, time) {
+  const there = step !== null && step.kind !== "rest" && shown.experiment === "picking";
+  write("task_code", there ? `Object ${step.what}` : "");
+  write("task_name", there ? step.name : STATES[shown.state] ?? "");
+  write("task_left", time);
+}
+
 function showBanner() {
   const { stopped } = shown;
   find("banner").hidden = stopped === null;
@@ -181,7 +187,10 @@ function frame() {
     const words = step === null || step.kind === "rest" ? "" : `${step.condition} \u00b7 ${step.kind} \u00b7 ${step.what}${step.name ? ` ${step.name}` : ` \u00b7 ${step.repeat}`}`;
     write("what", words);
     const left = state === "align" || state === "rest" ? shown.countdown : trial.time_left;
-    write("clock", known(left) ? `${left.toFixed(1)} s` : "");
+    const time = known(left) ? `${left.toFixed(1)} s` : "";
+    write("clock", time);
+    write("next", next(shown));
+    showTask(step, time);
     write("place", `${shown.trials - shown.trials_left} of ${shown.trials} done`);
     write("page", shown.page_connected ? "Participant's page is open" : "");
     find("open").hidden = shown.page_connected || !shown.page_condition;
@@ -208,9 +217,10 @@ function submit(name) {
 
 find("emergency").addEventListener("click", () => send({ command: "emergency" }));
 for (const button of document.querySelectorAll("[data-command]"))
-  button.addEventListener("click", () => {
+  button.addEventListener("click", (event) => {
     submit(button.dataset.command);
-    button.blur();
+    // The space bar does not press it again; with the keyboard the focus stays.
+    if (event.detail > 0) button.blur();
   });
 window.addEventListener("keydown", (event) => {
   if (event.code === "Escape") send({ command: "emergency" });

@@ -1,15 +1,7 @@
 import { connect, find, known, write } from "/link.js";
 import { Hands } from "/hands.js";
 import { Plot } from "/plot.js";
-
-const HINTS = {
-  keyboard: "Up and down with the arrow keys, or W and S",
-  mouse: "The pointer follows the mouse",
-  gamepad: "Push the stick up",
-  ikns: "Lift and lower the elbow, the hand stays",
-  ring: "Press the button to close, again to open",
-  virtual: "A virtual operator is in control",
-};
+import { hint, instructions, score } from "/words.js";
 
 let hello = { role: "viewer", stick: "left", experiment: "tracking" }, shown = null;
 const plot = new Plot(find("plot"), { big: true });
@@ -39,12 +31,22 @@ const hands = new Hands(plot, {
 
 const seconds = (value) => (value >= 60 ? `${Math.floor(value / 60)}:${String(Math.ceil(value) % 60).padStart(2, "0")}` : String(Math.ceil(value)));
 
-function hint() {
-  if (hello.role !== "participant") return "Another page is in control; this one only watches";
-  const trigger = shown.condition === "gamepad" && hello.stick === "trigger";
-  const words = trigger ? "Press the right trigger" : HINTS[shown.condition] ?? "";
-  const key = { keyboard: "the space bar", mouse: "the space bar", gamepad: "the first button or the space bar" }[shown.condition];
-  return shown.state === "waiting" && shown.page_condition && key ? `${words}. Begin with ${key}.` : words;
+// Instructions before the first trial, and the score of a training trial.
+function showCard() {
+  const todo = instructions(shown, hello), worth = score(shown);
+  find("card").hidden = !todo.length && worth === null;
+  find("score").hidden = worth === null;
+  write("points", worth?.[0] ?? "");
+  write("meaning", worth?.[1] ?? "");
+  find("how").hidden = find("steps").hidden = !todo.length;
+  const list = find("steps"), text = todo.join("\n");
+  if (list.dataset.text === text) return;
+  list.dataset.text = text;
+  list.replaceChildren(...todo.map((sentence) => {
+    const item = document.createElement("li");
+    item.textContent = sentence;
+    return item;
+  }));
 }
 
 function showTrial() {
@@ -77,7 +79,8 @@ function frame() {
     write("prompt", shown.prompt);
     const done = shown.trials - shown.trials_left, training = shown.step?.kind === "training";
     write("place", shown.trials_left ? `${training ? "Training, " : ""}${done + 1} of ${shown.trials}` : "");
-    write("hint", hint());
+    write("hint", hint(shown, hello));
+    showCard();
     write("input", shown.page_condition && hello.role === "participant" ? input() : "");
     showTrial();
   }

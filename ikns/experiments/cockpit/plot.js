@@ -1,7 +1,7 @@
 // The whole profile, the pointer that crosses it, and the pointer's trail.
 import { known } from "/link.js";
 
-const INK = "#1d2430", SOFT = "#8a93a0", LINE = "#e4e7eb", RED = "#d02f1c";
+const INK = "#1d2430", SOFT = "#5a6472", LINE = "#e4e7eb", RED = "#d02f1c";
 
 // Three canvases on top of each other, so that a frame is cheap on any machine: the grid
 // with the curve is drawn once, and the trail is only extended.
@@ -31,7 +31,7 @@ export class Plot {
   // The plot area in pixels.
   box() {
     const { width, height } = this.holder.getBoundingClientRect();
-    const side = this.big ? 0.06 * width : 34, end = this.big ? 26 : 14;
+    const side = this.big ? Math.max(44, 0.06 * width) : 34, end = this.big ? 26 : 14;
     return { left: side, right: width - (this.big ? side : 14), top: end, bottom: height - end, width, height };
   }
 

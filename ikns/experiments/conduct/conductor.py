@@ -234,7 +234,7 @@ class Conductor:
         elif name in ("page_connected", "page_disconnected"):
             visit.set_page(name == "page_connected", now)
         elif visit.stopped:
-            raise InvalidInput("the run was stopped; end it and start it again.")
+            raise InvalidInput("the run was stopped; end it, then start it again.")
         elif name == "connect":
             visit.reconnect(now)
             self._reconnect = not self.on_arm  # the source is there: arm its finger
@@ -246,7 +246,7 @@ class Conductor:
             visit.begin(now)
         elif name == "abort":
             if not self.experiment.state():
-                raise InvalidInput("no trial is running that could be aborted.")
+                raise InvalidInput("no trial is running, so there is none to abort.")
             visit.abort(now, reason)
         elif name == "skip":
             visit.skip(now, reason)

@@ -14,7 +14,11 @@ _PROMPTS = {
     "running": "Pick it up and put it down",
     "judge": "Done",
 }
-_STATES = {"ready": "not started", "running": "running", "judge": "stopped"}
+#: What to do instead of a command that does not fit the trial.
+_INSTEAD = {
+    "ready": "the clock is not running; start it first.",
+    "judge": "the clock has stopped; press Success or Dropped.",
+}
 
 
 class PickingExperiment:
@@ -85,9 +89,7 @@ class PickingExperiment:
             trial.stop(self._time(now), outcome)
             self.visit.finish()
         elif name != "comment":
-            raise InvalidInput(
-                f"'{name}' needs a running clock; the trial is {_STATES[state]}."
-            )
+            raise InvalidInput(_INSTEAD[state])
 
     def state(self) -> str:
         """Return ready, running or judge; empty without a trial."""

@@ -87,7 +87,7 @@ class SignalMonitor:
         if now - self._received <= _SIGNAL_TIMEOUT and page:
             return None
         if not from_page:
-            return ": check its source"
+            return ": check cameras, markers and cables"
         if not page:
             return ": open the participant's page"
         return (

@@ -110,22 +110,20 @@ class VisitState:
             When none can begin now, or it lacks a control signal.
         """
         if self.paused:
-            raise InvalidInput("the visit is paused; continue it to begin a trial.")
+            raise InvalidInput("the visit is paused; press Continue first.")
         if self._on_break:
-            raise InvalidInput("a break is running; skip it to begin a trial.")
+            raise InvalidInput("a break is running; press Skip to end it first.")
         step = self.experiment.visit.current
         if step is not None and step.kind != "rest" and self.experiment.needs_signal:
             stop = self.signal.stop_notice()
             if stop is not None:
                 raise InvalidInput(
-                    f"{stop['title'].lower()} ({stop['reason'].rstrip('.')}); connect "
-                    "again to begin a trial."
+                    f"{stop['title'].lower()} ({stop['reason'].rstrip('.')}); press "
+                    "Connect again first."
                 )
             missing = self.signal.missing(step.condition, now)
             if missing is not None:
-                raise InvalidInput(
-                    f"there is no control signal of {step.condition}{missing}."
-                )
+                raise InvalidInput(f"no control signal from {step.condition}{missing}.")
         self.experiment.begin(now)
         self.clear_message()
         self.trials_begun += 1
@@ -141,7 +139,7 @@ class VisitState:
         """
         stop = self.signal.stop_notice()
         if stop is None:
-            raise InvalidInput("nothing has stopped, so there is nothing to connect.")
+            raise InvalidInput("nothing has stopped; there is nothing to connect.")
         reason = stop["reason"].rstrip(".")
         self.abort(now, f"{stop['title'].lower()}: {reason}")
 
@@ -181,7 +179,7 @@ class VisitState:
         if self._on_break and not self.experiment.state():
             self._break_end = -math.inf
         elif self.experiment.visit.current is None:
-            raise InvalidInput("all steps are done; none is left to skip.")
+            raise InvalidInput("all steps are done; there is none left to skip.")
         else:
             self.experiment.skip(now, reason)
 
@@ -194,10 +192,10 @@ class VisitState:
             When no trial comes next.
         """
         if self.experiment.state():
-            raise InvalidInput("a trial is running; abort it to take a break.")
+            raise InvalidInput("a trial is running; press Abort first.")
         step = self.experiment.visit.current
         if step is None or step.kind == "rest" or self._on_break:
-            raise InvalidInput("no trial comes next, so there is no break to give.")
+            raise InvalidInput("no trial comes next, so a break is not needed.")
         self._break_end = now + self._rest
         self.log_event("break", f"{self._rest:g} s", now)
 

@@ -90,7 +90,13 @@ def compute_on_cluster(
                     result = future.result()
                     future.release()
                     yield result
-        except (KilledWorker, CancelledError, OSError) as error:
+        except KilledWorker as error:
+            dead = getattr(error, "allowed_failures", 3) + 1
+            raise StreamError(
+                f"{scheduler}: {dead} workers died with the same task, perhaps out of "
+                f"memory; {RESUMES}."
+            ) from None
+        except (CancelledError, OSError) as error:
             raise StreamError(
                 f"{scheduler}: the Dask cluster failed ({_first_line(error)}); "
                 f"{RESUMES}."

@@ -45,6 +45,7 @@ def run(
     on_notice: Callable[[str], None] | None = None,
     listener: LoopListener | None = None,
     realtime: bool = False,
+    exclusive: bool = True,
 ) -> Report:
     """Drive a finger, or several, with a person's null space until the source ends.
 
@@ -86,6 +87,9 @@ def run(
         the loop; :func:`ikns.live.publish.open_publisher` opens one that publishes.
     realtime : bool
         Give the loop priority over ordinary programs, where the system allows it.
+    exclusive : bool
+        Whether the program does nothing else meanwhile, so that Python's garbage
+        collector of cycles may be off.
 
     Returns
     -------
@@ -150,7 +154,10 @@ def run(
     controller.solver.solve(np.full((len(marker_set.labels), 3), np.nan))
     controller.solver.reset()
     stopped = threading.Event() if stop is None else stop
-    with realtime_priority(realtime=realtime), connected(fingers):
+    with (
+        realtime_priority(realtime=realtime, exclusive=exclusive),
+        connected(fingers),
+    ):
         loop.arm()
         try:
             while not (stopped.is_set() or source.ended or loop.elapsed() >= duration):

@@ -20,7 +20,9 @@ _PRIORITY = 1
 
 
 @contextmanager
-def realtime_priority(*, realtime: bool = False) -> Iterator[None]:
+def realtime_priority(
+    *, realtime: bool = False, exclusive: bool = True
+) -> Iterator[None]:
     """Keep this thread from waiting long for others.
 
     Turns Python's garbage collector of cycles off, as it may take milliseconds and the
@@ -33,6 +35,9 @@ def realtime_priority(*, realtime: bool = False) -> Iterator[None]:
     ----------
     realtime : bool
         Whether to use real-time scheduling.
+    exclusive : bool
+        Whether the program does nothing else. Another's cycles still have to be
+        collected, or its memory grows.
 
     Raises
     ------
@@ -41,16 +46,18 @@ def realtime_priority(*, realtime: bool = False) -> Iterator[None]:
     """
     was_on, interval = gc.isenabled(), sys.getswitchinterval()
     with _realtime_scheduling(wanted=realtime):
-        gc.collect()
-        gc.freeze()
-        gc.disable()
+        if exclusive:
+            gc.collect()
+            gc.freeze()
+            gc.disable()
         sys.setswitchinterval(min(interval, _SWITCH_INTERVAL))
         try:
             yield
         finally:
             sys.setswitchinterval(interval)
-            gc.unfreeze()
-            if was_on:
+            if exclusive:
+                gc.unfreeze()
+            if exclusive and was_on:
                 gc.enable()
 
 

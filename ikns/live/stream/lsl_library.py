@@ -9,6 +9,8 @@ from __future__ import annotations
 import configparser
 import io
 import os
+import platform
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -39,12 +41,21 @@ def lsl(needed_by: str, *, this_machine: bool = False) -> Any:
     global _library, _this_machine
     with _once:
         if _library is None:
-            module = load_client(
-                "pylsl", needed_by=needed_by, remedy="pip install 'ikns[lsl]'"
-            )
+            module = load_client("pylsl", needed_by=needed_by, remedy=_remedy())
             module.set_config_content(lsl_settings(this_machine=this_machine))
             _library, _this_machine = module, this_machine
         return _library
+
+
+def _remedy() -> str:
+    """Say what to install: PyPI's pylsl has no liblsl for Linux on ARM."""
+    remedy = "pip install 'ikns[lsl]'"
+    if (sys.platform, platform.machine()) == ("linux", "aarch64"):
+        remedy += (
+            ", and liblsl itself for this processor (conda-forge, or built from "
+            "github.com/sccn/liblsl, with its path in PYLSL_LIB)"
+        )
+    return remedy
 
 
 def only_this_machine() -> bool:

@@ -5,9 +5,9 @@ stored as points too and named in separate parameter lists; they are dropped, an
 trajectories without a name. Virtual points that *are* positions (joint centers, the
 center of mass) are kept; callers select markers by label.
 
-ezc3d writes our files and checks this reader in its tests but does not read them:
-version 1.7.2 ends the whole process on some damaged parameters, refuses parameter
-descriptions over 127 bytes, and drops all frames after 65535.
+ezc3d checks this reader in its tests but does not read our files: version 1.7.2 ends
+the whole process on some damaged parameters, refuses parameter descriptions over 127
+bytes, and drops all frames after 65535.
 """
 
 from __future__ import annotations

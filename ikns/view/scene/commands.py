@@ -110,11 +110,14 @@ def object_command(
 
 def text_command(path: str, text: str, *, height: float) -> Command:
     """Draw black text that faces the viewer, on top of all; height in m."""
+    # The picture of the text is a square of 256 pixels; a letter of a sans-serif font
+    # is at most 0.6 of its size wide on average.
+    size = min(150, int(256 / (0.6 * len(text))))
     texture = {
         "uuid": f"{path}:texture",
         "type": "_text",
         "text": text,
-        "font_size": 150,
+        "font_size": size,
         "font_face": "sans-serif",
     }
     material = {
@@ -124,9 +127,8 @@ def text_command(path: str, text: str, *, height: float) -> Command:
         "transparent": True,
         "depthTest": False,
     }
-    # The picture of the text is a square of 256 pixels.
-    size = height * 256 / 150
-    scale = np.diag([size, size, 1.0, 1.0]).ravel().tolist()
+    side = height * 256 / size
+    scale = np.diag([side, side, 1.0, 1.0]).ravel().tolist()
     entry = {"renderOrder": 1000, "matrix": scale}
     return _object(path, "Sprite", entry, [], [material], textures=[texture])
 

@@ -28,6 +28,9 @@ from ikns.view.scene.scene import Layer, Scene
 from ikns.view.scene.shapes import visual_shapes
 
 _COLOR, _TIP = "#40454C", "#D97340"
+#: Where the palm faces in the forearm's frame. The wrist flexes about +X
+#: (``urdf/README.md``), so the right hand, along -Y, goes to -Z; the left mirrors it.
+_PALM = {"right": (0.0, 0.0, -1.0), "left": (0.0, 0.0, 1.0)}
 #: Half the thickness of the hand of ``urdf/upper_body.urdf``, m.
 _HALF_HAND = 0.014
 #: Thickness of the post that is drawn between wrist and base, m.
@@ -44,7 +47,7 @@ def with_finger(scene: Scene, skeleton: Skeleton, side: str) -> Scene:
     base = finger_path(side)
     paths = _paths(base)
     last = max(paths.values(), key=len)
-    commands = [transform_command(base, _worn(skeleton, side))]
+    commands = [transform_command(base, worn_pose(skeleton, side))]
     for i, shape in enumerate(visual_shapes(_urdf())):
         node = f"{paths[shape.link]}/shape{i}"
         color = _TIP if paths[shape.link] == last else _COLOR
@@ -72,18 +75,19 @@ def flexion_commands(base: str, flexion: float) -> list[Command]:
     return [
         transform_command(paths[name], pose_matrix(_turn(axis, angle), origin))
         for (name, origin, axis), angle in zip(
-            _joints(), joint_angles(flexion), strict=True
+            finger_joints(), joint_angles(flexion), strict=True
         )
     ]
 
 
-def _worn(skeleton: Skeleton, side: str) -> Array:
-    """Pose of the finger's base in the forearm's frame (ISB: X to the palm, Y up)."""
+def worn_pose(skeleton: Skeleton, side: str) -> Array:
+    """Return the pose of the finger's base in the forearm's frame, (4, 4) m."""
     length = segment_lengths(skeleton.urdf)[f"{side}_forearm"]
     # Along the hand, away from the palm, and the third across.
-    along, away = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    along, away = np.array([0.0, -1.0, 0.0]), np.array(_PALM[side])
     rotation = np.column_stack([along, away, np.cross(along, away)])
-    return pose_matrix(rotation, np.array([_HALF_HAND + WIDEST, -length, 0.0]))
+    place = (_HALF_HAND + WIDEST) * away + length * along
+    return pose_matrix(rotation, place)
 
 
 def _urdf() -> str:
@@ -91,8 +95,8 @@ def _urdf() -> str:
 
 
 @cache
-def _joints() -> tuple[tuple[str, Array, Array], ...]:
-    """Child link, origin (3,) m and axis (3,) of every joint that bends."""
+def finger_joints() -> tuple[tuple[str, Array, Array], ...]:
+    """Return child link, origin (3,) m and axis (3,) of every joint that bends."""
     return tuple(
         (
             _read(joint, "child", "link"),
@@ -112,7 +116,7 @@ def _read(joint: ET.Element, tag: str, key: str) -> str:
 
 def _paths(base: str) -> dict[str, str]:
     """Return the node of every link: each module is a child of the one before."""
-    names = [name for name, _, _ in _joints()]
+    names = [name for name, _, _ in finger_joints()]
     modules = {name: "/".join([base, *names[: k + 1]]) for k, name in enumerate(names)}
     return {"finger_base": base} | modules
 

@@ -20,11 +20,19 @@ if TYPE_CHECKING:
 
 @contextmanager
 def body_view(
-    subject: Subject, *, simulated: bool
+    subject: Subject, *, simulated: bool, name: str
 ) -> Iterator[tuple[LiveView, Callable[[LoopStatus], None]]]:
     """Serve the 3-D view of a subject with a finger, on this machine only.
 
     A thread of its own draws the newest status and skips the others.
+
+    Parameters
+    ----------
+    subject : Subject
+    simulated : bool
+        Whether markers or map come from a virtual subject; the page says so.
+    name : str
+        Of the subject, for the title.
 
     Yields
     ------
@@ -37,7 +45,7 @@ def body_view(
         subject.null_space_map,
         subject.chain,
         simulated=simulated,
-        title="Live",
+        title=f"{name}, live",
     )
     scene = with_finger(scene, subject.skeleton, chain_sides(subject.chain)[-1])
     newest: list[LoopStatus] = []

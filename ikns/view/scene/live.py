@@ -29,6 +29,8 @@ from ikns.view.scene.scene import Scene
 
 _LOOPBACK = "127.0.0.1"
 _FRAMES = "/frames"
+#: Layers of :func:`ikns.view.scene.map_scene` at one PCA point; hidden at first.
+_AT_POINT = {f"{ROOT}/ghosts", f"{ROOT}/sweep"}
 #: A quiet view sends a comment after this many seconds, to notice who has left.
 _HEARTBEAT = 1.0
 
@@ -86,12 +88,19 @@ class LiveView:
                 f"port {port} of {_LOOPBACK} cannot be opened: {error}."
             ) from None
         frames = f"{_FRAMES}?token={self._server.access.token}"
+        # What belongs to one point stays there while the body moves.
+        layers = [
+            replace(layer, shown=False) if set(layer.paths) & _AT_POINT else layer
+            for layer in scene.layers
+        ]
         still = replace(
             scene,
+            layers=layers,
             caption="Live, seen from the thorax.",
             commands=[c for c in scene.commands if c["type"] != "set_animation"],
             times=np.zeros(0),
             c=np.zeros(0),
+            speed=np.zeros(0),
             start=0.0,
         )
         self._page = scene_html(still, live=frames).encode()

@@ -15,6 +15,7 @@ from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.self_motion import posture_at_point, visited_posture
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, property_command, root_commands
+from ikns.view.scene.ground import GROUND, ground_commands
 from ikns.view.scene.places import point_commands, volume_commands
 from ikns.view.scene.playback import animation_command
 from ikns.view.scene.scene import Layer, Scene, camera_and_target
@@ -65,11 +66,13 @@ def map_scene(
     two = len(chain_sides(chain)) > 1
     swivel = Swivel.at(skeleton, learned, chain, chosen, q)
     tracks = swivel_tracks(skeleton, swivel, chain)
+    camera = camera_and_target(skeleton, learned, chain, q)
     commands = [
         *root_commands(),
         *body_commands(skeleton, q, chain),
         *marker_commands(skeleton),
         *map_commands(learned),
+        *ground_commands(learned.centers_, *camera),
         *swivel_commands(skeleton, swivel, chain, playing=True),
     ]
     layers = map_layers(skeleton, learned, chosen)
@@ -85,7 +88,7 @@ def map_scene(
         simulated,
         commands + hidden(layers),
         layers,
-        *camera_and_target(skeleton, learned, chain, q),
+        *camera,
         times=swivel.times,
         c=swivel.playing_c,
         start=swivel.start,
@@ -125,6 +128,7 @@ def map_layers(
         Layer("PCA points", (f"{ROOT}/points",), _MANY),
         Layer(f"along learned Z{where}", (f"{ROOT}/ghosts",), ghost, not playing),
         Layer(f"self-motion (Jacobian){where}", (f"{ROOT}/sweep",), INK, not playing),
+        GROUND,
     ]
     if len(_facets(learned)):
         layers.insert(2, Layer("interpolation volume", (f"{ROOT}/volume",), VOLUME))

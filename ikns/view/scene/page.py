@@ -38,6 +38,7 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
         "fov": FIELD_OF_VIEW,
         "times": np.asarray(scene.times, dtype=np.float32),
         "c": np.asarray(scene.c, dtype=np.float32),
+        "speed": np.asarray(scene.speed, dtype=np.float32),
         "start": scene.start,
         "live": live,
     }
@@ -60,16 +61,21 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
 <title>{title}{" (simulated)" if scene.simulated else ""}</title>
 <style>
 {style}</style></head><body>
-<div id="pane"></div>
-<header id="head" class="panel">{badge}<h1>{title}</h1>
-<p>{escape(scene.caption)}</p></header>
-<details id="legend" class="panel"><summary>Layers</summary><ul></ul></details>
-<div id="player" class="panel" hidden>
-<button id="play" type="button">&#9654;</button>
+<header id="head">{badge}<h1>{title}</h1><p>{escape(scene.caption)}</p></header>
+<details id="legend"><summary>Layers</summary><ul></ul></details>
+<main id="pane" tabindex="0" aria-label="Body in 3-D; arrow keys turn it"></main>
+<footer id="player" hidden>
+<button id="play" type="button" aria-label="Play">&#9654;</button>
 <input id="time" type="range" min="0" step="any" value="0" aria-label="Time">
-<output id="clock"></output><output id="c"></output>
-<div id="gauge" title="control signal c, 0 to 1"><i></i></div></div>
-<p id="fault" hidden></p>
+<output id="clock"></output>
+<span class="name">c<small>control signal</small></span>
+<div id="c_curve" class="curve"></div>
+<output id="c"></output>
+<span class="name speed">hand<small>speed, m/s</small></span>
+<div id="speed_curve" class="curve speed"></div>
+<output id="speed" class="speed"></output>
+<div id="gauge"><i></i></div></footer>
+<p id="fault" role="alert" hidden></p>
 <script id="scene" type="application/json">{packed_json(data)}</script>
 <script>
 {_viewer()}

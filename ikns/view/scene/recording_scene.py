@@ -15,6 +15,7 @@ from ikns.nullspace.self_motion import posture_at_point
 from ikns.recording.recording import Recording
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, object_command, root_commands
+from ikns.view.scene.ground import ground_commands
 from ikns.view.scene.map_scene import (
     chosen_point,
     hidden,
@@ -106,6 +107,7 @@ def recording_scene(
     if c is None:
         c = learned.control_signal(motion.chain_angles(chain), place)
     signal = np.reshape(np.asarray(c, dtype=np.float64), (len(place), -1))[:, 0]
+    camera = camera_and_target(skeleton, learned, chain, motion.q[kept])
     commands = [
         *root_commands(),
         *body_commands(skeleton, motion.q[first if known[first] else near], chain),
@@ -113,6 +115,7 @@ def recording_scene(
         *(object_command(track.path, _BALL, _SEEN) for track in seen),
         *_trails(motion, chain, kept),
         *map_commands(learned),
+        *ground_commands(np.concatenate([learned.centers_, place[kept]]), *camera),
         *swivel_commands(skeleton, swivel, chain, playing=False),
         animation_command(times, body_tracks(skeleton, motion.q[kept]) + seen),
     ]
@@ -129,9 +132,10 @@ def recording_scene(
         simulated,
         commands + hidden(layers),
         layers,
-        *camera_and_target(skeleton, learned, chain, motion.q[kept]),
+        *camera,
         times=times,
         c=signal[kept],
+        speed=motion.hand_speed(chain)[kept],
         start=float(motion.time[first] - motion.time[kept[0]]),
     )
 

@@ -46,6 +46,7 @@ class Scene:
     target: Array  # (3,) m, what it looks at
     times: Array = field(default_factory=lambda: np.zeros(0))  # (F,) s; may be empty
     c: Array = field(default_factory=lambda: np.zeros(0))  # (F,) not clipped, or NaN
+    speed: Array = field(default_factory=lambda: np.zeros(0))  # (F,) hand, m/s; or none
     start: float = 0.0  # time that is shown at first, s
 
 

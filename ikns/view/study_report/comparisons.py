@@ -10,13 +10,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ikns.statistics import Effect, Equivalence
-from ikns.view.parts import Cell, Picture, Table
+from ikns.view.cells import Cell
+from ikns.view.parts import Picture, Table
 from ikns.view.style import (
     BLUE,
     GREEN,
     GREY,
     INK,
     MARKS,
+    PAGE_WIDTH,
     PALE,
     figure_style,
     new_figure,
@@ -33,10 +35,12 @@ def condition_styles(conditions: Sequence[str]) -> dict[str, tuple[str, str]]:
     return {name: _STYLES[k % len(_STYLES)] for k, name in enumerate(conditions)}
 
 
-def study_figure(title: str, *, simulated: bool, height: float) -> Figure:
+def study_figure(
+    title: str, *, simulated: bool, height: float, width: float = PAGE_WIDTH
+) -> Figure:
     """Return an empty figure; its title says whether participants are simulated."""
     text = f"{title} (simulated participants)" if simulated else title
-    return new_figure(text, simulated=False, height=height)
+    return new_figure(text, simulated=False, height=height, width=width)
 
 
 def scatter_places(count: int, *, width: float) -> np.ndarray:

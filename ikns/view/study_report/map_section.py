@@ -31,7 +31,7 @@ def map_section(figure: ReportFigure | None) -> Section:
     title = "Clusters and interpolation volume"
     if figure is None:
         return Section(title, [_NO_MAP])
-    return Section(title, [], [figure.picture])
+    return Section(title, [], [figure.picture], folded=True)
 
 
 def _figure(found: VisitSubject, *, simulated: bool) -> ReportFigure:

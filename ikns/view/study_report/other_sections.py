@@ -13,7 +13,8 @@ from ikns.experiments.study.summary import (
 )
 from ikns.experiments.study.summary.answers import people
 from ikns.experiments.study.summary.methods import methods, setting_text
-from ikns.view.parts import Cell, Section, Table
+from ikns.view.cells import Cell
+from ikns.view.parts import Section, Table
 
 #: Visits left out that are listed at most.
 _MOST = 50
@@ -33,9 +34,9 @@ _OUTCOMES = {
 def done_section(group: Group) -> Section:
     """How many attempts were made, and how they ended."""
     text = [
-        "Every attempt that was made, training included. An aborted attempt comes "
-        "again; a skipped one was left out for good; `again` marks that what was done "
-        "before does not count."
+        "Every attempt, training included. An aborted attempt is repeated, a skipped "
+        "one is not; `again` marks trials that were repeated because an earlier "
+        "result does not count."
     ]
     tables = []
     for name, each in (
@@ -61,7 +62,7 @@ def done_section(group: Group) -> Section:
                 f"no trial: {', '.join(empty[:10])}"
                 f"{' and others' if len(empty) > 10 else ''}."
             )
-    return Section("What was done", text, tables=tables)
+    return Section("What was done", text, tables=tables, folded=True)
 
 
 def _attempts(name: str, found: TrackingSummary | PickingSummary) -> Table:
@@ -153,7 +154,8 @@ def methods_section(group: Group) -> Section:
     """Paragraphs to paste."""
     return Section(
         "Methods, from the configuration",
-        [
+        folded=True,
+        text=[
             "Written from what the visits and the study file hold; to be pasted and "
             "shortened.",
             *methods(group),
@@ -172,8 +174,8 @@ def left_out_section(summary: StudySummary) -> Section | None:
     return Section(
         "Left out",
         [
-            f"{count} of {summary.visits + count} visits could not be used; nothing "
-            "of them is in this report.",
+            f"{count} of {summary.visits + count} visits could not be used; none "
+            "of their data are in this report.",
             *reasons,
         ],
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.resources import files
+from typing import NamedTuple
 
 from ikns.experiments.study.summary import Group, StudySummary
 from ikns.experiments.study.summary.answers import (
@@ -11,19 +12,25 @@ from ikns.experiments.study.summary.answers import (
     picking_answer,
     tracking_answer,
 )
+from ikns.view.cells import Cell, inline
 from ikns.view.parts import (
-    Cell,
     NextStep,
+    Picture,
     ReportPage,
     Section,
     facts_html,
-    inline,
     steps_html,
 )
 from ikns.view.report import html_document
 
-#: The people, or the simulated participants, with the sections on them.
-GroupPart = tuple[Group, Sequence[Section]]
+
+class GroupPart(NamedTuple):
+    """People, or simulated participants: their answers, and sections on them."""
+
+    group: Group
+    answers: Picture | None
+    sections: Sequence[Section]
+
 
 _BANNER = "Simulated: no person took part"
 
@@ -57,58 +64,68 @@ def study_html(
             ("ikns.view.study_report", "study.css"),
         )
     )
-    simulated = all(group.simulated for group, _ in parts)
-    several = len(parts) > 1
-    page = _StudyPage()
+    simulated = all(part.group.simulated for part in parts)
+    page = _StudyPage(several=len(parts) > 1)
     title = f"Study {summary.name}"
+    main = [_answers(page, part) for part in parts]
+    for part in parts:
+        main += _part(page, part)
+    page.of(simulated=False)
+    if left_out is not None:
+        main.append(page.section(left_out))
     body = [
         "<header>",
         f'<p class="banner">{_BANNER}</p>' if simulated else "",
         f"<h1>{inline(title)}</h1>",
         f'<p class="lead">{inline(_lead(summary, parts))}</p>',
-        facts_html(_facts(summary, parts)),
-        *(_answers(group, several=several) for group, _ in parts),
+        page.contents(),
         "</header><main>",
+        *main,
+        steps_html(next_steps),
+        "</main><footer>",
+        facts_html(_facts(summary, parts)),
+        "</footer>",
     ]
-    for group, sections in parts:
-        page.of(simulated=group.simulated)
-        if several:
-            name = "Simulated participants" if group.simulated else "People"
-            body.append(f'<section class="part"><h1>{name}</h1>')
-            if group.simulated:
-                body.append(f'<p class="banner">{_BANNER}</p>')
-            body.append("</section>")
-        if group.simulated:
-            cannot = Section(
-                "What such a simulation can and cannot show", list(_CANNOT)
-            )
-            body.append(page.section(cannot))
-        body += [page.section(section) for section in sections]
-    page.of(simulated=False)
-    if left_out is not None:
-        body.append(page.section(left_out))
-    body += [steps_html(next_steps), "</main>"]
     return html_document(f"{title} (simulated)" if simulated else title, css, body)
+
+
+def _part(page: _StudyPage, part: GroupPart) -> list[str]:
+    """Return everything on the people, or on the simulated participants."""
+    group, body = part.group, []
+    page.of(simulated=group.simulated)
+    if page.several:
+        name = "Simulated participants" if group.simulated else "People"
+        body.append(f'<section class="part"><h1>{name}</h1>')
+        if group.simulated:
+            body.append(f'<p class="banner">{_BANNER}</p>')
+        body.append("</section>")
+    if group.simulated:
+        cannot = Section("What such a simulation can and cannot show", list(_CANNOT))
+        body.append(page.section(cannot))
+    return body + [page.section(section) for section in part.sections]
 
 
 class _StudyPage(ReportPage):
     """A page whose parts differ in whether they are simulated."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, several: bool) -> None:
         super().__init__(simulated=False)
+        self.several = several
 
     def of(self, *, simulated: bool) -> None:
-        """Label what follows."""
-        self.suffix = ReportPage(simulated).suffix
+        """Label what follows, headings too."""
+        self.suffix = self.section_tag = ReportPage(simulated).suffix
 
-    def section(self, section: Section) -> str:
-        """Say in the heading too that it is simulated."""
-        html = super().section(section)
-        return html.replace("</h2>", f"{self.suffix}</h2>", 1)
+    def anchor(self, title: str) -> str:
+        """Tell headings of people and of simulated participants apart."""
+        return super().anchor(
+            f"{title} (simulated)" if self.several and self.suffix else title
+        )
 
 
 def _lead(summary: StudySummary, parts: Sequence[GroupPart]) -> str:
-    who = [people(_count(group), simulated=group.simulated) for group, _ in parts]
+    groups = [part.group for part in parts]
+    who = [people(_count(group), simulated=group.simulated) for group in groups]
     apart = (
         " People and simulated participants are analyzed apart, people first."
         if len(parts) > 1
@@ -117,7 +134,7 @@ def _lead(summary: StudySummary, parts: Sequence[GroupPart]) -> str:
     planned = summary.plan.get("participants")
     came = sum(
         _count(group)
-        for group, _ in parts
+        for group in groups
         if group.simulated == summary.plan.get("simulated")
     )
     so_far = (
@@ -141,7 +158,7 @@ def _count(group: Group) -> int:
 
 def _facts(summary: StudySummary, parts: Sequence[GroupPart]) -> dict[str, Cell]:
     facts: dict[str, Cell] = {}
-    for group, _ in parts:
+    for group in (part.group for part in parts):
         kind = "simulated" if group.simulated else "people"
         for name, each in (
             ("tracking", group.tracking),
@@ -156,16 +173,20 @@ def _facts(summary: StudySummary, parts: Sequence[GroupPart]) -> dict[str, Cell]
     return facts
 
 
-def _answers(group: Group, *, several: bool) -> str:
+def _answers(page: _StudyPage, part: GroupPart) -> str:
+    group = part.group
+    page.of(simulated=group.simulated)
     questions = [
         *tracking_answer(group.tracking, simulated=group.simulated),
         *picking_answer(group.picking, simulated=group.simulated),
     ]
-    tag = ReportPage(group.simulated).suffix
     who = ""
-    if several:
+    if page.several:
         who = ": simulated participants" if group.simulated else ": people"
-    parts = [f'<section class="answers"><h2>Answers{who}{tag}</h2>']
+    heading, anchor = f"Answers{who}{page.section_tag}", page.anchor("Answers")
+    parts = [f'<section class="answers" id="{anchor}"><h2>{heading}</h2>']
+    if part.answers is not None:
+        parts.append(page.picture(part.answers))
     for question, sentences in questions:
         parts.append(f"<h3>{inline(question)}</h3>")
         parts += [f"<p>{inline(sentence)}</p>" for sentence in sentences]

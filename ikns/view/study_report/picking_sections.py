@@ -12,7 +12,8 @@ from ikns.experiments.study.summary import (
     PickingSummary,
 )
 from ikns.experiments.study.summary.answers import people, worded
-from ikns.view.parts import Cell, Picture, Section, Table
+from ikns.view.cells import Cell
+from ikns.view.parts import Picture, Section, Table
 from ikns.view.study_report.comparisons import (
     NO_MARGIN,
     NO_TRIAL,
@@ -64,7 +65,7 @@ def picking_sections(
         "Pick and place",
         text,
         [pictures["picking_objects"]] if figures else [],
-        [_success_table(found), _time_table(found)] if figures else [],
+        details=[_success_table(found), _time_table(found)] if figures else [],
     )
     for k, compared in enumerate(found.comparisons):
         name = difference_name("picking", k)
@@ -102,7 +103,8 @@ def _comparison(compared: PickComparison, pictures: list[Picture]) -> Section:
         title,
         text,
         pictures,
-        [
+        folded=True,
+        details=[
             tests_table([found.paper], others),
             *([effects_table(found.effects)] if found.effects else []),
         ],

@@ -71,7 +71,7 @@ def error_figure(found: TrackingSummary) -> Figure:
             axes.plot(error.time, error.mean, color=color, label=f"{condition}: mean")
             axes.set_title(f"{trajectory}, {condition}: n = {int(error.count.max())}")
             axes.set_xlim(error.time[0], error.time[-1])
-        figure.supylabel("pointer less target (of 100)", fontsize=8.5)
+        figure.supylabel("pointer minus target (of 100)", fontsize=8.5)
     return figure
 
 

@@ -10,7 +10,8 @@ from ikns.experiments.study.summary.answers import people, worded
 from ikns.experiments.study.summary.tracking import UNITS
 from ikns.statistics.paper import RMSE, TRAJECTORIES
 from ikns.statistics.wording import p_text
-from ikns.view.parts import Cell, Picture, Section, Table
+from ikns.view.cells import Cell
+from ikns.view.parts import Picture, Section, Table
 from ikns.view.study_report.comparisons import (
     NO_MARGIN,
     NO_TRIAL,
@@ -46,7 +47,7 @@ def tracking_figures(found: TrackingSummary) -> list[ReportFigure]:
         ReportFigure(
             "tracking_traces",
             trace_figure(found),
-            "Target (grey) and pointer of the trial whose RMSE is the median of its "
+            "Target (gray) and pointer of the trial whose RMSE is the median of its "
             "cell, for each condition and trajectory; the paper shows such traces "
             "without saying how they were chosen.",
             "Grid of time series: target and pointer by condition and trajectory",
@@ -54,7 +55,7 @@ def tracking_figures(found: TrackingSummary) -> list[ReportFigure]:
         ReportFigure(
             "tracking_error",
             error_figure(found),
-            "Error over time: pointer less target, a participant's repeats averaged "
+            "Error over time: pointer minus target, a participant's repeats averaged "
             "first. Line: mean over participants; band: 10th to 90th percentile.",
             "Grid of time series of the error by condition and trajectory",
         ),
@@ -103,16 +104,25 @@ def tracking_sections(
             f"{len(found.unmeasured)} finished trials hold less than a second of "
             f"control signal and were not measured: {_some(found.unmeasured)}."
         )
-    shown = ("tracking_traces", "tracking_error", "tracking_rmse")
     yield Section(
         "Tracking",
         text,
-        [pictures[k] for k in shown if k in pictures],
-        [_rmse_table(found), _metric_table(found)] if figures else [],
+        [pictures["tracking_rmse"]] if figures else [],
+        details=[
+            pictures["tracking_traces"],
+            pictures["tracking_error"],
+            _rmse_table(found),
+            _metric_table(found),
+        ]
+        if figures
+        else [],
     )
     if "tracking_learning" in pictures:
         yield Section(
-            "Tracking: learning", _learning(found), [pictures["tracking_learning"]]
+            "Tracking: learning",
+            _learning(found),
+            [pictures["tracking_learning"]],
+            folded=True,
         )
     for k, compared in enumerate(found.comparisons):
         name = difference_name("tracking", k)
@@ -156,10 +166,8 @@ def _comparison(
         title,
         text,
         pictures,
-        [
-            tests_table(found.paper, others),
-            effects_table(found.effects),
-        ],
+        folded=True,
+        details=[tests_table(found.paper, others), effects_table(found.effects)],
     )
 
 
@@ -201,7 +209,7 @@ def _rmse_table(found: TrackingSummary) -> Table:
         rows,
         "RMSE, mean over participants' means, their standard deviation, and the "
         "interval of the mean. The paper's curves are unknown, so only the order of "
-        "size can be compared with its column.",
+        "magnitude can be compared with its column.",
     )
 
 
@@ -223,7 +231,7 @@ def _metric_table(found: TrackingSummary) -> Table:
         ],
         rows,
         "Mean ± standard deviation over n participants. The lag is how far the "
-        "pointer is behind; smoothness is negative, nearer to 0 is smoother.",
+        "pointer is behind; smoothness is negative, and closer to 0 is smoother.",
     )
 
 

@@ -13,6 +13,7 @@ from ikns.experiments.study.summary.numbers import error_csv, numbers, trials_cs
 from ikns.view.parts import NextStep, Section
 from ikns.view.render import pdf, svg
 from ikns.view.study_report.comparisons import ReportFigure
+from ikns.view.study_report.forest_figure import forest_figure
 from ikns.view.study_report.map_section import map_figure, map_section
 from ikns.view.study_report.other_sections import (
     done_section,
@@ -20,7 +21,7 @@ from ikns.view.study_report.other_sections import (
     methods_section,
     variation_section,
 )
-from ikns.view.study_report.page import study_html
+from ikns.view.study_report.page import GroupPart, study_html
 from ikns.view.study_report.picking_sections import picking_figures, picking_sections
 from ikns.view.study_report.tracking_sections import (
     tracking_figures,
@@ -34,6 +35,7 @@ _TABLES: dict[str, Callable[[StudySummary], str]] = {
     "tables/tracking_error.csv": error_csv,
 }
 _FIGURES = (
+    "answers",
     "tracking_traces",
     "tracking_error",
     "tracking_rmse",
@@ -65,9 +67,13 @@ def study_page(summary: StudySummary) -> tuple[str, list[tuple[str, ReportFigure
     parts, drawn = [], []
     for group in summary.groups:
         figures, sections = _group_contents(group)
+        forest = forest_figure(group)
+        if forest is not None:
+            figures.insert(0, forest)
         prefix = "simulated_" if group.simulated else ""
         drawn += [(f"{prefix}{each.name}", each) for each in figures]
-        parts.append((group, sections))
+        answers = None if forest is None else forest.picture
+        parts.append(GroupPart(group, answers, sections))
     page = study_html(
         summary,
         parts,
