@@ -64,8 +64,8 @@ Fingers = Annotated[
     typer.Option(
         "--finger",
         metavar="ADDRESS",
-        help="sim:, dynamixel:/dev/ttyUSB0, ros2:TOPIC or lerobot:TYPE; again with dof=2 "
-        "for the second freedom of the map.",
+        help="sim:, dynamixel:/dev/ttyUSB0, ros2:TOPIC or lerobot:TYPE; again with "
+        "dof=2 for the second freedom of the map.",
     ),
 ]
 Publish = Annotated[
