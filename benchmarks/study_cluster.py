@@ -124,7 +124,7 @@ def by_cluster(study: Path, workers: int, kills: int, seed: int) -> dict[str, An
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
-            dashboard_address=None,
+            dashboard_address=":0",
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster) as client,

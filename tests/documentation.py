@@ -30,8 +30,9 @@ class Block(NamedTuple):
 
     @property
     def commands(self) -> list[list[str]]:
-        """The words of each line, as a shell has them."""
-        lines = self.text.replace("\\\n", " ").splitlines()
+        """The words of each line, as a shell has them, without its prompt."""
+        text = re.sub(r"^\$ ", "", self.text, flags=re.MULTILINE)
+        lines = text.replace("\\\n", " ").splitlines()
         return [shlex.split(line) for line in lines if line]
 
 

@@ -53,7 +53,9 @@ def test_markers_that_the_static_trial_lacks_are_left_out_and_named() -> None:
     points = run.points.recording
     worn = points.select([la for la in points.labels if la != "LUPA"])
     subject = calibrate(static.select(shown), [worn], min_still=0.2)
-    named = [w for w in subject.report["warnings"] if "left out, as their places" in w]
+    named = [
+        w for w in subject.report["warnings"] if "left out because their places" in w
+    ]
     # The left one is not worn, the wrist's place is known.
     assert len(named) == 1
     assert "none of RUPA:" in named[0]
@@ -67,7 +69,7 @@ def test_a_marker_that_is_not_where_it_was_is_named() -> None:
     first, second = (points.labels.index(name) for name in ("RUPA", "RELB"))
     markers[:, [first, second]] = markers[:, [second, first]]
     mistaken = Recording(points.time, markers, points.labels, "points.c3d")
-    with pytest.raises(MarkerMismatch, match=r"points\.c3d: .*exchange RUPA and RELB"):
+    with pytest.raises(MarkerMismatch, match=r"points\.c3d: .*swap RUPA and RELB"):
         calibrate(run.static.recording, [mistaken], min_still=0.2)
     fine = small_person.subject().report["warnings"]
     assert not any("name" in w for w in fine)
@@ -272,10 +274,12 @@ def test_two_arms_with_one_degree_of_freedom_are_told_to_have_two() -> None:
         calibrate(run.static.recording, [run.points.recording], n_dof=n, **options)
         for n in (1, 2)
     )
-    told = [w for w in one.report["warnings"] if "two arms have two freedoms" in w]
+    told = [
+        w for w in one.report["warnings"] if "two arms have two degrees of freedom" in w
+    ]
     assert len(told) == 1
     assert "--n-dof 2" in told[0]
-    assert not any("two freedoms" in w for w in two.report["warnings"])
+    assert not any("two degrees of freedom" in w for w in two.report["warnings"])
 
 
 def test_the_wrong_side_is_named() -> None:

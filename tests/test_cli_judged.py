@@ -43,7 +43,7 @@ def not_seen_as_a_number(recording: Recording) -> Recording:
 
 #: What a sentence about each must say.
 WRONG: dict[str, tuple[Change, str]] = {
-    "exchanged": (partial(swap, a="RWRA", b="RWRB"), "exchange RWRA and RWRB"),
+    "exchanged": (partial(swap, a="RWRA", b="RWRB"), "swap RWRA and RWRB"),
     "unit": (partial(scaled, factor=10.0), "correct the unit"),
     "not seen": (not_seen_as_a_number, "empty cells"),
 }
@@ -111,7 +111,7 @@ def test_a_wrong_recording_can_be_looked_at(
 ) -> None:
     argv = ["view", str(files / "person"), str(wrong["exchanged"])]
     assert main([*argv, "--to", "2", "--out", str(tmp_path / "view.html")]) == 0
-    assert "exchange RWRA and RWRB" in capsys.readouterr().err
+    assert "swap RWRA and RWRB" in capsys.readouterr().err
 
 
 def test_what_spoils_a_moment_is_said_and_the_rest_is_used() -> None:
@@ -139,5 +139,5 @@ def test_a_single_frame_is_judged() -> None:
     one = small_person.cut(points, int(np.argmax(seen)), int(np.argmax(seen)) + 1)
     motion, warned = judged_motion(person, one)
     assert (len(motion.time), warned) == (1, [])
-    with pytest.raises(MarkerMismatch, match="exchange RWRA and RWRB"):
+    with pytest.raises(MarkerMismatch, match="swap RWRA and RWRB"):
         judged_motion(person, swap(one, "RWRA", "RWRB"))

@@ -65,7 +65,7 @@ def test_compare_reads_crosstalk_by_the_method_and_directions_by_the_paper(
     intent = json.loads(capsys.readouterr().out)
     assert intent["points"] == paper["points"]
     assert intent["comparisons"] == paper["comparisons"]
-    assert any("intent reads no such direction" in note for note in intent["warnings"])
+    assert any("intent uses no such direction" in note for note in intent["warnings"])
     subject = ikns.Subject.load(person)
     motion = ikns.MarkerIK(subject.skeleton).track(ikns.read(points), chain="right_arm")
     c = subject.readout("intent").control_signal(subject.skeleton, motion)
@@ -103,4 +103,4 @@ def test_view_of_a_map_alone_is_the_paper_s(files, tmp_path, capfd):
     sentence = check_refused(
         [*argv, "--out", str(tmp_path / "x.html")], tmp_path, capfd
     )
-    assert "expected a recording whose c --method intent reads" in sentence
+    assert "expected a recording to compute c from with --method intent" in sentence

@@ -140,7 +140,7 @@ def test_a_run_that_never_moves_says_why_within_a_second(files, tmp_path, capfd)
     out, err = capfd.readouterr()
     result = json.loads(out)
     # Markers of the thorax are occluded in some frames, too.
-    why = "the right hand is not in sight"
+    why = "the right hand is not visible"
     assert sum(result["rejections"].values()) == result["frames"]
     assert next(iter(result["rejections"])) == why
     assert all("right hand is not in s" in reason for reason in result["rejections"])
@@ -167,7 +167,7 @@ def test_a_run_that_is_over_too_soon_says_why_at_its_end(files, tmp_path, capfd)
     )
     assert main(argv) == 3
     out, err = capfd.readouterr()
-    assert "frames: the right hand is not in sight" in out
+    assert "frames: the right hand is not visible" in out
     last = err.splitlines()[-1].removeprefix("ikns: ")
     assert last.startswith("the finger never moved: ")
     assert f"Note: {last}\n" in out
@@ -188,7 +188,7 @@ def test_a_run_that_ends_in_its_safe_state_says_so_at_once(files, tmp_path, capf
     assert (
         f"for the last {stayed:.1f} of {result['seconds']:.1f} s" in result["problem"]
     )
-    assert "right hand is not in sight" in result["problem"]
+    assert "right hand is not visible" in result["problem"]
 
 
 def test_the_help_names_the_exit_code(capfd):
@@ -276,7 +276,7 @@ def test_a_signal_ends_a_run_in_order(files, tmp_path, number):
         out, err = process.communicate(timeout=60)
     result = json.loads(out)
     last = result["transitions"][-1]
-    assert last["reason"] == "asked to stop"
+    assert last["reason"] == "stop requested"
     # On a machine that is too busy the finger may be in its safe state by then.
     ended_safe = last["before"] == "safe"
     assert process.returncode == (3 if ended_safe else 128 + number), err

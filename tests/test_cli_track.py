@@ -125,7 +125,7 @@ def test_the_arm_drives_the_pointer_and_the_finger(
     begins = [words for what, words in told if what == "trial begins"]
     assert begins == [row["key"]]
     assert ("trial ends", f"1 {row['key']} aborted") in told
-    assert any(words.endswith("asked to stop") for _, words in told)
+    assert any(words.endswith("stop requested") for _, words in told)
     c = recorded.model["c"]
     known = row["c"][np.isfinite(row["c"])]
     # Both are kept to the bit; a row of the one belongs to a row of the other.

@@ -46,7 +46,7 @@ def test_only_a_request_leads_out_of_the_safe_state():
         call(machine, name, 0.2)
         assert machine.state == "safe"
     (change,) = machine.arm_again(0.3)
-    assert change[1:] == ("safe", "armed", "asked to arm again")
+    assert change[1:] == ("safe", "armed", "re-arming requested")
     assert machine.arm_again(0.4) == ()
     # It moves only once poses come, as after the first time.
     assert machine.activate(0.4) == ()

@@ -137,11 +137,11 @@ def test_a_rejection_says_what_to_look_after(subject, exploring):
     labels = subject.skeleton.marker_set.labels
     made = controller(subject)
     assert made.frame(seen[0], 0.0, 0.0).rejection == ""
-    assert made.frame(seen[0], 0.02, 0.02).rejection == "the same picture again"
+    assert made.frame(seen[0], 0.02, 0.02).rejection == "the same frame again"
     hidden = seen[1].copy()
     hidden[of_chain(subject)[-1]] = np.nan
     # For so long that its joints may be anywhere.
-    assert "right hand is not in sight" in made.frame(hidden, 0.6, 0.6).rejection
+    assert "right hand is not visible" in made.frame(hidden, 0.6, 0.6).rejection
     alone = next(own for own in of_chain(subject) if len(own) == 1)[0]
     astray = seen[2].copy()
     astray[alone] += 1.0

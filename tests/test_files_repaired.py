@@ -178,7 +178,7 @@ def test_a_last_line_that_is_cut_off_is_left_out(tmp_path):
         # With blanks between the columns a gap leaves no trace.
         (
             trc(body=[rows()[0].replace("\t", " "), "2 0.010 1.0 2.0 3.0"]),
-            "a marker that was not seen cannot be told",
+            "an unseen marker cannot be recognized",
         ),
         (trc(body=[*rows()[:3], rows()[3].replace("\t", " ", 1)]), "found '4 0.030'"),
         (
@@ -269,7 +269,7 @@ def test_the_same_marker_twice_is_one_marker(tmp_path, ending):
     names = ["RKNE", "RELB", "RKNE"]
     for third in (points[:, 0], 0.0):
         points[:, 2] = third
-        note = "RKNE stands 2 times, the same or unseen"
+        note = "RKNE appears 2 times, identical or unseen"
         recording = doubled(tmp_path, ending, points, names, note)
         assert recording.labels == ("RKNE", "RELB")
         np.testing.assert_array_equal(recording.markers, points[:, :2] * 1e-3)

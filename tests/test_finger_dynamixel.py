@@ -375,7 +375,7 @@ class TestRefusals:
         self.refused(wire, r"at 57600 baud, but at 1000000\.", baud=57600)
 
     def test_no_such_rate(self, wire):
-        self.refused(wire, r"no serial port runs at 12345 baud", baud=12345)
+        self.refused(wire, r"no serial port supports 12345 baud", baud=12345)
 
     def test_wrong_model(self, wire):
         sentence = r"servo 1 has model number 1060, but the mx28 has 30"
@@ -400,7 +400,7 @@ class TestRefusals:
 
     def test_complaining(self, servo, wire):
         servo.overheat()
-        self.refused(wire, r"reports overheating; let it rest and switch its power")
+        self.refused(wire, r"reports overheating; let it rest, then power-cycle")
 
 
 SECOND = """

@@ -119,7 +119,7 @@ def test_a_finger_that_breaks_laws_is_found_out(time):
         "relaxes after an exception",
     ):
         assert law in broken
-    with pytest.raises(FingerError, match=r"breaks a law: sends nothing before it"):
+    with pytest.raises(FingerError, match=r"violates a law: sends nothing before it"):
         check_finger(make, **options)
 
 

@@ -5,6 +5,9 @@ arm turns as one about the line from shoulder to wrist while the hand stays, or 
 forearm turns while elbow and wrist stay. No Jacobian is in it.
 """
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 import small_person
@@ -15,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
+from ikns.calibration.report import points_report
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.nullspace.map.dual import dual_rows
@@ -90,7 +94,7 @@ def test_each_output_ignores_the_other_motion(seed: int) -> None:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_second_freedom_that_was_not_explored_is_refused(seed: int) -> None:
     run = person(seed, 0.0)
-    with pytest.raises(NotEnoughData, match=r"2 freedoms.*--n-dof"):
+    with pytest.raises(NotEnoughData, match=r"2 degrees of freedom.*--n-dof"):
         calibrate(run.static.recording, [run.points.recording], n_dof=2)
 
 
@@ -140,13 +144,20 @@ def test_places_that_do_not_show_every_freedom_are_left_out_or_too_many(
         with pytest.raises(NotEnoughData, match="found them at 5:"):
             learned.fit(x, q, motions=motions)
         return
-    with pytest.warns(MapWarning, match=f"{short} of 8 places do not show 2 freedoms"):
+    with pytest.warns(
+        MapWarning, match=f"{short} of 8 places do not show 2 degrees of freedom"
+    ):
         learned.fit(x, q, motions=motions)
-    left = np.delete(corners, lacks, axis=0)
+    # Only a place without a direction is missing.
+    lacks = lacks if hidden == "still" else lacks[:0]
+    left, short = np.delete(corners, lacks, axis=0), len(lacks)
+    rows = points_report(learned, rate=50.0)
+    assert [row["point"] is None for row in rows].count(True) == short
     found = learned.centers_[np.lexsort(learned.centers_.T[::-1])]
     np.testing.assert_allclose(found, left, atol=1e-12)
     assert len(learned.cluster_means_) == len(learned.counts_) == 8 - short
-    assert set(learned.labels_) == {-1, *range(8 - short)}
+    assert set(learned.labels_) - {-1} == set(range(8 - short))
+    assert (learned.labels_ == -1).sum() == 100 * short
     # The rows of the others are the joints themselves.
     np.testing.assert_allclose(
         learned.directions_, np.tile(np.eye(7)[[1, 4]], (8 - short, 1, 1)), atol=1e-12
@@ -187,3 +198,20 @@ def test_the_score_is_the_share_in_the_span_however_the_rows_lie() -> None:
     )
     # Everything moves in that plane: rounding.
     assert learned.score(x, q) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_the_report_numbers_the_places_that_the_map_has() -> None:
+    learned = SimpleNamespace(
+        all_centers_=np.eye(3),
+        all_counts_=np.array(
+            [50, 60, 70]
+        ),  # all enough, but the second shows too little
+        centers_=np.eye(3)[[0, 2]],
+        n_components_=np.array([1, 1]),
+        explained_variance_ratio_=np.array([[0.9, 0.1], [0.8, 0.2]]),
+        lower_=np.zeros((2, 1)),
+        upper_=np.ones((2, 1)),
+    )
+    rows = points_report(cast(Any, learned), rate=100.0)
+    assert [row["point"] for row in rows] == [1, None, 2]
+    assert [row.get("explained_variance") for row in rows] == [0.9, None, 0.8]

@@ -196,7 +196,7 @@ def test_a_signal_that_is_lost_holds_and_stops_all():
     assert states[(1,)][-1][0] == "active"
     # 40 frames of 20 ms are longer than half a second.
     assert [states[(1, 2)][k][0] for k in (19, 30, -1)] == ["active", "holding", "safe"]
-    assert states[(1, 2)][-1][1] == "the right hand is not in sight"
+    assert states[(1, 2)][-1][1] == "the right hand is not visible"
     assert states[(1, 2)][30][2] == states[(1, 2)][-1][2]  # both hold
     # What drives nothing has no flexion, and the first has the same with and without.
     assert np.isnan([flexions[1] for *_, flexions in states[(1,)]]).all()
@@ -316,7 +316,7 @@ def test_fingers_and_settings_must_name_the_same_freedoms():
         with pytest.raises(InvalidInput, match="up to the map's 2, found 3"):
             run(source, person, settings=ControlSettings(dofs=(3,)))
     for wrong in ((), (0,), (1, 1)):
-        with pytest.raises(InvalidInput, match="different dofs from 1 on"):
+        with pytest.raises(InvalidInput, match="different dofs, counted from 1"):
             ControlSettings(dofs=wrong)
 
 
@@ -365,15 +365,15 @@ def test_the_command_says_what_drives_nothing(two, capsys, fingers, said):
 @pytest.mark.parametrize(
     ("command", "fingers", "said"),
     [
-        ("run", ["sim:", "sim:"], "both want dof=1"),
-        ("run", ["sim:dof=3"], "the map has 2 freedoms"),
+        ("run", ["sim:", "sim:"], "both ask for dof=1"),
+        ("run", ["sim:dof=3"], "the map has 2 degrees of freedom"),
         (
             "run",
             ["dynamixel:/dev/z", "dynamixel:/dev/z?dof=2"],
-            "are one servo",
+            "are the same servo",
         ),
-        ("track", ["sim:", "sim:dof=3"], "the map has 2 freedoms"),
-        ("pick", ["sim:", "sim:dof=1"], "both want dof=1"),
+        ("track", ["sim:", "sim:dof=3"], "the map has 2 degrees of freedom"),
+        ("pick", ["sim:", "sim:dof=1"], "both ask for dof=1"),
     ],
 )
 def test_the_command_refuses_fingers_that_cannot_be(

@@ -93,9 +93,9 @@ def test_the_same_frames_give_the_same_bits():
 
 def test_proximal_and_other_chains_are_refused_live():
     subject = small_person.subject()
-    with pytest.raises(InvalidInput, match="reads recordings only"):
+    with pytest.raises(InvalidInput, match="works with recordings only"):
         ControlSettings(method="proximal")
-    with pytest.raises(InvalidInput, match="reads recordings only"):
+    with pytest.raises(InvalidInput, match="works with recordings only"):
         intent_numbers(subject.skeleton, subject.readout("proximal"))
     other = dataclasses.replace(subject.readout("intent"), chain="left_arm")
     with pytest.raises(InvalidInput, match="expected a readout of right_arm"):

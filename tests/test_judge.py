@@ -112,7 +112,7 @@ def test_names_exchanged_everywhere_are_refused_with_what_repairs_them(names):
         scale(generic(), static)
     sentence = str(caught.value)
     assert sentence.startswith("static.c3d: ")
-    pairs = {f"exchange {a} and {b}:" for a, b in (names, names[::-1])}
+    pairs = {f"swap {a} and {b}:" for a, b in (names, names[::-1])}
     assert any(pair in sentence for pair in pairs), sentence
 
 
@@ -255,7 +255,7 @@ def test_the_command_exits_with_2_only_for_what_must_not_be_used(tmp_path, capsy
     out, err = capsys.readouterr()
     assert "do not use" in out
     assert err.count("\n") == 1
-    assert "exchange RELB and RMEP" in err
+    assert "swap RELB and RMEP" in err
     assert main([*wrong, "--json"]) == 2
     result = json.loads(capsys.readouterr().out)
     assert result["usable"] is False
@@ -347,7 +347,7 @@ def test_names_that_went_round_a_cluster_are_told_together():
     assert (found.kind, found.severity) == ("exchanged", "refuse")
     assert set(found.markers) == set(round_about)
     # Done one after the other, the exchanges it names make it right.
-    steps = found.right.removeprefix("exchange ").partition(":")[0].split(", then ")
+    steps = found.right.removeprefix("swap ").partition(":")[0].split(", then ")
     mended = wrong
     for step in steps:
         mended = swapped(mended, *step.split(" and "))

@@ -199,7 +199,7 @@ def test_a_folder_in_the_place_of_a_file_is_said(
         assert load(place).small(VALUES) == expected()
         said = capsys.readouterr().err
         assert "found a damaged file" in said
-        assert "cannot be kept: is a directory" in said
+        assert "cannot be stored: is a directory" in said
 
 
 def test_a_full_disk_is_said_and_the_numbers_stay(
@@ -214,7 +214,7 @@ def test_a_full_disk_is_said_and_the_numbers_stay(
     assert load(place).small(VALUES) == expected()
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "cannot be kept: no space left on device" in said
+    assert "cannot be stored: no space left on device" in said
 
 
 @pytest.mark.parametrize("mode", [0o770, 0o702, 0o777])
@@ -231,7 +231,7 @@ def test_code_that_others_could_have_written_is_not_run(
     again = load(place)
     assert again.small(VALUES) == expected()
     assert not loaded(again.small)
-    assert "found another; machine code is not kept there" in capsys.readouterr().err
+    assert "found another; machine code is not stored there" in capsys.readouterr().err
     assert again.small.stats.cache_path.startswith(str(place / "home" / "ikns"))
 
 

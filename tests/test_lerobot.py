@@ -149,7 +149,9 @@ def test_torque_that_comes_on_again_in_limp_is_taken():
         wait_for(lambda: not device.torque)
 
 
-def test_a_bus_that_does_not_confirm_is_told():
+def test_a_bus_that_does_not_confirm_is_told(monkeypatch):
+    for name in ("_CONFIRM_TIMEOUT", "_RELEASE_TIMEOUT"):
+        monkeypatch.setattr(f"ikns.finger.lerobot.{name}", 0.1)
     device = Device()
     finger = LeRobotFinger(device, **JOINT)
     finger.connect()
@@ -158,6 +160,24 @@ def test_a_bus_that_does_not_confirm_is_told():
     wait_for(lambda: "has not confirmed that its torque is off" in finger.state().alert)
     with pytest.raises(FingerError, match="cut its power"):
         finger.relax()
+
+
+def test_a_packet_that_is_lost_at_the_end_is_sent_again():
+    device = Device()
+    finger = LeRobotFinger(device, **JOINT)
+    finger.connect()
+    switch_off, lost = device.bus.disable_torque, [None] * 3
+
+    def noisy(motor):
+        if lost:
+            lost.pop()
+            raise ConnectionError("There is no status packet!")
+        switch_off(motor)
+
+    device.bus.disable_torque = noisy
+    finger.relax()
+    assert not lost
+    assert not device.torque
 
 
 def test_a_robot_that_raises_leads_to_the_safe_state():
@@ -174,7 +194,8 @@ def test_a_robot_that_raises_leads_to_the_safe_state():
     assert not device.torque
 
 
-def test_a_robot_that_blocks_blocks_nobody():
+def test_a_robot_that_blocks_blocks_nobody(monkeypatch):
+    monkeypatch.setattr("ikns.finger.lerobot._RELAX_TIMEOUT", 0.3)
     device, free = Device(), threading.Event()
     finger = LeRobotFinger(device, **JOINT)
     finger.connect()
@@ -185,6 +206,7 @@ def test_a_robot_that_blocks_blocks_nobody():
         finger.relax()
     assert device.torque  # and so it is
     free.set()
+    monkeypatch.undo()
     finger.relax()
     assert not device.torque
 
@@ -254,7 +276,7 @@ def test_two_joints_of_one_robot_are_no_two_fingers(monkeypatch):
     address = "lerobot:x?joint=gripper.pos&open=100&closed=0&port=/dev/{}&dof={}"
     group = open_fingers([address.format("a", 1), address.format("b", 2)], n_dof=2)
     assert group.dofs == (1, 2)
-    with pytest.raises(InvalidInput, match="are one robot"):
+    with pytest.raises(InvalidInput, match="are the same robot"):
         open_fingers([address.format("a", 1), address.format("a", 2)], n_dof=2)
 
 

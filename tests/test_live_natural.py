@@ -83,13 +83,15 @@ def test_a_half_explored_point_is_asked_for_once_more():
         judge.places,
         judge._ends,
     )
-    assert "The elbow went" not in brief.judge(STEP[part], point(part, 0.45, 1)).reason
+    assert (
+        "The elbow covered" not in brief.judge(STEP[part], point(part, 0.45, 1)).reason
+    )
 
 
 def _narrow(judge: Judge, k: int) -> bool:
     found = judge.judge(STEP[k], point(k, 0.45))
     assert "ends_deg" in found.values or not found.usable
-    return not found.keep and "The elbow went" in found.reason
+    return not found.keep and "The elbow covered" in found.reason
 
 
 def test_the_short_protocol_takes_movement_and_two_places(tmp_path, capfd):
@@ -135,7 +137,7 @@ def test_only_the_short_protocol_goes_without_free_exploration(
     argv = ["calibrate", "--live", "--source", "replay:x.c3d", "--free-seconds", "0"]
     argv += ["--natural-seconds", str(seconds), "--out", str(tmp_path / "new")]
     assert main(argv) == 2
-    assert "only --short goes without free exploration" in capfd.readouterr().err
+    assert "only --short works without free exploration" in capfd.readouterr().err
 
 
 def test_a_straight_arm_is_sent_back_nearer():

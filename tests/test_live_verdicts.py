@@ -127,7 +127,7 @@ def test_markers_with_each_others_names_are_told(names):
     markers[:, [first, second]] = markers[:, [second, first]]
     verdict = at_point(Recording(recording.time, markers, recording.labels, "p"))
     assert not verdict.keep
-    assert f"exchange {names[0]} and {names[1]}" in verdict.reason
+    assert f"swap {names[0]} and {names[1]}" in verdict.reason
 
 
 @pytest.mark.parametrize("change", [0.03, -0.03])
@@ -158,7 +158,7 @@ def test_a_marker_that_the_static_trial_never_shows_is_reported():
     )
     assert not verdict.keep
     assert verdict.usable
-    assert "Never in sight: RUPA;" in verdict.reason
+    assert "Never visible: RUPA;" in verdict.reason
     # Nor are those of an arm that wears none, or that the cameras do not know at all.
     left = [i for i, label in enumerate(static.labels) if label.startswith("L")]
     hidden = static.markers.copy()

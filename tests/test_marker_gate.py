@@ -115,7 +115,7 @@ def test_labels_that_change_places_for_a_while_are_named(labels):
         for reason in count_rejections(motion, CHAIN)
         if set(labels) <= set(reason.replace(",", "").split())
     ]
-    assert any("changed places" in reason for reason in named)
+    assert any("swapped" in reason for reason in named)
     off = np.degrees(np.abs(motion.q - clean().q)[:, 7:])
     assert off[~bad & believed].max() < 10  # as above
 
@@ -216,7 +216,7 @@ def test_live_and_in_a_recording_the_same_labels_are_found():
     told = [
         made.frame(frame, k / 50, k / 50).rejection for k, frame in enumerate(markers)
     ]
-    named = np.array(["RWRA and RWRB have changed places" in why for why in told])
+    named = np.array(["RWRA and RWRB are swapped" in why for why in told])
     shown = motion.in_sight(CHAIN)
     np.testing.assert_array_equal(named[shown], bad[shown])
     np.testing.assert_array_equal(~motion.believed(CHAIN)[shown], bad[shown])
@@ -275,7 +275,7 @@ def test_a_map_is_that_of_the_believed_frames():
             (row,) = subject.report["explorations"]
             assert row["frames_rejected"] > 0.2 * row["frames"]  # in sight
             told = [w for w in subject.report["warnings"] if "left out" in w]
-            assert any("RWRA and RWRB have changed places" in w for w in told)
+            assert any("RWRA and RWRB are swapped" in w for w in told)
     a, b = maps
     # The same samples, but for poses that start from elsewhere: a degree or two, of
     # ranges of 30 deg or more, in the extremes.

@@ -82,9 +82,9 @@ def test_a_folder_of_before_says_what_there_is(moved, tmp_path):
     old = Subject.load(tmp_path / "old")
     found = method_summary(old, natural=[motion])
     assert list(found["methods"]) == ["paper"]
-    assert found["why"] == "paper is the only method there is"
+    assert found["why"] == "paper is the only method available"
     assert found["methods"]["paper"]["turned_hand"] > 0.1
     del old.report["methods"]
     assert any(
-        "before there were others" in str(p) for p in calibration_parts(old.report)
+        "before other methods existed" in str(p) for p in calibration_parts(old.report)
     )

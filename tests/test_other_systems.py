@@ -76,7 +76,7 @@ def test_what_only_linux_has_is_known():
 def test_without_real_time_scheduling_it_is_refused_and_the_rest_works(monkeypatch):
     for name in ("sched_getscheduler", "sched_setscheduler", "SCHED_RR"):
         monkeypatch.delattr(os, name)
-    with pytest.raises(InvalidInput, match="lets this program run in real time"):
+    with pytest.raises(InvalidInput, match="expected permission to run at real-time"):
         check_realtime()
     before = sys.getswitchinterval()
     with realtime_priority():

@@ -46,7 +46,7 @@ def test_a_link_to_nothing_is_not_replaced_unasked(tmp_path: Path) -> None:
     link.symlink_to(tmp_path / "elsewhere.csv")
     with pytest.raises(InvalidInput, match="use --force"):
         refuse_overwriting(link, force=False, inputs=[])
-    with pytest.raises(InvalidInput, match="another program wrote it"):
+    with pytest.raises(InvalidInput, match="another program has written it"):
         write_bytes(link, b"new", force=False)
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
 
@@ -55,7 +55,9 @@ def test_a_file_that_came_meanwhile_is_not_replaced_unasked(tmp_path: Path) -> N
     path = tmp_path / "table.csv"
     refuse_overwriting(path, force=False, inputs=[])
     path.write_text("of another program")
-    with pytest.raises(InvalidInput, match="another program wrote it meanwhile"):
+    with pytest.raises(
+        InvalidInput, match="another program has written it in the meantime"
+    ):
         write_csv(path, ["a"], [[1.0]], force=False)
     assert path.read_text() == "of another program"
     write_csv(path, ["a"], [[1.0]], force=True)

@@ -4,7 +4,7 @@ One browser serves all.
 """
 
 from collections.abc import Iterator
-from functools import cache
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from ikns.experiments.study import init_study
 from ikns.experiments.study.summary import summarize
 from ikns.motion.marker_ik import MarkerIK
 from ikns.view.elbow import elbow_widget
-from ikns.view.figures import residual_figure, workspace_figure
+from ikns.view.figures import residual_figure
 from ikns.view.report import (
     KeyNumber,
     NextStep,
@@ -34,8 +34,8 @@ from ikns.view.scene.playback import kept_frames
 from ikns.view.study_report import study_page
 
 
-@pytest.fixture(scope="module", name="page")
-def _page() -> Iterator[Any]:
+@pytest.fixture(scope="module", name="chromium")
+def _chromium() -> Iterator[Any]:
     browser = find_browser()
     if browser is None:
         pytest.skip(HOW_TO_GET_ONE)
@@ -45,13 +45,35 @@ def _page() -> Iterator[Any]:
         chromium = driver.chromium.launch(
             executable_path=browser, args=browser_options()
         )
-        page = chromium.new_page(viewport=DESK)
-        said: list[str] = []
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        yield page
-        assert said == []
+        yield chromium
         chromium.close()
+
+
+@contextmanager
+def tab(chromium: Any) -> Iterator[Any]:
+    """Open a page; in the end it has complained of nothing."""
+    page = chromium.new_page(viewport=DESK)
+    said: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    yield page
+    page.close()
+    assert said == []
+
+
+@pytest.fixture(scope="module", name="page")
+def _page(chromium: Any) -> Iterator[Any]:
+    with tab(chromium) as page:
+        yield page
+
+
+@pytest.fixture(scope="module", name="report_page")
+def _report_page(
+    chromium: Any, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Any]:
+    with tab(chromium) as page:
+        page.goto(shown(tmp_path_factory.mktemp("report"), report()))
+        yield page
 
 
 def shown(folder: Path, html: str) -> str:
@@ -60,12 +82,10 @@ def shown(folder: Path, html: str) -> str:
     return path.as_uri()
 
 
-@cache
 def report() -> str:
     """Page of every kind of part."""
-    person, corners = small_person.subject(), np.eye(4, 3)
+    person = small_person.subject()
     steady = residual_figure(np.arange(3.0), np.ones(3), simulated=True)
-    spatial = workspace_figure(corners, corners, [0, 1, 2, 3], corners, simulated=True)
     table = Table(["a long name of a column"] * 9, [[1.5] * 9], "Wide. Not folded")
     return report_html(
         title="A person",
@@ -78,7 +98,7 @@ def report() -> str:
             Section(
                 "Shown",
                 ["A word in `code`."],
-                [Picture(spatial, "Space.", "Four points")],
+                [Picture(steady, "Shown.", "A line")],
                 [table],
                 [Picture(steady, "Folded.", "A line"), table],
             ),
@@ -102,8 +122,8 @@ def test_the_judge_of_pages_finds_a_fault(page: Any, fault: str) -> None:
         judge(page)
 
 
-def test_a_report_fits_and_is_accessible(page: Any, tmp_path: Path) -> None:
-    page.goto(shown(tmp_path, report()))
+def test_a_report_fits_and_is_accessible(report_page: Any) -> None:
+    page = report_page
     page.evaluate("document.querySelectorAll('details').forEach(x => x.open = true)")
     judge(page)
     # Every link of the contents leads to a heading of that name.
@@ -132,18 +152,17 @@ def test_the_page_of_ten_participants_is_short(page: Any, tmp_path: Path) -> Non
 
 
 def test_the_dragged_elbow_moves_c_and_the_finger_and_leaves_the_hand(
-    page: Any, tmp_path: Path
+    report_page: Any,
 ) -> None:
     """The page's own numbers against the map and the skeleton, in Python.
 
     The page holds the hand to 1e-11 m; weights between points change by less than 1e-6
     with that. The goal is 1e-6.
     """
-    person = small_person.subject()
+    page, person = report_page, small_person.subject()
     body, learned, chain = person.skeleton, person.null_space_map, person.chain
     columns = [body.joint_names.index(joint) for joint in chain_joints(chain)]
     page.set_viewport_size(DESK)
-    page.goto(shown(tmp_path, report()))
     for point in range(len(learned.centers_)):
         states = page.evaluate(
             """k => {

@@ -305,5 +305,5 @@ def test_a_visit_publishes_its_trials(tmp_path, name):
 def test_a_scope_that_cannot_be_had_is_refused(name, monkeypatch):
     lsl("a test", this_machine=True)
     monkeypatch.setattr("ikns.live.stream.lsl_library._this_machine", True)
-    with pytest.raises(StreamError, match="was started for this machine only, by a so"):
+    with pytest.raises(StreamError, match="has limited LSL to this machine"):
         open_publisher(f"lsl:{name}?scope=network", rate=100.0)

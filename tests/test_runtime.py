@@ -225,7 +225,7 @@ def test_a_stopped_finger_is_armed_again_on_request_only(
     why = [status.stopped for status in shown if status.stopped]
     assert len(why) >= 5
     assert why[0].endswith("a test")
-    refused = "; arming again failed: the servo is not there"
+    refused = "; re-arming failed: the servo is not there"
     assert why[-1].endswith(refused if refuses else "a test")
     assert report.stopped == ""
     assert replay_run(read_run(folder)).same
@@ -283,7 +283,7 @@ def test_it_stops_when_asked(subject, exploring):
 
     with source(exploring) as stream:
         report = run(stream, subject, stop=stop, on_status=show, status_every=0.1)
-    assert report.transitions[-1].reason == "asked to stop"
+    assert report.transitions[-1].reason == "stop requested"
     assert 0 < report.frames < len(exploring.time)
     assert [status.frames for status in shown] == sorted(s.frames for s in shown)
 
@@ -455,9 +455,9 @@ def test_without_any_frame_that_is_the_reason(subject, exploring):
     with Source(Mute(exploring)) as stream:
         report = run(stream, subject, duration=0.8, on_notice=told.append)
     # The source reports its silence, too.
-    (why,) = (sentence for sentence in told if "does not move yet" in sentence)
-    assert why.endswith(" s: no frame came.")
-    assert report.problem == "the finger never moved: no frame came."
+    (why,) = (sentence for sentence in told if "has not moved after" in sentence)
+    assert why.endswith(" s: no frame arrived.")
+    assert report.problem == "the finger never moved: no frame arrived."
 
 
 def test_each_new_reason_is_told_once(subject, exploring):
@@ -471,12 +471,12 @@ def test_each_new_reason_is_told_once(subject, exploring):
     with source(there) as stream:
         report = run(stream, subject, on_notice=told.append)
     first, *others = told
-    assert first.endswith(": the right hand is not in sight.")
+    assert first.endswith(": the right hand is not visible.")
     assert others
     assert all("RUPA" in sentence for sentence in others)
     assert len(others) == len({kind_of(n.partition(": ")[2]) for n in others})
     assert sum(report.rejections.values()) == report.frames
-    assert report.rejections["the right hand is not in sight"] == 80
+    assert report.rejections["the right hand is not visible"] == 80
     assert all("up to" in why for why in report.rejections if "RUPA" in why)
 
 
@@ -484,7 +484,7 @@ def test_a_wrong_unit_is_a_reason_where_it_was_not_refused(subject, exploring):
     there = dataclasses.replace(exploring, markers=100 * exploring.markers)
     with source(there, speed=0) as stream:
         report = run(stream, subject)
-    (why,) = (w for w in report.rejections if "in sight" not in w)
+    (why,) = (w for w in report.rejections if "not visible" not in w)
     assert why == (
         "the body is 100 times as large as at calibration; the unit may be wrong"
     )

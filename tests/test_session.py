@@ -216,7 +216,9 @@ def test_a_torn_row_is_left_out_and_mended(tmp_path):
     run = read_run(session)
     assert len(run.frame) == 7
     assert run.torn["markers"] > 0
-    assert any("ends within a row" in finding for finding in check_session(session))
+    assert any(
+        "ends in the middle of a row" in finding for finding in check_session(session)
+    )
     cut = mend_session(session)
     assert len(cut) == 3
     assert len(read_run(session).frame) == 7
@@ -257,7 +259,7 @@ def test_a_full_disk_is_told_at_once_and_loses_nothing_once_there_is_room(tmp_pa
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, handler)
-    assert told[-1] == "the session is written again."
+    assert told[-1] == "the session is being written again."
     assert run.lost == 0
     np.testing.assert_array_equal(read_run(session).markers, markers)
     assert check_session(session) == []

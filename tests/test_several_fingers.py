@@ -71,13 +71,13 @@ def test_addresses_are_taken_or_refused_in_a_sentence(known, n_dof):
 @pytest.mark.parametrize(
     ("texts", "words"),
     [
-        (["sim:dof=0"], "from 1 on"),
-        (["sim:dof=-1"], "from 1 on"),
+        (["sim:dof=0"], "expected 1 or more"),
+        (["sim:dof=-1"], "expected 1 or more"),
         (["sim:dof=two"], "expected a number"),
         (["sim:dof=1&dof=2"], "gives dof twice"),
-        (["sim:dof=3"], "the map has 2 freedoms"),
-        (["sim:", "sim:dof=1"], "both want dof=1"),
-        (["dynamixel:/dev/z", "dynamixel:/dev/z?dof=2"], "are one servo"),
+        (["sim:dof=3"], "the map has 2 degrees of freedom"),
+        (["sim:", "sim:dof=1"], "both ask for dof=1"),
+        (["dynamixel:/dev/z", "dynamixel:/dev/z?dof=2"], "are the same servo"),
         (
             ["dynamixel:/dev/z", "dynamixel:/dev/z?dof=2&id=2&model=ax12"],
             "one baud rate and protocol",
@@ -92,7 +92,7 @@ def test_what_is_wrong_with_an_address_is_said(texts, words):
 def test_a_link_to_a_port_is_that_port(tmp_path):
     (tmp_path / "servo").symlink_to("/dev/null")
     texts = ["dynamixel:/dev/null", f"dynamixel:{tmp_path / 'servo'}?dof=2"]
-    with pytest.raises(InvalidInput, match="are one servo"):
+    with pytest.raises(InvalidInput, match="are the same servo"):
         open_fingers(texts, n_dof=2)
 
 

@@ -53,7 +53,10 @@ Frame#\tTime\tA\t\t
         ("replay:{}/none.c3d", "none.c3d"),
         ("replay:{}/notes.c3d", "notes.c3d: expected"),
         ("replay:{}/notes.txt", "notes.txt: expected a marker file that ends in .c3d"),
-        ("replay:{}/short.trc", "expected two frames or more to have a rate, found 1"),
+        (
+            "replay:{}/short.trc",
+            "expected at least two frames to determine a rate, found 1",
+        ),
         ("replay:{}/good.c3d?speed=-1", "speed of 0 or more, found -1"),
         ("replay:{}/good.c3d?speed=fast", "number for speed, found 'fast'"),
         ("replay:{}/good.c3d?speed=nan", "speed of 0 or more, found nan"),

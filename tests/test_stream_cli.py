@@ -86,7 +86,7 @@ def test_a_stream_that_dies_without_a_word_is_noticed_and_found_again(
         with open_source(f"lsl:{name}?scope=machine&timeout=60") as source:
             next(source)
             server.send_signal(signal.SIGSTOP)
-            while not any("broke off" in event.text for event in source.events):
+            while not any("was interrupted" in event.text for event in source.events):
                 source.read(0.1)
             server.send_signal(signal.SIGCONT)
             before = source.continuity.counts.received

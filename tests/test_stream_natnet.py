@@ -138,7 +138,7 @@ def test_a_server_that_goes_away_is_reported_and_found_again(
             server.send(150, 5.5, MARKERS[1])
             frame = source.read(0.1)
         told = " ".join(event.text for event in source.events)
-    assert "the server went away." in told
+    assert "the server disconnected." in told
 
 
 def test_a_change_that_leaves_the_markers_as_they_were_is_survived() -> None:
@@ -164,7 +164,7 @@ def test_models_that_change_are_not_read_under_the_old_names() -> None:
         server.sets = {"Ann": ["OTHER", *LABELS[1:]]}
         server.send(102, 5.02, MARKERS[2], changed=True)
         give_up = time.monotonic() + 20
-        while not any("other markers" in event.text for event in source.events):
+        while not any("different markers" in event.text for event in source.events):
             assert time.monotonic() < give_up
             assert source.read(0.05) is None
 

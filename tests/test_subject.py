@@ -141,10 +141,10 @@ def test_samples_that_make_no_sense_are_refused(
     shutil.copytree(folder, tmp_path / "person")
     path = tmp_path / "person" / "samples.csv"
     path.write_text(f"{path.read_text()}{row}\n")
-    with pytest.raises(FileError, match=r"samples.csv: .* the file can go"):
+    with pytest.raises(FileError, match=r"samples.csv: .* the file can be deleted"):
         Subject.load(tmp_path / "person")
     path.write_text(f"x_m,y_m,z_m,point\n{row}\n")
-    with pytest.raises(FileError, match=r"samples.csv: .* the file can go"):
+    with pytest.raises(FileError, match=r"samples.csv: .* the file can be deleted"):
         Subject.load(tmp_path / "person")
 
 

@@ -43,14 +43,17 @@ def watch(
     return [Sample(t / last, share, s, last - t) for t, share, s in said]
 
 
-def wrong(samples: list[Sample]) -> list[Sample]:
-    """From 20 % on, by the bar and by the clock, said to be off by more than twice."""
+def wrong(samples: list[Sample], slack: float = 0.0) -> list[Sample]:
+    """From 20 % on, by the bar and by the clock, said to be off by more than twice.
+
+    A task that is nearly over is said to take a twentieth of its time: `slack`.
+    """
     return [
         s
         for s in samples
         if min(s.share, s.share_of_time) >= 0.2
         and s.took > 1e-9
-        and (s.said is None or not s.took / 2 <= s.said <= 2 * s.took)
+        and (s.said is None or not s.took / 2 <= s.said <= 2 * s.took + slack)
     ]
 
 
@@ -73,6 +76,8 @@ def study(
     return [tasks[k] for k in [*ahead, *sorted({*range(len(tasks))} - {*ahead})]]
 
 
+#: So many tasks for each worker that one of every kind is done in a fifth of the time:
+#: before, nobody can know what it costs.
 COST = st.floats(0.5, 20.0)
 PARTS = st.fixed_dictionaries({"person": COST, "tracking": COST, "picking": COST})
 
@@ -80,27 +85,27 @@ PARTS = st.fixed_dictionaries({"person": COST, "tracking": COST, "picking": COST
 @settings(max_examples=50, deadline=None)
 @given(
     parts=PARTS,
-    people=st.integers(8, 40),
+    rounds=st.integers(10, 25),
     workers=st.integers(1, 4),
     half=st.booleans(),
 )
 def test_time_left_is_right_within_a_factor_of_two_from_a_fifth_on(
-    parts: dict[str, float], people: int, workers: int, half: bool
+    parts: dict[str, float], rounds: int, workers: int, half: bool
 ) -> None:
-    samples = watch(study(people, {"": parts}, half=half), workers)
-    assert wrong(samples) == []
+    samples = watch(study(rounds * workers, {"": parts}, half=half), workers)
+    assert wrong(samples, sum(parts.values()) / 20) == []
     assert samples[-1].share == 1.0
     assert samples[-1].said == 0.0
 
 
 @settings(max_examples=30, deadline=None)
-@given(usual=PARTS, dear=PARTS, people=st.integers(10, 40), workers=st.integers(1, 3))
+@given(usual=PARTS, dear=PARTS, rounds=st.integers(10, 25), workers=st.integers(1, 3))
 def test_so_it_is_where_a_variation_costs_more_than_the_rest(
-    usual: dict[str, float], dear: dict[str, float], people: int, workers: int
+    usual: dict[str, float], dear: dict[str, float], rounds: int, workers: int
 ) -> None:
     more = {part: 5 * cost for part, cost in dear.items()}
-    samples = watch(study(people, {"": usual, "rate": more}), workers)
-    assert wrong(samples) == []
+    samples = watch(study(rounds * workers, {"": usual, "rate": more}), workers)
+    assert wrong(samples, sum(more.values()) / 20) == []
 
 
 def test_the_count_of_visits_alone_would_be_wrong() -> None:

@@ -171,7 +171,9 @@ def test_a_servo_is_had_by_one_finger_and_a_port_has_one_rate(tmp_path):
     with servos_at("one port", tmp_path) as (_, texts):
         with open_fingers(texts[:1]):
             port = texts[0].partition(":")[2].partition("?")[0]
-            with pytest.raises(FingerError, match="another finger has servo 1"):
+            with pytest.raises(
+                FingerError, match="another finger already uses servo 1"
+            ):
                 join_line(port, 1, baud=BAUD, protocol=2)
             with pytest.raises(FingerError, match="expected one baud rate"):
                 join_line(port, 2, baud=57600, protocol=2)

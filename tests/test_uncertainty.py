@@ -167,7 +167,7 @@ def test_a_hand_that_stays_hidden_leaves_the_papers_c_uncertain(person):
     ]
     assert made[40].valid
     late = made[90:]
-    assert all(one.rejection == "the right hand is not in sight" for one in late)
+    assert all(one.rejection == "the right hand is not visible" for one in late)
     assert len({one.flexion for one in late}) == 1
     assert np.isnan([one.solved.c[0] for one in late]).all()
 

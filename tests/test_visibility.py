@@ -251,7 +251,7 @@ def test_a_recording_of_one_arm_is_tracked_and_the_other_is_never_known() -> Non
     assert motion.in_sight("right_arm").all()
     assert not motion.in_sight("left_arm").any()
     assert np.isnan(motion.chain_angles("left_arm_clavicle")).all()
-    with pytest.raises(NotEnoughData, match="left_clavicle is never in sight"):
+    with pytest.raises(NotEnoughData, match="left_clavicle is never visible"):
         ikns.null_space_samples(motion, chain="left_arm")
 
 
@@ -260,7 +260,7 @@ def test_a_chain_that_was_asked_for_must_be_shown() -> None:
     lost = hide(recording, np.arange(100), ["RFIN"])
     with pytest.raises(
         MarkerMismatch,
-        match=r"^hidden.c3d: the segment right_hand is never in sight; expected at "
+        match=r"^hidden.c3d: the segment right_hand is never visible; expected at "
         r"least 1 of RFIN of oxford24 in a frame\.$",
     ):
         MarkerIK(skeleton).track(lost, chain="right_arm")

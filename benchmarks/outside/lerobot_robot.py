@@ -57,8 +57,15 @@ def wired() -> Iterator[Wire]:
     """Wire up a servo that lerobot has calibrated."""
     with Wire(Servo("xl430", baud=BAUD)) as wire:
         robot = one_servo.OneServo(one_servo.OneServoConfig(port=wire.port))
-        robot.connect()
-        robot.disconnect()
+        for left in reversed(range(5)):  # on a busy machine its one second is short
+            try:
+                robot.connect()
+                robot.disconnect()
+                break
+            except ConnectionError:
+                if not left:
+                    raise
+                robot.bus.port_handler.closePort()
         wire.servos[0].goals.clear()
         yield wire
 

@@ -112,7 +112,7 @@ def _cache_folder(module: str) -> Path | None:
             say_once(
                 "not private",
                 f"{folder}: expected a folder that no one else can write to, found "
-                "another; machine code is not kept there.",
+                "another; machine code is not stored there.",
             )
         elif os.access(folder, os.W_OK):
             return folder

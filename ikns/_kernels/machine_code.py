@@ -73,7 +73,7 @@ class KernelCache:
             path.unlink()
         say_once(
             "damaged",
-            f"{path}: expected machine code as it was kept, found a damaged file; it "
+            f"{path}: expected machine code as it was stored, found a damaged file; it "
             "was removed and is compiled again.",
         )
         return None
@@ -102,8 +102,8 @@ class KernelCache:
             reason = (error.strerror or str(error)).lower()
             say_once(
                 "not kept",
-                f"{self._folder}: machine code cannot be kept: {reason}; it is "
-                "compiled again next time.",
+                f"{self._folder}: machine code cannot be stored: {reason}; "
+                "it is compiled again next time.",
             )
 
     def flush(self) -> None:

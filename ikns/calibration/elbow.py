@@ -15,9 +15,9 @@ _STEP = 1e-5
 
 #: Two elbows that move by themselves, read by one direction.
 _TWO_ARMS = (
-    "two arms have two freedoms, one for each elbow, and with one degree of freedom "
-    "every place mixes them in its own way; use two degrees of freedom (--n-dof 2), or "
-    "move both elbows together"
+    "two arms have two degrees of freedom, one for each elbow, "
+    "and a single one mixes them differently at every place; use two degrees of "
+    "freedom (--n-dof 2), or move both elbows together"
 )
 
 

@@ -36,7 +36,7 @@ def method_summary(
     *,
     own: bool = False,
 ) -> dict[str, Any]:
-    """Compare the methods of a subject where nothing is meant.
+    """Compare the methods of a subject when nothing is intended.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def _recommended(
         cost[method] = float(np.mean(told)) if told else np.inf
     best = min(cost, key=lambda method: cost[method])
     if len(cost) == 1:
-        return {"recommended": best, "why": f"{best} is the only method there is"}
+        return {"recommended": best, "why": f"{best} is the only method available"}
 
     def told_of(method: str) -> str:
         row = rows[method]

@@ -75,7 +75,8 @@ def calibrate(
         point alone says which samples are of one place.
     natural : sequence of Recording
         Ordinary movement with everyday objects, 20 s over the work space: the natural
-        posture of the method intent. Without it the reaches between the points tell.
+        posture of the method intent. Without it, the reaches between the points are
+        used.
     generic : Skeleton, optional
         Body to start from; :meth:`Skeleton.from_anthropometry` when stature, mass and
         sex are known. Default: the generic adult.
@@ -112,7 +113,7 @@ def calibrate(
     ------
     MarkerMismatch
         When a segment of the chain has no marker in a recording, or a recording must
-        not be used: names exchanged, another unit, another person.
+        not be used: swapped names, wrong unit, different person.
     NotEnoughData
         When the static trial is too short or the person moves in it, no sample is
         still, or the usable points are fewer than 4 or in one plane.

@@ -141,7 +141,7 @@ def _intent(
     if bent < LEAST_BENT:
         raise NotEnoughData(
             f"the arm is straight wherever the hand is held, with the elbow at "
-            f"{bent:.0f} deg at most; hold it nearer, so that the elbow bends by "
+            f"{bent:.0f} deg at most; hold it closer, so that the elbow bends by "
             f"{LEAST_BENT:.0f} deg or more"
         )
     rows = [

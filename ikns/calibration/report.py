@@ -77,7 +77,6 @@ def exploration_report(
 
 def points_report(learned: NullSpaceMap, *, rate: float) -> list[dict[str, Any]]:
     """All PCA points, including those left out; `point` is the number in the map."""
-    used = iter(range(len(learned.centers_)))
     rows: list[dict[str, Any]] = []
     for center, count in zip(learned.all_centers_, learned.all_counts_, strict=True):
         row: dict[str, Any] = {
@@ -86,8 +85,9 @@ def points_report(learned: NullSpaceMap, *, rate: float) -> list[dict[str, Any]]
             "samples": int(count),
             "still_s": float(count / rate),
         }
-        if count >= learned.min_samples:
-            k = next(used)
+        used = np.flatnonzero((learned.centers_ == center).all(axis=1))
+        if used.size:
+            k = int(used[0])
             n = int(learned.n_components_[k])
             ratios = learned.explained_variance_ratio_[k]
             row |= {

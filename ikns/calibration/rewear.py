@@ -54,7 +54,7 @@ def rewear(
     Parameters
     ----------
     subject : Subject
-        As calibrated in another wearing of the markers.
+        As calibrated with an earlier placement of the markers.
     static : Recording
         The person standing or sitting still.
     natural : sequence of Recording
@@ -71,24 +71,24 @@ def rewear(
     Subject
         With the same body and maps, the new places of the markers, and intent's range
         shifted; ``report["rewear"]`` says by how much. The paper's map and proximal
-        have no natural posture to be shifted by, and stay.
+        have no natural posture to be shifted by, and stay unchanged.
 
     Raises
     ------
     NotEnoughData
-        When the static trial is too short, or natural movement covers nothing or is
-        that of the other arm.
+        When the static trial is too short, or the natural movement covers too little or
+        is that of the other arm.
     MarkerMismatch
         As :func:`ikns.calibrate` raises it.
     InvalidInput
-        When there is no natural movement, or the marker set is not known any more.
+        When there is no natural movement, or the marker set is no longer known.
     """
     if not natural:
         raise InvalidInput("expected natural movement of the new wearing, found none.")
     worn = subject.skeleton.marker_set.name
     if marker_set is None and worn not in MarkerSet.names():
         raise InvalidInput(
-            f"the calibration was with the markers of '{worn}', a set of one's own; "
+            f"the calibration was with the markers of '{worn}', a custom set; "
             "give its .toml file with --marker-set (marker_set)."
         )
     chain = subject.chain

@@ -68,8 +68,8 @@ class ScalingReport:
             return [*self.warnings]
         return [
             *self.warnings,
-            f"{source}: expected every marker in sight, found none of "
-            f"{', '.join(sorted(lost))}: left out, as their places are unknown.",
+            f"{source}: expected every marker to be visible, found none of "
+            f"{', '.join(sorted(lost))}: left out because their places are unknown.",
         ]
 
 
@@ -117,8 +117,8 @@ def scale(
     NotEnoughData
         When the trial is too short or the person moves in it.
     MarkerMismatch
-        When no marker is known or a whole segment has none, or no person stands like
-        that: names exchanged, another unit, a mirror image.
+        When no marker is known or a whole segment has none, or no person can stand like
+        that: swapped names, wrong unit, mirror image.
 
     Examples
     --------

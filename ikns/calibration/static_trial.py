@@ -58,7 +58,7 @@ def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
         raise MarkerMismatch(
             f"{static.source}: expected markers of {worn.name} "
             f"({', '.join(worn.labels[:4])}, ...), found "
-            f"{', '.join(static.labels[:4]) or 'none'}; name the right marker set."
+            f"{', '.join(static.labels[:4]) or 'none'}; choose the right marker set."
         )
     # No one stands quite still, so markers averaged over different frames do not match:
     # where enough frames show everything, only those count.

@@ -90,11 +90,11 @@ class Subject:
 
     @property
     def methods(self) -> list[str]:
-        """What can read c off this subject's postures: ``paper``, and what else."""
+        """Methods available for this subject: ``paper`` and any others."""
         return ["paper", *(method for method in OTHERS if method in self.readouts)]
 
     def readout(self, method: Method = "paper") -> Readout:
-        """Return a method's map and what it reads.
+        """Return a method's map and the coordinate that it uses.
 
         Raises
         ------
@@ -197,10 +197,10 @@ class Subject:
             if all("mean_rad" in point for point in points):
                 means = np.array([point["mean_rad"] for point in points], dtype=float)
                 if means.shape != learned.directions_[:, 0].shape:
-                    raise InvalidInput("a mean posture needs one entry a joint.")
+                    raise InvalidInput("a mean posture needs one entry per joint.")
                 learned.cluster_means_ = means
             if learned.directions_.shape[2] != len(table["joints"]):
-                raise InvalidInput("a direction needs one entry a joint.")
+                raise InvalidInput("a direction needs one entry per joint.")
         except (LookupError, TypeError, ValueError) as error:
             fault = f"{error}" if isinstance(error, IknsError) else f"({error!r})."
             raise FileError(
@@ -224,7 +224,7 @@ class Subject:
         Raises
         ------
         InvalidInput
-            When the report's are no such numbers.
+            When the values in the report are invalid.
         """
         settings = self.report.get("settings", {})
         try:
@@ -238,8 +238,8 @@ class Subject:
             0 < gate["max_hand_speed"] < np.inf and 0 <= gate["min_duration"] < np.inf
         ):
             raise InvalidInput(
-                "expected max_hand_speed_m_s above 0 and min_rest_s from 0 on in the "
-                f"settings of the calibration's report, found {settings}."
+                "expected max_hand_speed_m_s above 0 and min_rest_s of at least 0 in "
+                f"the settings of the calibration's report, found {settings}."
             )
         return gate
 
@@ -302,8 +302,8 @@ def _read_samples(path: Path, *, n_points: int) -> Array | None:
     except (OSError, ValueError) as error:
         fault = f"{error}" if isinstance(error, IknsError) else f"({error})."
         raise FileError(
-            f"{path}: cannot be read as still samples: {fault} Nothing needs them but "
-            "pictures: the file can go."
+            f"{path}: cannot be read as still samples: {fault} Only pictures need "
+            "them: the file can be deleted."
         ) from None
     return samples
 
@@ -322,7 +322,7 @@ def _read_readout(path: Path, method: str, chain: str) -> Readout:
         fault = f"{error}" if isinstance(error, IknsError) else f"({error!r})."
         raise FileError(
             f"{path}: cannot be read as a map of {method}: {fault} Only --method "
-            f"{method} needs it: the file can go."
+            f"{method} needs it: the file can be deleted."
         ) from None
 
 

@@ -276,7 +276,7 @@ def _chain(side: str, *, clavicle: bool) -> str:
     if side != "both":
         return f"{side}_arm" + "_clavicle" * clavicle
     if clavicle:
-        raise InvalidInput("--clavicle goes with --side right or left, not with both.")
+        raise InvalidInput("--clavicle works with --side right or left, not with both.")
     return "both_arms"
 
 
@@ -293,7 +293,7 @@ def _lengths(
         )
     if live and not free > 0:
         raise InvalidInput(
-            f"expected --free-seconds above 0 s, found {free:g} s; only --short goes "
+            f"expected --free-seconds above 0 s, found {free:g} s; only --short works "
             "without free exploration."
         )
     return values

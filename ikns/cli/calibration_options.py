@@ -54,8 +54,8 @@ def check_options(
     if rewear:
         if other := [name for name in context.params if name in given - _REWEAR]:
             raise InvalidInput(
-                f"{options(other)} {'does' if len(other) == 1 else 'do'} not go with "
-                "--rewear, which keeps what was learned."
+                f"{options(other)} {'does' if len(other) == 1 else 'do'} not combine "
+                "with --rewear, which keeps what was learned."
             )
         wanted = [n for n in ("subject", "static", "natural") if n not in given]
         if wanted:

@@ -94,7 +94,7 @@ def methods_parts(report: dict[str, Any]) -> list[Any]:
     """
     methods = report.get("methods")
     if methods is None:
-        return ["Methods learned: paper. Calibrated before there were others."]
+        return ["Methods learned: paper. Calibrated before other methods existed."]
     lost = methods["without"]
     known = [name for name in ("paper", "proximal", "intent") if name not in lost]
     parts = [f"Methods learned: {', '.join(known)}."]
@@ -114,7 +114,7 @@ def methods_parts(report: dict[str, Any]) -> list[Any]:
     parts.append(f"Recommended: --method {found['recommended']}; {found['why']}.")
     return [
         table(
-            "Change of c where nothing is meant (mean; 1 is the whole range)",
+            "Change of c when nothing is intended (mean; 1 is the whole range)",
             {
                 "method": "s",
                 f"{counts['between_places']} reaches\nbetween points": ".2f",
@@ -144,7 +144,8 @@ def methods_parts(report: dict[str, Any]) -> list[Any]:
 
 def _verdict(row: dict[str, Any], least: int, n_dof: int) -> str:
     if row["point"] is None:
-        return f"left out: fewer than {least}"
+        few = row["samples"] < least
+        return f"left out: fewer than {least}" if few else "left out: freedoms"
     if row["components"] > n_dof:
         return f"used, but took {row['components']} components"
     return "used"

@@ -44,7 +44,7 @@ def check(
         raise InvalidInput("--static and --subject exclude each other; give one.")
     if subject is not None and marker_set is not None:
         raise InvalidInput(
-            "--marker-set goes with --static; a subject has markers of its own."
+            "--marker-set works only with --static; a subject has its own markers."
         )
     check_inputs([*recordings, static], subject)
 

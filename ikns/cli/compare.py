@@ -42,8 +42,8 @@ _UNITS = {"max_hand_speed": "m_s", "min_duration": "s"}
 #: Why another method has no comparison of directions.
 _PAPER_ONLY = (
     "directions, leak and bend are those of the paper's Z over all joint angles of the "
-    "chain, next to the Jacobian over the same; {method} reads no such direction, and "
-    "only crosstalk is that of its c."
+    "chain, compared with the Jacobian over the same; {method} uses no "
+    "such direction, so only crosstalk is that of its c."
 )
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 

@@ -174,11 +174,12 @@ def pooled_table(
 #: What the columns of both tables mean.
 LEGEND = (
     "angle: largest between learned and analytic directions, averaged over the visited "
-    "postures.  inside: joint variance inside the null space.  leak, turn: hand's way "
-    "while c goes from 0 to 1.  ends: how far the hand is off where straight Z ends.  "
+    "postures.  inside: joint variance inside the null space.  leak, turn: hand "
+    "motion while c "
+    "goes from 0 to 1.  ends: how far the hand is off where straight Z ends.  "
     "bend: turn of the null space over the range.  chance: one random subspace in "
-    "twenty is below (above).  angle and leak are without what noise adds to them, as "
-    "long as there are intervals; --json has both."
+    "twenty is below (above).  angle and leak are corrected for "
+    "noise if there are intervals; --json has both."
 )
 
 
@@ -218,8 +219,8 @@ def crosstalk_sentence(found: Crosstalk) -> str:
     mean = _with_ends(found.mean_change, found.mean_change_interval, float)
     rate = _with_ends(found.per_meter, found.per_meter_interval, float)
     return (
-        f"Crosstalk on {reaches}: c changes by {mean} a reach, {rate} a meter; at most "
-        f"it goes {found.largest:.2f} away."
+        f"Crosstalk on {reaches}: c changes by {mean} per reach, {rate} per meter; at "
+        f"most by {found.largest:.2f}."
     )
 
 

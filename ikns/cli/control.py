@@ -96,7 +96,7 @@ def control(
                 ["of these, markers rejected", result["frames_rejected"]],
                 ["of these, c too uncertain", result["frames_uncertain"]],
                 ["% with the hand in the volume", _percent(result["inside_share"])],
-                ["% with c cut off at 0 or 1", _percent(result["clipped_share"])],
+                ["% with c clipped to 0 or 1", _percent(result["clipped_share"])],
                 ["median of c", round(result["c_median"], 3)],
                 [
                     "median standard deviation of c",

@@ -68,7 +68,7 @@ def ik(
         )
     if subject is not None and marker_set is not None:
         raise InvalidInput(
-            "--marker-set goes with --static; a subject has markers of its own."
+            "--marker-set works only with --static; a subject has its own markers."
         )
     check_inputs([recording, static], subject)
 
@@ -127,4 +127,4 @@ def ik(
 def _note(joint: str, lowest: float, held: tuple[str, ...]) -> str:
     if joint in held:
         return "held: no marker shows it"
-    return "never in sight" if math.isnan(lowest) else ""
+    return "never visible" if math.isnan(lowest) else ""

@@ -36,7 +36,7 @@ _KEYS: dict[str, Key] = {
     "q": "quit",
 }
 _PROMPTS = {
-    "static": "Stand still, arms a little off the body",
+    "static": "Stand still, arms slightly away from the body",
     "free": "Sit down, keep the torso still and move the hand wherever it goes",
     "natural": "Do everyday things with objects at hand, all over the work space: "
     "reach, drink, carry, put away",
@@ -206,7 +206,7 @@ class _Screen:
                 skip = "" if step.kind == "static" else "s leaves it out, "
                 self._say(f"  {accept}r records it again, {skip}q quits.")
         elif what == "rejected":
-            self._say(f"{step.name}: that key means nothing here.")
+            self._say(f"{step.name}: that key does nothing here.")
         elif what in ("accepted", "redo", "skipped", "stopped"):
             self._say(f"{step.name}: {what}.")
 

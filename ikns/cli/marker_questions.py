@@ -22,7 +22,8 @@ def ask_sites(labels: Sequence[str], *, guess: bool) -> dict[str, str]:
                 answers[label] = found.name
         return answers
     _say(
-        "Where does each marker sit? Enter takes the place in brackets, 'skip' leaves "
+        "Where does each marker sit? Enter accepts the place in brackets, 'skip' "
+        "leaves "
         "the marker out, '?' lists places; add 'static' to what is worn in static "
         "trials only."
     )

@@ -181,8 +181,8 @@ def check(
         )
     remarks = [
         *(
-            f"{m.label} is {m.offset_sd:.1f} deviations from its place: on another "
-            "place, exchanged, or of another set."
+            f"{m.label} is {m.offset_sd:.1f} standard deviations from its place: "
+            "misplaced, swapped, or from another set."
             for m in found.markers
             if m.seen and m.offset_sd > _FAR
         ),
@@ -315,7 +315,7 @@ def new(
     ]
     remarks = [
         *(
-            f"no landmark on {link}: its angles are counted from the static trial."
+            f"no landmark on {link}: its angles are measured from the static trial."
             for link in made.assumed
         ),
         *([f"left out: {', '.join(made.skipped)}."] if made.skipped else []),

@@ -27,7 +27,7 @@ def refuse_picture(
         return
     if path.suffix.lower() not in _ENDINGS:
         raise InvalidInput(
-            f"{path}: expected a picture with the ending {', '.join(_ENDINGS)}."
+            f"{path}: expected a picture file that ends in {', '.join(_ENDINGS)}."
         )
     refuse_overwriting(path, force=force, inputs=inputs)
 

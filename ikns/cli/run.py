@@ -219,7 +219,7 @@ def run(
         report.lost_rows = writer.lost  # counted on disk once it is closed
     if writer is not None and not report.frames:
         session = None
-        sys.stderr.write("ikns: no frame came, so no session was kept.\n")
+        sys.stderr.write("ikns: no frame arrived, so no session was kept.\n")
     driven = "nothing (dry run)" if dry_run else " and ".join(addresses)
     title = f"{source} to {driven}"
     _show_report(report, title, session, losses, publisher, as_json=as_json)
@@ -398,8 +398,8 @@ def _rows(report: Report, published: dict[str, Any] | None) -> list[list[str]]:
             "receipt to command, p50 / p99 / worst ms",
             " / ".join(f"{1e3 * total.percentile(p):.2f}" for p in (50, 99, 100)),
         ],
-        ["frames that took longer than a frame", str(report.misses)],
-        ["rows that are missing on disk", str(report.lost_rows)],
+        ["frames that took longer than a frame period", str(report.misses)],
+        ["rows missing on disk", str(report.lost_rows)],
         *(
             [["published / dropped", "{sent} / {dropped}".format(**published)]]
             if published

@@ -61,7 +61,7 @@ def stream(
     frames = read(recording)
     if len(frames.time) < 2:
         raise InvalidInput(
-            f"{recording}: expected two frames or more to have a rate, found "
+            f"{recording}: expected at least two frames to determine a rate, found "
             f"{len(frames.time)}."
         )
     title = recording.stem if name is None else name

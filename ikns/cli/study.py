@@ -113,7 +113,7 @@ def run(
         named = " ".join(list(done.damaged.values())[:_NAMED])
         warned += [
             f"{len(done.damaged)} of {done.cells} cells were damaged and are simulated "
-            f"again: {named} What was left of them is beside them, under hidden names."
+            f"again: {named} What was left of them is next to them, under hidden names."
         ]
     if done.failed:
         few = list(done.failed.items())[:_NAMED]

@@ -103,24 +103,24 @@ def view(
         refuse_overwriting(path, force=force, inputs=inputs)
     if len({path.resolve() for path in (out, *pictures)}) <= len(pictures):
         raise InvalidInput(
-            f"{pictures[-1]}: expected a file for each picture and for the page, found "
-            "one for two of them."
+            f"{pictures[-1]}: expected different files for each picture and for "
+            "the page, found the same one twice."
         )
     if png is not None and png.suffix.lower() != ".png":
         raise InvalidInput(
-            f"{png}: expected a picture with the ending .png, found '{png.suffix}'."
+            f"{png}: expected a picture file that ends in .png, found '{png.suffix}'."
         )
     if animation is not None and animation.suffix.lower() not in (".gif", ".png"):
         raise InvalidInput(
-            f"{animation}: expected a moving picture with the ending .gif or .png, "
+            f"{animation}: expected an animation file that ends in .gif or .png, "
             f"found '{animation.suffix}'."
         )
     if recording is None and (from_, to) != (None, None):
         raise InvalidInput("expected a recording for --from and --to, found none.")
     if recording is None and method != "paper":
         raise InvalidInput(
-            f"expected a recording whose c --method {method} reads, found none; the "
-            "map without one is the paper's."
+            f"expected a recording to compute c from with --method {method}, "
+            "found none; without one, the map is the paper's."
         )
     check_inputs([recording], subject)
 

@@ -35,7 +35,7 @@ def check_finger(
 ) -> FingerReport:
     """Test that a finger does what :class:`Finger` promises.
 
-    The finger moves: keep its way free, and do not wear it.
+    The finger moves: keep its path clear, and do not wear it.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def check_finger(
     clock, sleep : callable
         The finger's time, where it is simulated.
     strict : bool
-        Whether to raise an error at the end when a law is broken.
+        Whether to raise an error at the end when a law is violated.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def check_finger(
     Raises
     ------
     FingerError
-        When laws are broken; the message names all of them.
+        When laws are violated; the message names all of them.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def check_finger(
             kept.append(law)
     if strict and broken:
         raise FingerError(
-            "the finger breaks a law: "
+            "the finger violates a law: "
             + "; ".join(f"{law} ({what})" for law, what in broken.items())
             + "."
         )

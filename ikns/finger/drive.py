@@ -75,8 +75,8 @@ class Drive:
                 bus.write("status_return_level", RESPOND_TO_ALL)
         if alert := bus.alerts():
             raise FingerError(
-                f"{bus.port}: servo {bus.id} reports {alert}; let it rest and "
-                "switch its power off and on."
+                f"{bus.port}: servo {bus.id} reports {alert}; let it rest, "
+                "then power-cycle it."
             )
         self._torque.switch_off()
         for values in (

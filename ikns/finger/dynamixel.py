@@ -28,7 +28,7 @@ _TRIES = 5
 class DynamixelFinger:
     """A finger driven by one Dynamixel servo in position control.
 
-    A thread of its own talks to the servo, so that a silent bus (35 ms for every
+    A dedicated thread talks to the servo, so that a silent bus (35 ms for every
     instruction without a response) never blocks the caller. It keeps sending the last
     goal, and the servo stops by itself when it receives nothing for `watchdog` seconds
     (models with Protocol 2.0; an AX-12 has no watchdog and keeps its last goal, which
@@ -133,7 +133,7 @@ class DynamixelFinger:
         ------
         FingerError
             When the port is missing or busy, or the servo does not respond, is another
-            model, or reports an alert. If it was connected before, it goes on switching
+            model, or reports an alert. If it was connected before, it keeps switching
             the torque off until :meth:`relax`.
         """
         with self._access:
@@ -251,13 +251,13 @@ class DynamixelFinger:
             try:
                 self._drive.cycle()
             except Exception as error:  # whatever it is, the safe state needs this
-                self.make_safe(f"talking to the servo failed with {error!r}")
+                self.make_safe(f"communication with the servo failed with {error!r}")
             due = max(due + self._period, time.monotonic())
             self._stop.wait(max(due - time.monotonic(), 0.0))
         else:
             self._close()
         if (late := self._attempt) is not None:  # it was to relax before it connected
-            late.error = FingerError(f"{self._bus.port}: connecting was given up.")
+            late.error = FingerError(f"{self._bus.port}: connecting was aborted.")
             late.done.set()
 
     def _open(self, attempt: _Attempt) -> bool:
@@ -273,7 +273,7 @@ class DynamixelFinger:
             self._torque_owed = True
             self._drive.set_up()
             if self._stop.is_set() or ending_requested():
-                raise FingerError(f"{self._bus.port}: connecting was given up.")
+                raise FingerError(f"{self._bus.port}: connecting was aborted.")
             self._drive.arm()
         except BaseException as error:  # the caller's
             with self._lock:

@@ -62,12 +62,12 @@ class FingerGroup:
         self._passed_on = ""
         if not count or len(self.dofs) != count:
             raise InvalidInput(
-                f"expected a freedom for each finger, found {len(self.dofs)} for "
-                f"{count} fingers."
+                "expected a degree of freedom for each finger, found "
+                f"{len(self.dofs)} for {count} fingers."
             )
         if min(self.dofs) < 1 or len(set(self.dofs)) < count:
             raise InvalidInput(
-                "expected different freedoms from 1 on, found "
+                "expected different degrees of freedom, counted from 1, found "
                 f"{', '.join(map(str, self.dofs))}."
             )
 

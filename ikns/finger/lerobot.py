@@ -17,8 +17,9 @@ from ikns.finger.lerobot_joint import RobotDevice, RobotJoint
 from ikns.finger.relax_at_exit import forget, relax_at_exit
 from ikns.finger.state import FingerState
 
-#: Timeout for switching the torque off at the end, s; a call of a robot may block.
-_RELAX_TIMEOUT = 2.0
+#: Torque is tried to be switched off for so long at the end, s, and how long that is
+#: waited for: a call of a robot may block.
+_RELEASE_TIMEOUT, _RELAX_TIMEOUT = 1.0, 3.0
 #: Seconds between readings of torque that is to stay off.
 _CHECK_INTERVAL = 0.1
 #: Torque that should be off and was not read to be off for so long is reported, s.
@@ -213,15 +214,27 @@ class LeRobotFinger:
             except Exception as error:  # the robot's library raises what it likes
                 self._failed(error)
             self._stop.wait(self._period)
-        for step in (self._joint.switch_off, self._joint.disconnect):
-            with contextlib.suppress(Exception):
-                step()
+        self._release()
         if self._joint.off:
             forget(self)
         for late in (request, self._connecting):
             if late is not None and not late.done.is_set():
                 late.error = late.error or self._given_up()
                 late.done.set()
+
+    def _release(self) -> None:
+        """Switch the torque off, more than once if need be, and disconnect."""
+        give_up = time.monotonic() + _RELEASE_TIMEOUT
+        while True:
+            try:
+                self._joint.switch_off()
+            except Exception:  # one packet may be lost
+                self._joint.off = False
+            if self._joint.off or time.monotonic() > give_up:
+                break
+            time.sleep(self._period)
+        with contextlib.suppress(Exception):
+            self._joint.disconnect()
 
     def _open(self, request: _Connecting) -> None:
         """Connect, on the thread; note what went wrong in the request."""
@@ -243,7 +256,7 @@ class LeRobotFinger:
                 self._guard.relax()
 
     def _given_up(self) -> FingerError:
-        return FingerError(f"{self._name}: connecting was given up.")
+        return FingerError(f"{self._name}: connecting was aborted.")
 
     def _cycle(self) -> None:
         """Send the goal, or keep the torque off, and observe."""

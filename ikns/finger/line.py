@@ -121,13 +121,13 @@ class Line:
         for other, asked in tuple(self._asked.items()):
             if now - asked > _HUNG:
                 time.sleep(_PAUSE)
-                raise NoResponse(f"{self.name}: nothing looks after servo {other}.")
+                raise NoResponse(f"{self.name}: nothing services servo {other}.")
 
     def _opened(self) -> Any:
         _, port_type = load_sdk()
         port = port_type(self.name)
         if port.getCFlagBaud(self.baud) <= 0:
-            raise FingerError(f"{self.name}: no serial port runs at {self.baud} baud.")
+            raise FingerError(f"{self.name}: no serial port supports {self.baud} baud.")
         port.baudrate = self.baud
         try:
             port.openPort()
@@ -166,7 +166,7 @@ def join_line(path: str, servo: int, *, baud: int, protocol: int) -> Line:
         if line is None:
             line = Line(path, baud=baud, protocol=protocol)
         if servo in line.servos:
-            raise FingerError(f"{path}: another finger has servo {servo} already.")
+            raise FingerError(f"{path}: another finger already uses servo {servo}.")
         if (line.baud, line.protocol) != (baud, protocol):
             raise FingerError(
                 f"{path}: expected one baud rate and protocol for all servos of a "

@@ -97,15 +97,15 @@ def open_fingers(
     n_dof: int | None = None,
     safety: Safety | None = None,
 ) -> FingerGroup:
-    """Make fingers that each follow a freedom of a map, not connected yet.
+    """Create one finger per degree of freedom of a map, not connected yet.
 
     Parameters
     ----------
     addresses : sequence of str
-        As for :func:`open_finger`. ``dof=2`` is what drives a finger: the second
-        freedom of the map; without it, the first.
+        As for :func:`open_finger`. ``dof`` selects the degree of freedom of the map
+        that drives the finger; the first by default.
     n_dof : int, optional
-        Freedoms of the map, where one is known.
+        Degrees of freedom of the map, if known.
     safety : Safety, optional
         Of each finger.
 
@@ -116,8 +116,9 @@ def open_fingers(
     Raises
     ------
     InvalidInput
-        When an address is wrong, two fingers want one freedom or one servo, the servos
-        of a port have different rates or protocols, or the map lacks a freedom.
+        When an address is wrong, two fingers use the same degree of freedom or servo,
+        the servos of a port have different rates or protocols, or the map lacks a
+        degree of freedom.
 
     Examples
     --------
@@ -125,7 +126,7 @@ def open_fingers(
     (1, 2)
     >>> open_fingers(["sim:", "sim:"], n_dof=2)
     Traceback (most recent call last):
-    ikns.errors.InvalidInput: 'sim:' and 'sim:' both want dof=1, expected one each.
+    ikns.errors.InvalidInput: 'sim:' and 'sim:' both ask for dof=1, expected one each.
     """
     safety = Safety() if safety is None else safety
     taken: dict[int, str] = {}
@@ -134,12 +135,12 @@ def open_fingers(
         finger, dof = _opened(address, safety)
         if n_dof is not None and dof > n_dof:
             raise InvalidInput(
-                f"'{address}' wants dof={dof}, but the map has {n_dof} "
-                f"freedom{'s' * (n_dof > 1)}."
+                f"'{address}' asks for dof={dof}, but the map has {n_dof} "
+                f"degree{'s' * (n_dof > 1)} of freedom."
             )
         if dof in taken:
             raise InvalidInput(
-                f"'{taken[dof]}' and '{address}' both want dof={dof}, expected one "
+                f"'{taken[dof]}' and '{address}' both ask for dof={dof}, expected one "
                 "each."
             )
         taken[dof] = address
@@ -157,8 +158,8 @@ def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
             port = os.path.realpath(finger.port)
             if (other := robots.setdefault(port, address)) != address:
                 raise InvalidInput(
-                    f"'{other}' and '{address}' are one robot, of which one joint can "
-                    "be a finger."
+                    f"'{other}' and '{address}' are the same robot, of which "
+                    "only one joint can be a finger."
                 )
         if not isinstance(finger, DynamixelFinger):
             continue
@@ -166,13 +167,13 @@ def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
         for other, one in others:
             if one.id == finger.id:
                 raise InvalidInput(
-                    f"'{other}' and '{address}' are one servo, expected another port "
-                    "or id."
+                    f"'{other}' and '{address}' are the same servo, expected another "
+                    "port or id."
                 )
             if one.speech != finger.speech:
                 raise InvalidInput(
-                    f"'{other}' and '{address}' are on one port, expected one baud "
-                    "rate and protocol."
+                    f"'{other}' and '{address}' are on the same port, expected one "
+                    "baud rate and protocol."
                 )
         others.append((address, finger))
 
@@ -255,7 +256,7 @@ def _lerobot_finger(
 
 def _dof(address: str, dof: int) -> int:
     if dof < 1:
-        raise InvalidInput(f"'{address}' has dof={dof}, expected a number from 1 on.")
+        raise InvalidInput(f"'{address}' has dof={dof}, expected 1 or more.")
     return dof
 
 

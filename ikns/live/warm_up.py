@@ -31,7 +31,7 @@ def compiled_before() -> bool:
 
 
 def warm_up(progress: Callable[[str, int, int], None] | None = None) -> float:
-    """Run every kernel once, so that none is compiled while a robot waits.
+    """Run every kernel once, so that none is compiled while a robot is waiting.
 
     The first call on a machine, and after an update, compiles for about a minute, half
     of it in a second process; later calls load the compiled kernels.

@@ -17,11 +17,11 @@ class Motion:
     """Joints and hands over time, NaN where they were not seen.
 
     `q` alone has a number in every frame, so that there is a posture to draw and to
-    compute with: what was not seen stays there where it was. Everything else is NaN
-    where it is not known: an angle and its velocity by `known`, the pose of the thorax
-    by `seen` of the thorax, a hand while the thorax or a segment of its arm is out of
-    sight; and all of an arm, and the thorax if it is of both, in frames whose markers
-    were rejected.
+    compute with: what was not seen stays where it was. Everything else is NaN where it
+    is not known: an angle and its velocity by `known`, the pose of the thorax by `seen`
+    of the thorax, a hand while the thorax or a segment of its arm is out of sight; and
+    all of an arm, and the thorax if it is of both, in frames whose markers were
+    rejected.
 
     Parameters
     ----------
@@ -29,8 +29,8 @@ class Motion:
         Seconds.
     q : (T, nq) array
         Configuration of the skeleton; the last ``len(joint_names)`` columns are the
-        joint angles in radians, before them stands the pose of the thorax in the world
-        (meters and a unit quaternion x, y, z, w) where the skeleton has one.
+        joint angles in radians, preceded by the pose of the thorax in the world (meters
+        and a unit quaternion x, y, z, w) if the skeleton has one.
     v : (T, nv) array
         Velocity of `q` in the tangent space, m/s and rad/s.
     joint_names : tuple of str
@@ -53,14 +53,15 @@ class Motion:
     segments : tuple of S str
         Links that carry markers, and the thorax.
     seen : (T, S) boolean array
-        Whether each was in sight. By default there are none, and all was seen.
+        Whether each was visible. By default there are none, and everything was visible.
     known : (T, J) boolean array
         Whether the frame shows each joint, in the order of `joint_names`; the rule is
         that of :func:`ikns.motion.marker_ik.visibility.visible_segments`.
     rejected : (T, 2) integer array
-        By side, why the markers of thorax and arm are not believed: a number of
-        `reasons`, -1 where they are; see :class:`ikns.motion.marker_ik.gate.GateLimits`
-        and :func:`ikns.motion.marker_ik.rejection.count_rejections`.
+        By side, why the markers of thorax and arm were rejected: an index into
+        `reasons`, -1 where they were not; see
+        :class:`ikns.motion.marker_ik.gate.GateLimits` and
+        :func:`ikns.motion.marker_ik.rejection.count_rejections`.
     reasons : tuple of str
         In words.
     """

@@ -41,6 +41,6 @@ def warn_unseen(
         if not shown and not marker.static_only and marker.link.startswith(own)
     )
     if lost:
-        note = f"no frame shows {', '.join(lost)}, so the others place the body alone."
+        note = f"no frame shows {', '.join(lost)}, so the others locate the body alone."
         warnings.warn(RecordingWarning(recording.source, note), stacklevel=2)
     return lost

@@ -64,13 +64,13 @@ def hinge_swivel(
     Returns
     -------
     (...) array
-        Radians in (-pi, pi]; larger with the elbow lifted outwards. NaN where an input
+        Radians in (-pi, pi]; larger with the elbow lifted outward. NaN where an input
         is not finite, and where the angle is undefined.
 
     Raises
     ------
     InvalidInput
-        When a shape or the side is another.
+        When a shape or the side is invalid.
 
     Examples
     --------

@@ -108,10 +108,11 @@ class NaturalPosture(EstimatorBase):
     in which the constant term is free of the penalty. Where the wrist is in none of the
     places that were taught (its leverage ``h = phi (Phi'Phi / N + penalty)^-1 phi``
     exceeds the 99th percentile h99 of the taught ones), the difference from the
-    population fades to its mean by ``h99 / h``: outside, other people know more than a
-    quadratic that is continued. Directions that the penalty decides do not count.
+    population fades to its mean by ``h99 / h``: there, other people's data predict
+    better than an extrapolated quadratic. Directions that the penalty decides do not
+    count.
 
-    :meth:`of_people` is the population's, without anything of one's own.
+    :meth:`of_people` is the population's, without any data of the person.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ class NaturalPosture(EstimatorBase):
 
     @classmethod
     def of_people(cls, **parameters: Any) -> Self:
-        """Return the population's natural posture, fitted to no movement of one's own.
+        """Return the population's natural posture, not fitted to a person's movement.
 
         Parameters are those of the constructor.
         """
@@ -266,7 +267,7 @@ class NaturalPosture(EstimatorBase):
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """Share of the variance of held-out swivels (N,) that is explained.
 
-        A constant difference counts as explained, since the ends of a range take it up.
+        A constant difference counts as explained, since the ends of a range absorb it.
         """
         s = np.asarray(y, dtype=np.float64)
         rest = s - self.predict(X)

@@ -74,8 +74,8 @@ def write_bytes(path: Path, content: bytes, *, force: bool = True) -> None:
     if not force:
         if not create_bytes(path, content):
             raise InvalidInput(
-                f"{path}: another program wrote it meanwhile; use --force to overwrite "
-                "it."
+                f"{path}: another program has written it in the meantime; use --force "
+                "to overwrite it."
             )
         return
     part = _write_part(path, content)

@@ -48,9 +48,7 @@ def check_output_folder(
     if not target.is_dir():
         raise InvalidInput(f"{target}: expected the name of a folder, found a file.")
     if Path.cwd().is_relative_to(target.resolve()):
-        raise InvalidInput(
-            f"{target}: expected another folder than the one that you are in."
-        )
+        raise InvalidInput(f"{target}: expected a folder other than the current one.")
     refuse_input_folder(target, inputs)
     found = [path for path in sorted(target.rglob("*")) if not path.is_dir()]
     for path in found:

@@ -122,7 +122,7 @@ def _refused(path: Path, what: str, holder: tuple[int, str] | None) -> InvalidIn
     who = "" if holder is None else f", process {holder[0]} on {holder[1]}"
     advice = "wait until it ends"
     if holder is not None and holder[1] != socket.gethostname():
-        advice = f"if it does not run any more, remove {path}"
+        advice = f"if it is no longer running, remove {path}"
     return InvalidInput(
         f"{path.parent}: expected {what} in one program at a time, found another run"
         f"{who}; {advice}."

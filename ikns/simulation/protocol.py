@@ -93,7 +93,7 @@ def simulate_protocol(
         on the settings of markers, so artifacts can be compared on one motion.
     side : {"right", "left", "both"}
         The arm that explores while the other rests; or both, as if holding an object
-        between the hands, each elbow with a rhythm of its own.
+        between the hands, each elbow with its own rhythm.
     n_points : int
         Points of the box, at most 10.
     static_seconds, free_seconds, point_seconds : float
@@ -110,16 +110,16 @@ def simulate_protocol(
         How far the clavicle follows the upper arm while the hand is held: 0 keeps it
         still at each point, 1 moves it as much as between points.
     hand_turn : float
-        A second freedom: the person also turns the hand, by so much to either side of
-        its long axis at each point, rad. 0.35 (20 deg) is comfortable.
+        A second degree of freedom: the person also turns the hand about its long axis
+        at each point, by this angle to either side, rad. 0.35 (20 deg) is comfortable.
     habits : PostureHabits, "drawn" or None
-        How the elbow goes with the hand while the person means nothing; drawn from real
-        people's by default. None is a person who holds nearly one posture everywhere,
-        and the hand within 2 cm of the points.
+        How the elbow moves with the hand when the person intends nothing; drawn from
+        real people's by default. None is a person who holds nearly the same posture
+        everywhere, and the hand within 2 cm of the points.
     rate : float
         Frames per second.
     quick : bool
-        A shorter protocol: at most 5 s of free exploration and 3 s a point.
+        A shorter protocol: at most 5 s of free exploration and 3 s per point.
 
     Raises
     ------

@@ -31,8 +31,10 @@ _RATE = 10.0
 _WIDTH, _HEIGHT = 640, 460  # pixels
 _FINE = 2  # drawn larger by this factor and averaged, so that edges are smooth
 _COLORS = 128
-#: Layers that are about the map; here the arm and the finger are to be seen.
-_HIDDEN = tuple(f"{ROOT}/{name}" for name in ("ghosts", "points", "volume", "trail"))
+#: Layers that are about the map or the room; here arm and finger are to be seen.
+_HIDDEN = tuple(
+    f"{ROOT}/{name}" for name in ("ghosts", "points", "volume", "trail", "ground")
+)
 
 
 def animation_bytes(

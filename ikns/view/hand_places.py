@@ -67,8 +67,10 @@ def _draw(axes: Any, posture: Array, places: Array, k: int) -> None:
             *np.moveaxis(surface, -1, 0)[_TO_DRAWING],
             color="#ECEEF1",
             lightsource=light,
-            rstride=2,
-            cstride=2,
+            # With 2, facets have unequal numbers of corners, and matplotlib projects
+            # whatever memory holds in place of the missing ones: sometimes a warning.
+            rstride=1,
+            cstride=1,
             linewidth=0,
             antialiased=False,
             zorder=1,

@@ -118,27 +118,27 @@ def variance_split(
     """Split joint variance over the first axis along and across a task's null space.
 
     Across trials: `q` is (trials, T, n) with time normalized, and the result has one
-    entry a time. Within a trial: `q` is (N, n), the samples of one trial or of one held
-    posture, and the result is a single split.
+    entry per time. Within a trial: `q` is (N, n), the samples of one trial or of one
+    held posture, and the result is a single split.
 
     Parameters
     ----------
     q : (N, ..., n) array
-        Joint angles, rad; NaN where unknown. A trial enters where all its joints are
+        Joint angles, rad; NaN where unknown. A trial counts where all its joints are
         known.
     jacobian : array or callable
         Of the task, k rows. As an array (k, n) it holds everywhere (a weighted sum of
-        joints is a row of weights); (..., k, n) is that of the mean postures;
-        (N, ..., k, n) has one a posture and is averaged over the trials. A callable
-        takes postures (..., n) and returns (..., k, n); see
+        joints is a row of weights); (..., k, n) is that of the mean postures; (N, ...,
+        k, n) has one per posture and is averaged over the trials. A callable takes
+        postures (..., n) and returns (..., k, n); see
         :func:`ikns.analysis.ucm.chain_task` and
         :func:`ikns.analysis.ucm.numerical_task`.
     at : {"mean", "visited"}
         Where a callable is evaluated: at the mean posture, as is usual, or at every
         posture, averaged.
     min_trials : int, optional
-        Fewer trials are too few. Default: n + 1, from which on the covariance of n
-        joints can have full rank. The split alone needs 2.
+        Smallest number of trials. Default: n + 1, the least for which the covariance of
+        n joints can have full rank. The split alone needs 2.
     joint_names : sequence of n str, optional
         For messages.
     rtol : float

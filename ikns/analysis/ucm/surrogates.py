@@ -57,15 +57,15 @@ def surrogate_test(
     by: Literal["trials", "shift"] = "trials",
     seed: int | np.random.Generator = 0,
 ) -> SurrogateTest:
-    """Test whether joints covary so as to keep the task.
+    """Test whether joints covary so that the task is stabilized.
 
     Each joint is shuffled on its own over the trials, the whole time course with it
-    (Muller and Sternad 2003, Biol Cybern 89:22). Mean posture,
-    Jacobian, the variance of every joint and its course over time stay; covariance
-    between joints goes. The null hypothesis is that joints vary independently of each
-    other; a small p says that they covary *and* that this puts more of the variance
-    into the null space. It does not say that V_UCM exceeds V_ORT: joints that the task
-    hardly sees may be variable without any covariation.
+    (Muller and Sternad 2003, Biol Cybern 89:22). Mean posture, Jacobian, the variance
+    of every joint and its course over time stay; covariance between joints is
+    destroyed. The null hypothesis is that joints vary independently of each other; a
+    small p says that they covary *and* that this puts more of the variance into the
+    null space. It does not say that V_UCM exceeds V_ORT: joints that hardly affect the
+    task may be variable without any covariation.
 
     Parameters
     ----------
@@ -73,9 +73,9 @@ def surrogate_test(
     n_surrogates : int
         S; the smallest p is 1 / (1 + S).
     by : {"trials", "shift"}
-        ``"trials"`` are exchangeable and get shuffled. Samples of one trial are not:
-        neighbors are alike. ``"shift"`` turns the whole series of each joint, end to
-        start, by a random number of samples.
+        ``"trials"`` are exchangeable and are shuffled. Samples of one trial are not,
+        because neighbors are similar: ``"shift"`` rotates the whole series of each
+        joint by a random number of samples.
     seed : int or numpy.random.Generator
 
     Returns

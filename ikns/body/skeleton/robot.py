@@ -24,8 +24,9 @@ from ikns.numerics.subspace import null_spaces
 class Robot:
     """The kinematics of a robot from its base to one of its links.
 
-    A joint that mimics another is no freedom of its own: it moves with the one that
-    leads it, which is a joint of the robot even where it lies beside the way.
+    A joint that mimics another is not a degree of freedom: it moves with the joint that
+    it follows, which counts as a joint of the robot even if it is not between base and
+    frame.
 
     Parameters
     ----------

@@ -316,6 +316,6 @@ class Skeleton:
         """Elbow angle about the line from shoulder to wrist, (..., 2) rad.
 
         Zero with the elbow straight below the line, positive where the elbow is lifted
-        outwards (the right one to the right); NaN for a straight arm.
+        outward (the right one to the right); NaN for a straight arm.
         """
         return self._frames.swivel(q)

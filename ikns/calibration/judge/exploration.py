@@ -132,8 +132,8 @@ def _repeated(where: str, markers: Array) -> list[Finding]:
             "repeated",
             "warn",
             where,
-            f"{100 * again.mean():.0f} % of the frames are the one before to the last "
-            "digit",
+            f"{100 * again.mean():.0f} % of the frames are "
+            "identical to the previous one",
             "export at the cameras' own rate, with gaps where they saw nothing",
             (),
             say_frames(again),
@@ -259,10 +259,9 @@ def _exchanged(
                 "exchanged",
                 "refuse",
                 where,
-                f"{say_markers(names)} carry each other's name"
-                f"{'s' * (len(group) > 1)}: their distances to other markers of their "
-                "segments are off",
-                f"exchange {steps}: then all distances fit",
+                f"{say_markers(names)} have swapped names: their distances to other "
+                "markers of their segments are off",
+                f"swap {steps}: then all distances fit",
                 names,
             )
         )
@@ -285,7 +284,7 @@ def _moved(
         "warn",
         where,
         f"{pair[0]} and {pair[1]} are {size} {side} than in the static trial",
-        f"look at {labels[worst]}: a marker moved or carries another's name",
+        f"check {labels[worst]}: a marker moved or has another marker's name",
         (labels[worst], *(name for name in pair if name != labels[worst])),
     )
 
@@ -302,7 +301,7 @@ def _unsteady(
         where,
         f"the distance of {pair[0]} and {pair[1]}, on one segment, varies by "
         f"{1000 * spread[k]:.0f} mm",
-        f"look at {pair[0]} and {pair[1]}: a marker carries another's name",
+        f"check {pair[0]} and {pair[1]}: a marker has another marker's name",
         pair,
     )
 
@@ -326,7 +325,7 @@ def _astray(where: str, worn: MarkerSet, apart: Array, pairs: Indices) -> list[F
             "warn",
             where,
             f"{named[0]} is not where the other markers of its segment say",
-            f"look at {named[0]} there: a ghost, or a name exchanged",
+            f"check {named[0]} there: a ghost marker, or a swapped name",
             tuple(named),
             say_frames(off),
         )

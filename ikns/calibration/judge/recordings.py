@@ -145,7 +145,7 @@ def _require_markers(recording: Recording, worn: MarkerSet) -> None:
         raise MarkerMismatch(
             f"{recording.source}: expected markers of {worn.name} "
             f"({', '.join(worn.labels[:4])}, ...), found "
-            f"{', '.join(recording.labels[:4])}, ...; name the right marker set."
+            f"{', '.join(recording.labels[:4])}, ...; choose the right marker set."
         )
 
 

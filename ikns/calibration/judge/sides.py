@@ -29,8 +29,8 @@ def sides_exchanged(where: str, then: str) -> Finding:
         "exchanged",
         "refuse",
         where,
-        "left and right carry each other's names",
-        f"exchange the labels of left and right: {then}",
+        "left and right are swapped",
+        f"swap the labels of left and right: {then}",
     )
 
 
@@ -39,7 +39,7 @@ def mirror_image(where: str, then: str, *, or_sides: bool = False) -> Finding:
 
     Or that left and right may carry each other's names.
     """
-    labels = "exchange the labels of left and right, or " * or_sides
+    labels = "swap the labels of left and right, or " * or_sides
     return Finding(
         "mirrored",
         "refuse",

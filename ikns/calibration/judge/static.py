@@ -141,7 +141,7 @@ def _exchanged(
             severity,
             where,
             "the body is a mirror image",
-            "exchange the labels of left and right, or export without mirroring an "
+            "swap the labels of left and right, or export without mirroring an "
             "axis: then everything fits",
         )
     names = tuple(labels[i] for pair in repair.exchanges for i in pair)
@@ -151,8 +151,8 @@ def _exchanged(
         "exchanged",
         severity,
         where,
-        f"{', '.join(pairs)} carry each other's name ({_misfit(labels, worst, found)})",
-        f"exchange {', and '.join(pairs)}: then everything fits",
+        f"{', '.join(pairs)} have swapped names ({_misfit(labels, worst, found)})",
+        f"swap {', and '.join(pairs)}: then everything fits",
         names,
     )
 
@@ -191,7 +191,7 @@ def _places(where: str, reference: Skeleton, found: Assumed) -> list[Finding]:
             "refuse" if impossible.any() else "warn",
             where,
             "; ".join(_far(labels, i, found) for i in far[:_NAMED]),
-            f"look at {say_markers([labels[i] for i in far])}: a wrong name, or not "
+            f"check {say_markers([labels[i] for i in far])}: a wrong name, or not "
             "where the marker set has it",
             tuple(labels[i] for i in far),
         )
@@ -212,8 +212,8 @@ def _joints(where: str, reference: Skeleton, fit: SizeFit) -> list[Finding]:
             where,
             f"{name} would be at {np.degrees(angles[worst]):.0f} deg",
             f"expected {np.degrees(reference.lower[worst]):.0f} to "
-            f"{np.degrees(reference.upper[worst]):.0f} deg: markers near it carry "
-            "wrong names or are misplaced",
+            f"{np.degrees(reference.upper[worst]):.0f} deg: markers near it are "
+            "mislabeled or misplaced",
             tuple(
                 m.label
                 for m in reference.marker_set.markers

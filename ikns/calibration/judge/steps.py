@@ -68,10 +68,10 @@ def judge_steps(
             "marker moved",
             "warn",
             where,
-            f"{labels[marker]} moved on its segment, {1000 * change:.0f} mm against "
-            "the others,",
-            f"take the part before it, as with --to {time[t - 1]:g}, and calibrate "
-            "again for what follows",
+            f"{labels[marker]} moved on its segment, {1000 * change:.0f} mm relative "
+            "to the others,",
+            f"use the part before it, for example with --to {time[t - 1]:g}, and "
+            "calibrate again for the rest",
             (labels[marker],),
             f"{t + 1}",
         )

@@ -66,8 +66,8 @@ def _not_seen(
             "refuse",
             where,
             f"{say_markers(own)} at {' '.join(f'{x:.0f}' for x in numbers)} mm where "
-            "nobody is",
-            "export what was not seen as empty cells",
+            "no one can be",
+            "export unseen markers as empty cells",
             tuple(own),
             say_frames(np.asarray(bad.any(axis=1))),
         )
@@ -76,8 +76,8 @@ def _not_seen(
 
 #: What a marker does that a program made, by kind.
 _MADE = {
-    "frozen": "stands still to the last digit while markers next to it move",
-    "filled": "runs along a line at constant speed, as a filled gap does",
+    "frozen": "is identical in every digit while markers next to it move",
+    "filled": "moves in a straight line at constant speed, as a filled gap does",
 }
 
 
@@ -99,10 +99,8 @@ def _exchanged(where: str, names: list[str], frames: Mask) -> Finding:
         "exchanged",
         _severity(frames),
         where,
-        f"{own} carry each other's name{'s' * (len(names) > 2)}",
-        f"exchange {own} there"
-        if len(names) == 2
-        else f"give {own} their own names there",
+        f"{own} have swapped names",
+        f"swap {own} there" if len(names) == 2 else f"give {own} their own names there",
         tuple(names),
         say_frames(frames),
     )
@@ -130,7 +128,7 @@ def _joined(where: str, time: Array, first: list[int]) -> Finding:
         "warn",
         where,
         "all markers jump at once (two recordings joined, or cameras moved)",
-        f"take each part by itself, as with --from {time[first[0]]:g}",
+        f"use each part by itself, for example with --from {time[first[0]]:g}",
         (),
         say_frames(part),
     )

@@ -93,7 +93,7 @@ def frozen(time: Array, markers: Array) -> Mask:
 
 
 def straight(time: Array, markers: Array) -> Mask:
-    """Where a marker runs along a line at constant speed, as a filled gap does, (T, M).
+    """Where a marker moves in a line at constant speed, as a filled gap does, (T, M).
 
     Arguments as for :func:`ikns.calibration.judge.jumps.find_jumps`. Not where most of
     its neighbors do so too, as they were made then, not measured.

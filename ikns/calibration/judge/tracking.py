@@ -58,9 +58,9 @@ def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Findi
                 "exchanged",
                 "refuse",
                 where,
-                f"{first} and {second} carry each other's name: no posture fits "
+                f"{first} and {second} have swapped names: no posture fits "
                 f"({1000 * residual:.0f} mm off)",
-                f"exchange {first} and {second}: then a posture fits",
+                f"swap {first} and {second}: then a posture fits",
                 (first, second),
             )
         ]
@@ -75,7 +75,7 @@ def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Findi
                 f"{skeleton.joint_names[worst]} is beyond its limits by more than "
                 f"{np.degrees(_BEYOND):.0f} deg in {100 * share[worst]:.0f} % of the "
                 "frames",
-                "look at the names and places of the markers next to it",
+                "check the names and places of the markers next to it",
                 _near(skeleton, skeleton.joint_names[worst]),
             )
         )
@@ -158,7 +158,7 @@ def _residual(
             f"markers and body are {1000 * residual:.0f} mm apart, {labels[worst]} "
             f"{1000 * off[worst]:.0f} mm",
             f"expected at most {1000 * MOST_RESIDUAL:.0f} mm with the static trial of "
-            "this person and session: a marker moved, or carries another's name",
+            "this person and session: a marker moved, or has another marker's name",
             (labels[worst],),
         )
     ]

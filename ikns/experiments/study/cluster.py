@@ -90,6 +90,8 @@ def compute_on_cluster(
                     result = future.result()
                     future.release()
                     yield result
+        except StreamError:  # which is an OSError
+            raise
         except KilledWorker as error:
             dead = getattr(error, "allowed_failures", 3) + 1
             raise StreamError(

@@ -84,7 +84,7 @@ def run_lock(folder: Path) -> Iterator[None]:
     try:
         visits.mkdir(exist_ok=True)
     except OSError as error:
-        raise FileError(f"{visits}: cannot be made: {error.strerror}.") from None
+        raise FileError(f"{visits}: cannot be created: {error.strerror}.") from None
     with hold_lock(visits / _LOCK, "to run a study"):
         for left in visits.glob(f".{_DECLARED}.*.part"):  # by a run that was killed
             left.unlink(missing_ok=True)

@@ -38,7 +38,7 @@ def visit_lock(folder: str | Path) -> Iterator[None]:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(f"{path}: cannot be made: {error.strerror}.") from None
+        raise FileError(f"{path}: cannot be created: {error.strerror}.") from None
     try:
         with hold_lock(path / LOCK, "to conduct a visit"):
             yield

@@ -52,7 +52,7 @@ def create_visit(folder: str | Path, about: Mapping[str, Any]) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(f"{path}: cannot be made: {error.strerror}.") from None
+        raise FileError(f"{path}: cannot be created: {error.strerror}.") from None
     _write(path / HEADER, header)
     return path
 
@@ -125,7 +125,7 @@ def write_visit(
     """
     path = Path(folder)
     if path.exists():
-        raise InvalidInput(f"{path}: is there already, and no visit is overwritten.")
+        raise InvalidInput(f"{path}: already exists, and no visit is overwritten.")
     part = path.with_name(f".{path.name}{_PART}")
     shutil.rmtree(part, ignore_errors=True)
     create_visit(part, about)
@@ -163,5 +163,5 @@ def _write(path: Path, content: bytes) -> Path:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
     if not new:
         kind = "visit" if path.name == HEADER else "attempt"
-        raise InvalidInput(f"{path}: is there already, and no {kind} is overwritten.")
+        raise InvalidInput(f"{path}: already exists, and no {kind} is overwritten.")
     return path

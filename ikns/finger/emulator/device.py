@@ -199,7 +199,7 @@ class Servo:
         if limit > 0 and self._now - self._received > limit:
             self.memory["bus_watchdog"] = -1
             self.motor.stop()
-            self._note(f"bus watchdog: nothing heard for {limit:g} s, stopped")
+            self._note(f"bus watchdog: no data for {limit:g} s, stopped")
 
     def _torque_off(self) -> None:
         if self.torque:

@@ -58,15 +58,15 @@ class RecordingsFolder:
             return
         if path.exists():
             raise InvalidInput(
-                f"{path}: recordings are there already; go on with --resume or name "
-                "another folder with --recordings."
+                f"{path}: already contains recordings; continue with --resume "
+                "or choose another folder with --recordings."
             )
         if not path.absolute().parent.is_dir():
             raise InvalidInput(f"{path}: expected an existing folder to write into.")
         try:
             path.mkdir()
         except OSError as error:
-            raise FileError(f"{path}: cannot be made: {error.strerror}.") from None
+            raise FileError(f"{path}: cannot be created: {error.strerror}.") from None
         self._write()
 
     def locked(self) -> AbstractContextManager[None]:
@@ -153,8 +153,8 @@ class RecordingsFolder:
             self.accepted  # noqa: B018 - raises if the table is damaged
         except FileNotFoundError:
             raise FileError(
-                f"{self.path}: expected recordings of a live calibration to go on "
-                "with, found none."
+                f"{self.path}: expected recordings of a live "
+                "calibration to continue, found none."
             ) from None
         except (OSError, ValueError, LookupError, TypeError) as error:
             raise FileError(
@@ -164,11 +164,11 @@ class RecordingsFolder:
             if settings.get(name) != value:
                 raise InvalidInput(
                     f"{self.path}: was recorded with {name} {settings.get(name)}, "
-                    f"found {value}; resume with the same."
+                    f"found {value}; resume with the same value."
                 )
         gone = [path for path in self.accepted.values() if not path.is_file()]
         if gone:
-            raise FileError(f"{gone[0]}: the accepted recording is gone.")
+            raise FileError(f"{gone[0]}: the accepted recording is missing.")
 
     def _write(self) -> None:
         place = self.path / _NAME

@@ -67,9 +67,15 @@ class Judge:
             (1 <= n_dof <= n, f"n_dof between 1 and the {n} joints, found {n_dof}"),
             (0 < variance <= 1, f"variance above 0 and at most 1, found {variance:g}"),
             (max_hand_speed > 0, f"max_hand_speed above 0, found {max_hand_speed:g}"),
-            (0 <= min_static < math.inf, f"min_static of 0 s on, found {min_static:g}"),
-            (0 <= min_still < math.inf, f"min_still of 0 s on, found {min_still:g}"),
-            (0 <= min_rest < math.inf, f"min_rest of 0 s on, found {min_rest:g}"),
+            (
+                0 <= min_static < math.inf,
+                f"min_static of 0 s or more, found {min_static:g}",
+            ),
+            (
+                0 <= min_still < math.inf,
+                f"min_still of 0 s or more, found {min_still:g}",
+            ),
+            (0 <= min_rest < math.inf, f"min_rest of 0 s or more, found {min_rest:g}"),
         ):
             if not right:
                 raise InvalidInput(f"expected {sentence}.")
@@ -89,7 +95,7 @@ class Judge:
     def judge(self, step: ProtocolStep, recording: Recording | None) -> Verdict:
         """Judge a recording of a step; None stands for no frames."""
         if recording is None:
-            return Verdict(False, False, "No frames came.", {})
+            return Verdict(False, False, "No frames arrived.", {})
         try:
             return self._judge(step, recording)
         except (IknsError, np.linalg.LinAlgError) as error:
@@ -158,7 +164,7 @@ class Judge:
             return found
         if step.name in self._narrow:
             return replace(
-                found, keep=True, reason="The elbow goes no farther here, so it seems."
+                found, keep=True, reason="The elbow apparently goes no farther here."
             )
         self._narrow.add(step.name)
         return found

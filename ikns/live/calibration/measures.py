@@ -40,7 +40,7 @@ def tracking_fault(
         return ""
     if left_out := rejection_sentence(motion, chain):
         return f"Only {percent(known):.0f} % of the frames can be used: {left_out}."
-    return f"The arm was in sight in {percent(known):.0f} % of the frames only."
+    return f"The arm was visible in only {percent(known):.0f} % of the frames."
 
 
 def missing_percent(recording: Recording, skeleton: Skeleton) -> float:

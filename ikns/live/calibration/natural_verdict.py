@@ -87,14 +87,14 @@ def judge_natural(
     usable = bool(spans.max() >= LEAST_COVERED and seconds >= LEAST_NATURAL)
     if not reason and seconds < max(_MOVING_SHARE * values["seconds"], LEAST_NATURAL):
         reason = (
-            f"The hand moved for {seconds:.0f} s only, expected at least half of the "
-            "time: reach, carry and put away without a break."
+            f"The hand moved for only {seconds:.0f} s, expected at least half of the "
+            "time: reach, carry and put things away without a break."
         )
     elif not reason and np.sort(spans)[1] < LEAST_COVERED:
         reason = (
-            f"The hand covered {' x '.join(f'{100 * s:.0f}' for s in spans)} cm only, "
-            f"expected {100 * LEAST_COVERED:.0f} cm in two directions at least: use "
-            "all of the work space."
+            f"The hand covered only {' x '.join(f'{100 * s:.0f}' for s in spans)} cm, "
+            f"expected {100 * LEAST_COVERED:.0f} cm in at least two directions: "
+            "use the whole work space."
         )
     words = reason or "The hand moved over the work space."
     return Verdict(
@@ -153,6 +153,6 @@ def half_explored(
         return ""
     end = "lower" if ends[0] - low > high - ends[1] else "upper"
     return (
-        f"The elbow went {np.degrees(width):.0f} deg, at other points "
-        f"{np.degrees(usual):.0f} deg: turn it to the {end} end too, if it goes there."
+        f"The elbow covered {np.degrees(width):.0f} deg, at other points "
+        f"{np.degrees(usual):.0f} deg: move it to the {end} end too, if it gets there."
     )

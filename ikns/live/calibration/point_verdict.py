@@ -165,7 +165,7 @@ def _straight(elbow_deg: float) -> str:
         return ""
     return (
         f"The arm is straight, with the elbow at {elbow_deg:.0f} deg: hold the hand "
-        f"nearer, so that it bends by {LEAST_BENT:.0f} deg or more."
+        f"closer, so that it bends by {LEAST_BENT:.0f} deg or more."
     )
 
 
@@ -180,7 +180,7 @@ def _fault(
     """Describe the most important fault; empty if there is none."""
     if steady < STEADY_SHARE:
         return (
-            f"The hand was steady in {100 * steady:.0f} % of the samples only, "
+            f"The hand was steady in only {100 * steady:.0f} % of the samples, "
             f"expected {100 * STEADY_SHARE:.0f} % or more."
         )
     if width < LEAST_RANGE:
@@ -190,7 +190,7 @@ def _fault(
         )
     if components > n_dof:
         return (
-            f"It took {components} components, so more moved than the elbow: the hand "
+            f"It took {components} components, so more than the elbow moved: the hand "
             "turned or the shoulder moved too."
         )
     if not leak < ONE_PLACE:
@@ -198,7 +198,7 @@ def _fault(
     for name, distance in sorted(apart.items(), key=lambda item: item[1])[:1]:
         if distance < ONE_PLACE:
             return (
-                f"The position is that of {name}, {100 * distance:.0f} cm away, "
+                f"The position is only {100 * distance:.0f} cm away from {name}, "
                 f"expected at least {100 * ONE_PLACE:.0f} cm."
             )
     return ""

@@ -90,8 +90,8 @@ def accepted_recordings(
         raise NotEnoughData(
             f"{folder.path}: expected an accepted static trial and at least {need} "
             f"accepted points, found {'a' if static else 'no'} static trial and "
-            f"{len(points)} of {len(asked)} points; the recordings stay, so go on with "
-            "--resume."
+            f"{len(points)} of {len(asked)} points; the recordings are kept; "
+            "continue with --resume."
         )
     return accepted[static[0].name], [accepted[step.name] for step in points]
 
@@ -204,13 +204,13 @@ class _Run:
         step = protocol.step.name if protocol.step else "the end"
         if source.ended and not protocol.waiting and not protocol.over:
             raise StreamError(
-                f"{source.name}: ended at {step}; what was recorded is in "
-                f"{self._folder.path}, so go on with --resume."
+                f"{source.name}: ended at {step}; recordings so far are "
+                f"in {self._folder.path}; continue with --resume."
             )
         if protocol.auto and self._clock.silence > read_timeout:
             raise StreamError(
-                f"{source.name}: no frame for {read_timeout:g} s at {step}; what was "
-                f"recorded is in {self._folder.path}, so go on with --resume."
+                f"{source.name}: no frame for {read_timeout:g} s at {step}; "
+                f"recordings so far are in {self._folder.path}; continue with --resume."
             )
         if source.ended:
             time.sleep(_WAIT)

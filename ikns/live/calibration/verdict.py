@@ -126,8 +126,8 @@ def judge_static(
         lost := _lost(expected, seen.any(axis=0), recording.labels, dropped)
     ):
         reason = (
-            f"Never in sight: {', '.join(lost)}; what the static trial does not show "
-            "cannot be used later."
+            f"Never visible: {', '.join(lost)}; markers missing from the static "
+            "trial cannot be used later."
         )
     elif not reason and np.mean(seen[:, seen.any(axis=0)]) < SEEN_SHARE:
         reason = f"{values['missing_percent']:.0f} % of the markers were missing."
@@ -187,7 +187,7 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
     if len(explored) < 4:
         reason = tracking_fault(skeleton, recording, motion, chain=chain)
         return Verdict(
-            False, False, reason or "The hand was hardly ever in sight.", values
+            False, False, reason or "The hand was hardly ever visible.", values
         )
     box = minimum_bounding_box(explored)
     values["box_cm"] = np.round(200 * box.half_lengths, 1).tolist()

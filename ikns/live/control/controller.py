@@ -29,8 +29,8 @@ from ikns.motion.marker_ik.rejection import chain_columns
 _RESTART = 1.0
 #: Cut-off frequency for the hand's speed, Hz; natural reaches are below it.
 _SPEED_CUTOFF = 5.0
-#: Why there is no valid pose when no frame came since the last valid one.
-_SILENCE = "no frame came"
+#: Why there is no valid pose when no frame arrived since the last valid one.
+_SILENCE = "no frame arrived"
 
 
 class Decision(NamedTuple):

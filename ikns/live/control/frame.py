@@ -100,14 +100,14 @@ class FrameSolver:
         ``"intent"``, for which `inside` says where natural movement was taught.
     max_uncertainty : float, optional
         c is NaN where its standard deviation is larger. A segment may then be hidden as
-        long as c does not need it. None: c has no limit and is NaN whenever a segment
-        of the chain is out of sight: the rule of sessions that were recorded without.
+        long as c does not need it. None: no limit, and c is NaN whenever a segment of
+        the chain is not visible, as in sessions recorded without a limit.
 
     Raises
     ------
     InvalidInput
-        When the map is of other joints or the readout of another chain, or the kernels
-        do not know one of them.
+        When the map is for other joints or the readout for another chain, or the
+        kernels do not support one of them.
 
     Examples
     --------
@@ -266,7 +266,7 @@ class FrameSolver:
         time : (T,) array
             s.
         believed : (T,) boolean array
-            Whether the markers of the chain are; those of other frames leave no trace.
+            Whether the markers of the chain are trusted; other frames have no effect.
 
         Returns
         -------
@@ -308,7 +308,7 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
     elif not isinstance(interpolator, NearestPoint):
         raise InvalidInput(
             "expected a map between natural neighbors or nearest points, found "
-            f"{type(interpolator).__name__}, which the live kernel does not know."
+            f"{type(interpolator).__name__}, which the live kernel does not support."
         )
     hands = [SIDES.index(side) for side in chain_sides(chain)]
     return ControlMap(

@@ -26,13 +26,13 @@ def intent_numbers(skeleton: Skeleton, readout: Readout) -> IntentNumbers:
     Raises
     ------
     InvalidInput
-        For another method, which the live kernel does not know.
+        For another method, which the live kernel does not support.
     """
     learned = readout.map
     if not isinstance(learned, IntentMap):
         raise InvalidInput(
-            f"the method '{readout.method}' reads recordings only; live, choose "
-            "paper or intent."
+            f"the method '{readout.method}' works with recordings only; for live "
+            "control choose paper or intent."
         )
     (side,) = chain_sides(readout.chain)
     paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))

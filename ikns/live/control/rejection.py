@@ -55,7 +55,7 @@ def rejection_reason(
         Columns of labels that have changed places.
     """
     if not new:
-        return "the same picture again"
+        return "the same frame again"
     limit, worth = solver.max_uncertainty, solved.uncertainty.tolist()
     doubtful = 0
     for dof in settings.dofs:
@@ -67,7 +67,7 @@ def rejection_reason(
     # A marker that is wrong matters more than one that is hidden.
     hides = fits or not math.isfinite(solved.residual)
     if doubtful and not solved.in_sight and hides:
-        return f"the {_hidden(solver, markers)} is not in sight"
+        return f"the {_hidden(solver, markers)} is not visible"
     if len(exchanged):
         labels = solver.skeleton.marker_set.labels
         return say_exchanged(tuple(labels[column] for column in exchanged))

@@ -76,15 +76,15 @@ class SafetyMachine:
             return self._seen + self.hold_after
         return self._seen + self.safe_after if self.state == "holding" else math.inf
 
-    def arm(self, now: float, reason: str = "asked to arm") -> Changes:
+    def arm(self, now: float, reason: str = "arming requested") -> Changes:
         """Allow the finger to become active."""
         return self._go(now, "armed", reason) if self.state == "disarmed" else ()
 
-    def arm_again(self, now: float, reason: str = "asked to arm again") -> Changes:
+    def arm_again(self, now: float, reason: str = "re-arming requested") -> Changes:
         """Leave the safe state, because someone asked for it."""
         return self._go(now, "armed", reason) if self.state == "safe" else ()
 
-    def activate(self, now: float, reason: str = "asked to start") -> Changes:
+    def activate(self, now: float, reason: str = "start requested") -> Changes:
         """Let the finger follow the signal, if armed and poses are coming."""
         now = self._at(now)
         ready = self.state == "armed" and now - self._seen <= self.hold_after
@@ -97,7 +97,7 @@ class SafetyMachine:
         if self.state != "safe":
             self._seen = self._at(now)
         if self.state == "holding":
-            return late + self._go(now, "active", "poses are back")
+            return late + self._go(now, "active", "poses have returned")
         return late
 
     def check(self, now: float, why: str = "") -> Changes:
@@ -121,7 +121,7 @@ class SafetyMachine:
             return ()
         return self._go(now, "safe", reason)
 
-    def disarm(self, now: float, reason: str = "asked to disarm") -> Changes:
+    def disarm(self, now: float, reason: str = "disarming requested") -> Changes:
         """End: the finger is relaxed."""
         return () if self.state == "disarmed" else self._go(now, "disarmed", reason)
 

@@ -67,13 +67,13 @@ class ControlSettings:
         object.__setattr__(self, "dofs", tuple(self.dofs))
         if not self.dofs or min(self.dofs) < 1 or len(set(self.dofs)) < len(self.dofs):
             raise InvalidInput(
-                "expected different dofs from 1 on, found "
+                "expected different dofs, counted from 1, found "
                 f"{', '.join(map(str, self.dofs)) or 'none'}."
             )
         if self.method not in ("paper", "intent"):
             raise InvalidInput(
-                f"the method '{self.method}' reads recordings only; live, choose paper "
-                "or intent."
+                f"the method '{self.method}' works with recordings only; for live "
+                "control choose paper or intent."
             )
         for name in (
             "hold_speed",

@@ -22,7 +22,7 @@ from ikns.live.warm_up import warm_up
 
 #: How long to wait for a first frame that counts, s.
 _FIRST_TIMEOUT = 10.0
-_NONE = "no frame came"
+_NONE = "no frame arrived"
 
 
 class LiveSignal:

@@ -49,7 +49,7 @@ def check_publish(address: str) -> PublishAddress | RosAddress:
     scheme, colon, rest = address.partition(":")
     name, _, query = rest.partition("?")
     if scheme not in _OPTIONS or not (colon and name.strip() and name.isprintable()):
-        raise InvalidInput(f"unknown place to publish {address!r}, expected {_KNOWN}.")
+        raise InvalidInput(f"unknown publishing target {address!r}, expected {_KNOWN}.")
     options = dict(parse_qsl(query, keep_blank_values=True))
     for option in options:
         if option not in _OPTIONS[scheme]:

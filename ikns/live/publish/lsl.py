@@ -60,8 +60,8 @@ class LslSink:
         self._pylsl = lsl(f"publishing to lsl:{name}", this_machine=not everywhere)
         if everywhere and only_this_machine():
             raise StreamError(
-                f"lsl:{name}: LSL was started for this machine only, by a "
-                "source with scope=machine; leave scope out there, or here."
+                f"lsl:{name}: a source with scope=machine has limited LSL to "
+                "this machine; leave out scope there, or here."
             )
         _check_free(self._pylsl, name)
         about = {

@@ -105,7 +105,7 @@ class FrameLoop:
             try:
                 self._fingers.connect()
             except (IknsError, OSError) as error:
-                self._refusal = f"; arming again failed: {str(error).rstrip('.')}"
+                self._refusal = f"; re-arming failed: {str(error).rstrip('.')}"
                 return
         self._armed_at = time.monotonic()
         self._apply(self._controller.machine.arm_again(self.elapsed()))

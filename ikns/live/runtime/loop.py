@@ -57,9 +57,10 @@ def run(
         Calibrated.
     finger : Finger or FingerGroup, optional
         Not connected yet. Without a finger everything runs but nothing moves. Several
-        are safe together: what stops one stops all.
+        stop together: what stops one stops all.
     settings : ControlSettings, optional
-        Smoothing, dead band, watchdog, and which freedoms of the map drive a finger.
+        Smoothing, dead band, watchdog, and which degrees of freedom of the map drive a
+        finger.
     session : RunWriter, optional
         From :func:`ikns.live.session.open_run` with the labels of the subject's marker
         set; gets one row per frame and is left open.
@@ -79,12 +80,12 @@ def run(
         `time.monotonic`), the commanded flexion and the :class:`Decision`; also from
         within the loop.
     on_notice : callable, optional
-        Called with a sentence: why the finger does not move yet, half a second after
-        the start; that it is in its safe state, and why; and events of the source.
-        Also from within the loop.
+        Called with a sentence: why the finger has not moved half a second after the
+        start; that it is in its safe state, and why; and events of the source. Also
+        from within the loop.
     listener : LoopListener, optional
-        Hears of every frame and of every event that the session gets, also from within
-        the loop; :func:`ikns.live.publish.open_publisher` opens one that publishes.
+        Receives every frame and every event that the session gets, also from within the
+        loop; :func:`ikns.live.publish.open_publisher` opens one that publishes.
     realtime : bool
         Give the loop priority over ordinary programs, where the system allows it.
     exclusive : bool
@@ -99,8 +100,8 @@ def run(
     ------
     InvalidInput
         When the system does not allow real-time priority, the subject was calibrated
-        without the method of the settings, or the fingers follow other freedoms than
-        the settings name.
+        without the method of the settings, or the fingers follow other degrees of
+        freedom than the settings name.
     MarkerMismatch
         When the source has none of the subject's markers, or those of several people.
     FingerError
@@ -176,7 +177,7 @@ def run(
                 if on_status and loop.status_due(status_every):
                     on_status(loop.status())
         finally:
-            loop.disarm("asked to stop" if stopped.is_set() else "the end")
+            loop.disarm("stop requested" if stopped.is_set() else "the end")
     return loop.report
 
 

@@ -39,7 +39,7 @@ class Notices:
         self._told: set[str] = set()
         self._frame_time = 0.0
         self.was_active = False
-        self.why = "no frame came"
+        self.why = "no frame arrived"
 
     def frame(self, now: float, rejection: str) -> None:
         """Take the result of a frame; `rejection` is empty if it is valid."""
@@ -57,10 +57,10 @@ class Notices:
         self._take_events(now)
         if self.was_active or now < _WHY_AFTER:
             return
-        why = self.why if now - self._frame_time < _SILENCE else "no frame came"
+        why = self.why if now - self._frame_time < _SILENCE else "no frame arrived"
         if why and kind_of(why) not in self._told:
             self._told.add(kind_of(why))
-            self._tell(now, f"the finger does not move yet after {now:.1f} s: {why}.")
+            self._tell(now, f"the finger has not moved after {now:.1f} s: {why}.")
 
     def _take_events(self, now: float) -> None:
         events = self._source.events

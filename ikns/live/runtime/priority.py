@@ -86,8 +86,8 @@ def _realtime_scheduling(*, wanted: bool) -> Iterator[None]:
         AttributeError,
     ) as error:  # the latter outside Linux
         raise InvalidInput(
-            "expected a system that lets this program run in real time, found one that "
-            "does not: leave that out, or allow it (Linux: rtprio 1 for the user in "
+            "expected permission to run at real-time priority, found "
+            "none: leave out real time, or allow it (Linux: rtprio 1 for the user in "
             "/etc/security/limits.conf, then log in again)."
         ) from error
     try:

@@ -80,7 +80,7 @@ def _personal_data(place: Path) -> list[str]:
 
 def _faults(run: Run) -> list[str]:
     found = [
-        f"the file of {name} ends within a row ({size} bytes); mend it."
+        f"the file of {name} ends in the middle of a row ({size} bytes); mend it."
         for name, size in run.torn.items()
         if size
     ]
@@ -98,7 +98,7 @@ def _faults(run: Run) -> list[str]:
         if not np.isfinite(time).all():
             found.append(f"{name} is missing in {np.sum(~np.isfinite(time))} rows.")
     if not (np.diff(run.receive_time) >= 0).all():
-        found.append("receive_time runs back.")
+        found.append("receive_time goes backward.")
     for name, sent in run.model.items():
         beyond = np.sum((sent < 0) | (sent > 1)) if name.endswith("_sent") else 0
         if beyond:

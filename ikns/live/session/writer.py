@@ -145,4 +145,4 @@ class RunWriter:
         if fault != self.fault:
             self.fault = fault
             if self._on_fault:
-                self._on_fault(fault or "the session is written again.")
+                self._on_fault(fault or "the session is being written again.")

@@ -59,16 +59,16 @@ def open_source(
         All its markers except static-only ones must be among the labels, of one
         subject.
     subject : Subject, optional
-        Who is tracked: as `needs` with its marker set, and the distances within
-        segments must not be ten times those at calibration, or a tenth of them. The
-        frames of a live source that are looked at for this are not read again.
+        Who is tracked: like `needs` with its marker set, and distances within segments
+        must not be ten times or a tenth of those at calibration. The frames of a live
+        source used for this check are not returned again.
     names : mapping, optional
         Other labels for markers of the source, new by old, as for
         :func:`ikns.recording.labels.renamed`.
     read_timeout : float
         Iterating raises an error after this time without a frame, s.
     late_after : float, optional
-        A frame counts as late from this lateness on, s; one frame period by default.
+        Delay from which a frame counts as late, s; one frame period by default.
 
     Returns
     -------

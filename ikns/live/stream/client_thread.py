@@ -129,8 +129,8 @@ class ClientThread:
             )
         if self.connected and (labels, rate) != (self.labels, self.rate):
             raise StreamError(
-                f"{self.name}: {self.server} has other markers or another rate than "
-                "before and is not read."
+                f"{self.name}: {self.server} has different markers or a different "
+                "rate than before and is not read."
             )
         self.labels, self.rate = labels, rate
 

@@ -216,7 +216,7 @@ class LslFeed:
         except self._pylsl.util.TimeoutError:
             raise StreamError(
                 f"{self.name}: expected the stream to answer within "
-                f"{self._timeout:g} s; a firewall may stand in between."
+                f"{self._timeout:g} s; a firewall may be blocking it."
             ) from None
         except RuntimeError as error:  # the root of pylsl's errors
             raise StreamError(f"{self.name}: cannot be opened ({error}).") from None
@@ -236,7 +236,7 @@ class LslFeed:
             if self._open is None:  # noticed already, or closed
                 return
             self._open = self._reading = None
-        self._tell("the stream broke off.")
+        self._tell("the stream was interrupted.")
         threading.Thread(target=self._search_again, daemon=True).start()
 
     def _search_again(self) -> None:
@@ -253,7 +253,8 @@ class LslFeed:
                     self._nominal_rate,
                 ):
                     raise StreamError(
-                        "came back with other markers or another rate and is not read."
+                        "came back with different markers or a different rate and is "
+                        "not read."
                     )
             except StreamError as error:
                 text = str(error).removeprefix(f"{self.name}: ")

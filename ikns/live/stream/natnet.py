@@ -129,7 +129,7 @@ class NatNetFeed:
             if got is None:
                 raise StreamError(
                     f"{self.name}: the server sends no frames within "
-                    f"{client.timeout:g} s; let Motive run live or play a take, with "
+                    f"{client.timeout:g} s; run Motive live or play a take, with "
                     "streaming on."
                 )
             if got.number == packets.FRAME:
@@ -147,7 +147,7 @@ class NatNetFeed:
             got = self._link.receive(now + _KEEP_ALIVE)
             if got is None:
                 if time.monotonic() - heard > _SILENCE:
-                    self._client.add_event(f"{self.name}: the server went away.")
+                    self._client.add_event(f"{self.name}: the server disconnected.")
                     return
                 continue
             heard = got.time

@@ -133,7 +133,7 @@ class NatNetLink:
                 if got is not None and got.number == answer:
                     return got.content
         raise StreamError(
-            f"{self._name}: expected the server to tell {text or 'its models'} within "
+            f"{self._name}: expected the server to send {text or 'its models'} within "
             f"{self._client.timeout:g} s, found no answer."
         )
 
@@ -148,8 +148,8 @@ class NatNetLink:
                     return Received(number, content, received)
                 if number >= 0:
                     self._client.add_event(
-                        f"{self._name}: frames of another server at {sender[0]} come "
-                        "too and are ignored."
+                        f"{self._name}: frames of another server at {sender[0]} also "
+                        "arrive and are ignored."
                     )
         return None
 

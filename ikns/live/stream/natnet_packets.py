@@ -75,8 +75,8 @@ class ServerFacts:
             info = natnet.ServerInfo.read_from_buffer(_buffer(natnet, content), None)
         except (struct.error, UnicodeDecodeError):
             raise StreamError(
-                f"{source}: expected a NatNet server, found an answer of "
-                f"{len(content)} bytes that is none."
+                f"{source}: expected a NatNet server, found an invalid answer "
+                f"of {len(content)} bytes."
             ) from None
         self.version = info.nat_net_protocol_version
         if self.version.major not in _MAJOR:
@@ -211,12 +211,12 @@ def _bounded(buffer: Any) -> Any:
             self, max_length: int | None = None, static_length: bool = False
         ) -> str:
             if self.pointer >= len(self.data):
-                raise struct.error("it ends within a text")
+                raise struct.error("it ends inside a text")
             return str(super().read_string(max_length, static_length))
 
         def read_float32_array(self, count: int) -> tuple[float, ...]:
             if self.pointer + 4 * count > len(self.data):
-                raise struct.error("it ends within numbers")
+                raise struct.error("it ends inside numbers")
             return tuple(super().read_float32_array(count))
 
     return Bounded

@@ -105,7 +105,7 @@ class QualisysFeed:
                 self._client.set_connected()
                 await self._wake.wait()
                 if not self._client.closed:
-                    self._client.add_event(f"{self.name}: QTM went away.")
+                    self._client.add_event(f"{self.name}: QTM disconnected.")
             except StreamError as error:
                 if not self._client.connected:
                     raise

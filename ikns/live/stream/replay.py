@@ -32,8 +32,8 @@ def frame_times(recording: Recording) -> tuple[float, float]:
     rate = recording.rate
     if not (math.isfinite(rate) and rate > 0):
         raise InvalidInput(
-            f"{recording.source}: expected two frames or more to have a rate, found "
-            f"{len(recording.time)}."
+            f"{recording.source}: expected at least two frames to determine a rate, "
+            f"found {len(recording.time)}."
         )
     return rate, float(recording.time[-1] - recording.time[0]) + 1 / rate
 

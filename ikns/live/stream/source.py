@@ -83,7 +83,7 @@ class Source:
         Returns
         -------
         Frame or None
-            None when no frame came within `timeout` seconds, or the source has ended.
+            None if no frame arrived within `timeout` seconds, or the source has ended.
         """
         frame = None if self.ended else self._feed.poll(timeout)
         now = time.monotonic()
@@ -92,7 +92,7 @@ class Source:
             mark_gaps(markers)
             frame = Frame(frame.number, frame.device_time, frame.receive_time, markers)
             if self._silent:
-                self._add_event(f"frames again after {now - self._last:.1f} s.")
+                self._add_event(f"frames resumed after {now - self._last:.1f} s.")
                 self._silent = False
             self._last = now
             self.continuity.add(frame)

@@ -122,7 +122,7 @@ class ViconFeed:
                 if self._next_frame(client):
                     self._receive(client)
             if not self._client.closed:
-                self._client.add_event(f"{self.name}: Vicon went away.")
+                self._client.add_event(f"{self.name}: Vicon disconnected.")
         finally:
             client.Disconnect()
 

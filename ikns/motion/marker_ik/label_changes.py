@@ -44,7 +44,7 @@ class LabelState(NamedTuple):
 
 
 class LabelWatch:
-    """Notices, frame by frame, which of K labels have changed places.
+    """Notices, frame by frame, which of K labels are swapped.
 
     The first frame counts as right.
     """
@@ -163,7 +163,7 @@ def label_changes(time: Array, markers: Array) -> tuple[bool, Indices]:
 def exchanges(
     gate: MarkerGate, markers: Array, error: Array, rate: float
 ) -> list[tuple[Indices, Indices]]:
-    """Find the frames in which labels have changed places.
+    """Find the frames in which labels are swapped.
 
     Parameters
     ----------

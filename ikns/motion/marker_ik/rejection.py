@@ -79,17 +79,17 @@ def misfit_reason(
     if np.nanmax(away, initial=0.0) > limits.worst_residual:
         k = int(np.nanargmax(away))
         label = skeleton.marker_set.labels[worn.columns[k]]
-        return f"{label} is {_mm(away[k])} from where any posture has it"
+        return f"{label} is {_mm(away[k])} from where any posture would put it"
     return f"no posture fits the markers ({_mm(residual)} off)"
 
 
 def say_exchanged(labels: tuple[str, ...]) -> str:
-    """Say that labels have changed places.
+    """Say that labels are swapped.
 
     >>> print(say_exchanged(("RWRA", "RWRB")))
-    RWRA and RWRB have changed places
+    RWRA and RWRB are swapped
     """
-    return f"{', '.join(labels[:-1])} and {labels[-1]} have changed places"
+    return f"{', '.join(labels[:-1])} and {labels[-1]} are swapped"
 
 
 def recorded_reasons(
@@ -162,8 +162,8 @@ def rejection_sentence(motion: Motion, chain: str) -> str:
 def say_rejections(counts: dict[str, int], frames: int) -> str:
     """Say how many of so many frames were left out, by reason; empty for none.
 
-    >>> print(say_rejections({"RUPA and RUPB have changed places": 30}, 100))
-    30 of 100 frames left out: RUPA and RUPB have changed places
+    >>> print(say_rejections({"RUPA and RUPB are swapped": 30}, 100))
+    30 of 100 frames left out: RUPA and RUPB are swapped
     >>> print(say_rejections({"RFIN is up to 90 mm away": 3, "RUPA is": 1}, 100))
     4 of 100 frames left out: RFIN is up to 90 mm away (3 frames); RUPA is (1 frame)
     """

@@ -12,8 +12,8 @@ _PLACE = "# mm"
 def kind_of(reason: str) -> str:
     """Return a reason without its amount, so that alike ones are the same.
 
-    >>> kind_of("RFIN is 215 mm from where any posture has it")
-    'RFIN is # mm from where any posture has it'
+    >>> kind_of("RFIN is 215 mm from where any posture would put it")
+    'RFIN is # mm from where any posture would put it'
     """
     return _AMOUNT.sub(_PLACE, reason)
 

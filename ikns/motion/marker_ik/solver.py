@@ -52,7 +52,7 @@ class MarkerIK:
     Parameters
     ----------
     skeleton : Skeleton
-        Body and markers; static-only markers weigh nothing.
+        Body and markers; static-only markers have no weight.
     max_iterations : int
         Steps per frame.
     tolerance : float
@@ -97,7 +97,7 @@ class MarkerIK:
         Returns
         -------
         Pose
-            With every marker gone it is the pose before, residual NaN, not converged.
+            Without any visible marker, the pose before; residual NaN, not converged.
         """
         seen = np.ascontiguousarray(markers, dtype=np.float64)
         if seen.shape != self._markers_shape:
@@ -136,7 +136,7 @@ class MarkerIK:
             Any recording that holds at least three of the skeleton's markers.
         chain : str, optional
             What the recording is meant to show, see :data:`ikns.body.chains.CHAINS`.
-            Without it an arm that is never in sight is just unknown in every frame.
+            Without it an arm that is never visible is just unknown in every frame.
         progress : callable, optional
             Called with (frames done, frames in total).
 
@@ -153,7 +153,7 @@ class MarkerIK:
         ------
         MarkerMismatch
             When fewer than three of the skeleton's markers are in the recording, or a
-            segment of `chain`, or the thorax, is never in sight.
+            segment of `chain`, or the thorax, is never visible.
         NotEnoughData
             When `chain` is asked for and there are fewer than two frames.
         """

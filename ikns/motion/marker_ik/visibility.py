@@ -122,7 +122,7 @@ def require_sight(skeleton: Skeleton, visibility: Visibility, chain: str) -> Non
             )
         if not visibility.seen[:, visibility.segments.index(link)].any():
             raise MarkerMismatch(
-                f"the segment {link} is never in sight; expected at least {need} of "
+                f"the segment {link} is never visible; expected at least {need} of "
                 f"{', '.join(worn.labels[i] for i in own)} of {worn.name} in a frame."
             )
 

@@ -47,14 +47,14 @@ class NaturalNeighborInterpolator:
     Inside the convex hull the weights are at least 0, sum to 1, reproduce the query
     (``weights @ points == x``), are 1 at a site, continuous everywhere, and follow the
     sites under rotation, scaling and renumbering. Sites on a common sphere or in a
-    common plane (boxes, grids) are as good as any.
+    common plane (boxes, grids) need no special care.
 
     Parameters
     ----------
     points : (N, 3) array
         Sites, m; at least 4, all different, not all in one plane.
     values : (N, ...) array, optional
-        What to interpolate; without it only :meth:`weights` can be asked.
+        What to interpolate; without it only :meth:`weights` is available.
     outside : {"nearest", "project", "nan"}
         Outside the hull: the value of the nearest site (the paper's rule; it jumps at
         the hull), the value at the nearest point of the hull (continuous), or NaN.
@@ -104,9 +104,9 @@ class NaturalNeighborInterpolator:
     moved in as well: on sets thinner than 1e-6 of their width, by more than 1e-10.
 
     Queries are answered by compiled code, one or many at a time, which may round
-    differently. Where that cannot trust itself, for a weight comes out below -1e-9 or
-    no circumsphere around the query is found, weights and values are NaN. No query has
-    been seen for which this happens, unless the diagram was damaged on purpose.
+    differently. Where the result is unreliable (a weight below -1e-9, or no
+    circumsphere found around the query), weights and values are NaN. No such query is
+    known, unless the diagram was damaged on purpose.
 
     One interpolator can be used by many threads at once.
 
@@ -222,7 +222,7 @@ class NaturalNeighborInterpolator:
     def weights(self, x: ArrayLike, *, out: Array | None = None) -> Array:
         """Weights of the sites, (..., N); arguments as those of a call.
 
-        For "sibson_c1", whose values also depend on gradients, they are refused.
+        For "sibson_c1", whose values also depend on gradients, this raises an error.
         """
         if self.method == "sibson_c1":
             raise InvalidInput(

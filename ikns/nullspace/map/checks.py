@@ -192,7 +192,7 @@ def _warn_of_merged(found: BoundingBoxKMeans) -> None:
     if shared:
         warnings.warn(
             f"two places share one PCA point: {'; '.join(shared)}; use as many points "
-            "as there are places, or one recording a place.",
+            "as there are places, or one recording per place.",
             MapWarning,
             stacklevel=4,
         )
@@ -220,7 +220,8 @@ def warn_of_components(centers: Array, n_components: Indices, n_dof: int) -> Non
     ]
     if none:
         warnings.warn(
-            f"no joint moves at {'; '.join(none)}, so these points have no say in c.",
+            f"no joint moves at {'; '.join(none)}, so these points do not contribute "
+            "to c.",
             MapWarning,
             stacklevel=3,
         )
@@ -230,8 +231,9 @@ def warn_of_components(centers: Array, n_components: Indices, n_dof: int) -> Non
     ]
     if more:
         warnings.warn(
-            f"the recording holds more freedom than the {n_dof} wanted (the hand "
-            f"turned, the shoulder girdle moved, or noise): at {'; '.join(more)}.",
+            f"the recording holds more degrees of freedom than the {n_dof} requested "
+            "(the "
+            f"hand turned, the shoulder girdle moved, or noise): at {'; '.join(more)}.",
             MapWarning,
             stacklevel=3,
         )

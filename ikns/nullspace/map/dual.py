@@ -90,14 +90,14 @@ def assemble_dual(
 
     As :func:`ikns.nullspace.map.assembly.assemble`, but a row is orthogonal to the
     other motions and not to the other rows, and its output rises with its own motion.
-    Rows have unit length. A point at which a motion is not within the components, spans
-    less than :data:`LEAST_SPAN` or only follows those before it is left out, with a
-    MapWarning.
+    Rows have unit length. A point does not show a motion that is not within the
+    components, spans less than :data:`LEAST_SPAN` or only follows those before it; a
+    MapWarning names it. Without a direction, in the first case, it is left out.
 
     Returns
     -------
     shown : list of int
-        Points that show every motion, K of P.
+        Points that have all directions, K of P.
     directions : (K, d, n) array
     lower, upper : (K, d) arrays
         rad.
@@ -121,7 +121,7 @@ def assemble_dual(
         directions.append(z)
         ends.append(np.quantile(q @ z.T, quantiles, axis=0))
         faults.append(_fault(q, z, wanted, ends[-1]))
-    shown = [k for k, fault in enumerate(faults) if not fault]
+    shown = [k for k, z in enumerate(directions) if np.isfinite(z).all()]
     _check_shown(centers, faults, n_dof)
     lower, upper = np.swapaxes(np.array(ends)[shown], 0, 1)
     return shown, np.array(directions)[shown], lower, upper
@@ -130,7 +130,7 @@ def assemble_dual(
 def _fault(q: Array, z: Array, wanted: Array, ends: Array) -> str:
     """Say which motion a place does not show; empty where it shows all."""
     if not np.isfinite(z).all():
-        return "does not show each by itself"
+        return "does not show each by itself and is left out"
     spans = (ends[1] - ends[0]) / np.einsum("dn,dn->d", z, wanted)
     outputs = (q - q.mean(axis=0)) @ z.T
     for i, span in enumerate(spans):
@@ -154,13 +154,14 @@ def _check_shown(centers: Array, faults: Sequence[str], n_dof: int) -> None:
     least = max(math.ceil(_MOST * count), min(4, count))
     if good < least:
         raise NotEnoughData(
-            f"expected {n_dof} freedoms at {least} of the {count} places or more, "
+            f"expected {n_dof} degrees of freedom at {least} of the {count} places or "
+            "more, "
             f"found them at {good}: {listed}: explore each by itself there (lift the "
             "elbow, turn the hand), or ask for fewer with --n-dof (n_dof)."
         )
     warnings.warn(
-        f"{len(wrong)} of {count} places do not show {n_dof} freedoms and are left "
-        f"out: {listed}.",
+        f"{len(wrong)} of {count} places do not show {n_dof} degrees of freedom: "
+        f"{listed}.",
         MapWarning,
         stacklevel=4,
     )

@@ -81,8 +81,8 @@ class NullSpaceMap(EstimatorBase):
     interpolation : {"natural", "laplace", "nearest", "smooth"}
         Weights between the points: natural neighbors by volume (the paper's), natural
         neighbors by area (Laplace), all the weight to the nearest point, or a smooth
-        field (:class:`ikns.nullspace.map.smooth.SmoothField`), for which `outside`
-        means nothing. Signs agree between natural neighbors with all of them.
+        field (:class:`ikns.nullspace.map.smooth.SmoothField`), which ignores `outside`.
+        Signs agree between natural neighbors with all of them.
     min_samples : int, optional
         Points with fewer samples are left out, with a warning. Default: a tenth of an
         equal share, N / (10 n_points); half a second of 5 s at each point.
@@ -196,7 +196,7 @@ class NullSpaceMap(EstimatorBase):
         NotEnoughData
             With fewer samples than points, too few usable points, or points in a plane;
             when more than a third of the points do not show every motion; fewer are
-            left out with a warning.
+            named in a warning, and left out where they have no direction.
         """
         from ikns.nullspace.clustering import BoundingBoxKMeans
 

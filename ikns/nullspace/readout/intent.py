@@ -141,7 +141,7 @@ class IntentMap(EstimatorBase):
         InvalidInput, ValueError
             When a parameter is out of range, or samples are not finite or do not match.
         NotEnoughData
-            When no place has enough samples, or the elbow moves nowhere.
+            When no place has enough samples, or the elbow does not move.
         """
         from ikns.nullspace.clustering import BoundingBoxKMeans
 
@@ -241,7 +241,7 @@ class IntentMap(EstimatorBase):
         return self.natural_.taught(x)
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
-        """One less the share of c's variance that the wrist's place explains.
+        """One minus the share of c's variance that the wrist position explains.
 
         On held-out samples as for :meth:`fit`: 1 where c does not follow the hand.
         """
@@ -297,7 +297,7 @@ class IntentMap(EstimatorBase):
         """Name places whose ends are more than 0.1 of the range from their mean.
 
         Those that are also narrow were half explored; at the others the natural posture
-        is off. `names` (P,) are what the places are called, by default where they are.
+        is off. `names` (P,) are the names of the places, by default their positions.
         """
         width = self.upper_ - self.lower_
         narrow = width < (1 - _HALF_EXPLORED) * (self.ends_[1] - self.ends_[0])

@@ -56,12 +56,12 @@ def read(
     Parameters
     ----------
     path : str or Path
-        The ending decides: C3D; TRC; a CSV export of Vicon Nexus, Vicon Workstation or
-        OptiTrack Motive; a TSV export of Qualisys; or XDF, a recording of LSL streams,
-        which needs the extra ``xdf``.
+        The extension decides: C3D; TRC; a CSV export of Vicon Nexus, Vicon Workstation
+        or OptiTrack Motive; a TSV export of Qualisys; or XDF, a recording of LSL
+        streams, which needs the extra ``xdf``.
     subject_prefix : str, optional
-        Keep only the markers of this subject, ``Ann`` of ``Ann:RSHO``, and take the
-        prefix off.
+        Keep only the markers of this subject, ``Ann`` of ``Ann:RSHO``, and remove the
+        prefix.
     start, end : float or str, optional
         Keep the frames between these moments: seconds, or events of a C3D file by
         name.
@@ -145,7 +145,7 @@ def write(path: str | Path, recording: Recording, *, force: bool = False) -> Non
     Parameters
     ----------
     path : str or Path
-        The ending decides: C3D, TRC, or CSV in the form of Vicon Nexus.
+        The extension decides: C3D, TRC, or CSV in the format of Vicon Nexus.
     recording : Recording
         At least two frames at a constant rate.
     force : bool
@@ -154,7 +154,7 @@ def write(path: str | Path, recording: Recording, *, force: bool = False) -> Non
     Raises
     ------
     FileError
-        When the ending is another one, or the file cannot be written.
+        When the extension is not supported, or the file cannot be written.
     InvalidInput
         When such a file cannot hold the recording.
 

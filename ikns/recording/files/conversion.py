@@ -200,7 +200,7 @@ def _distinct(
                 kept.append(column)
         if len(kept) < 2:
             names[(kept or columns)[0]] = label
-            notes.append(f"{label} stands {len(columns)} times, the same or unseen.")
+            notes.append(f"{label} appears {len(columns)} times, identical or unseen.")
             continue
         number, called = 0, []
         for column in kept:
@@ -211,7 +211,7 @@ def _distinct(
             names[column] = called[-1]
         notes.append(
             f"{len(kept)} markers are named {label}, read as {', '.join(called)}; "
-            "which of them is meant cannot be known."
+            "it is unclear which of them is meant."
         )
     return [names[i] for i in sorted(names)], sorted(names), notes
 

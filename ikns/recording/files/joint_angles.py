@@ -114,7 +114,7 @@ def _number_table(path: Path) -> tuple[list[str], Array]:
             header, *rows = list(csv.reader(file)) or [[]]
         uneven = [i for i, row in enumerate(rows, 2) if len(row) != len(header)]
         if uneven:
-            raise ValueError(f"line {uneven[0]} has not {len(header)} cells")
+            raise ValueError(f"line {uneven[0]} does not have {len(header)} cells")
         table = np.array([[float(cell or "nan") for cell in row] for row in rows])
     except (OSError, ValueError) as error:
         raise FileError(

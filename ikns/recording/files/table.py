@@ -48,7 +48,7 @@ def separated_rows(path: Path, rows: list[Row]) -> tuple[list[Row], list[int]]:
             raise FileError(
                 f"{path}: expected {widths[0]} numbers in line {rows[uneven][0]} as in "
                 f"line {rows[0][0]}, found {widths[uneven]}: with blanks between the "
-                f"columns a marker that was not seen cannot be told; export it again "
+                f"columns an unseen marker cannot be recognized; export it again "
                 f"with tabs."
             )
     else:

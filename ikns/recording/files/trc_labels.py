@@ -58,7 +58,7 @@ def place_labels(
         labels = [by_place.get(marker, "") for marker in range(n)]
     elif len(found) == n_columns or len(found) == said:
         labels = names
-        notes.append("its labels do not stand above their X and are taken in order.")
+        notes.append("its labels are not above their X and are taken in order.")
     elif len(found) == 3 * n_columns:
         labels = _of_coordinates(path, names)
     else:

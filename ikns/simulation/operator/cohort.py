@@ -151,7 +151,7 @@ def draw_participant(
         return Participant(
             number, seed, abilities, run, subject, angles, place, redrawn=attempt
         )
-    raise InvalidInput(f"no one of {_TRIES} persons can do the protocol: {reason}")
+    raise InvalidInput(f"none of {_TRIES} people can do the protocol: {reason}")
 
 
 def tracking_place(
