@@ -1,19 +1,25 @@
-"""What does publishing cost the finger, and what does NatNet take? Two tables.
+"""What does publishing cost the finger; what do NatNet and ROS 2 take? Three tables.
 
 1. A simulated body swings its arm at 100 Hz through the live loop to a simulated
-   finger: without a publisher; with `--publish lsl:NAME`, without and with a listener
-   in another process; and with a publisher that blocks for ever. In turns, a second at
-   a time: from receipt to command (median of the percentiles of each second), and to
-   the end of the iteration, when the sample is handed over (all frames).
-2. The server of the tests, which speaks NatNet 4.1, sends 39 simulated markers from
-   another process on this machine; from sending to receipt.
+   finger: without a publisher; with `--publish lsl:NAME` and `ros2:NAMESPACE`, without
+   and with a listener in another process; with all of them and Rerun's file (where
+   Rerun is installed) together; and with publishers that block for ever or die. In
+   turns, a second at a time: from receipt to command (median of the percentiles of each
+   second), and to the end of the iteration, when the sample is handed over (all
+   frames).
+2. 39 simulated markers from another process on this machine, from sending to receipt:
+   the server of the tests, which speaks NatNet 4.1; and a ROS 2 node of the tests with
+   `mocap4r2_msgs/msg/Markers`, through a zenoh router in a third process.
+3. A finger under ROS 2, its robot simulated: from a fault to the safe state.
 """
 
 import argparse
+import importlib.util
 import json
 import multiprocessing
 import os
 import sys
+import tempfile
 import threading
 import time
 from contextlib import ExitStack
@@ -24,16 +30,30 @@ from typing import Any
 import numpy as np
 
 import ikns
-from ikns.live.publish import Publisher, open_publisher
+from ikns.finger import open_finger
+from ikns.live.publish import Publisher, Publishers, joint_places, open_publisher
 from ikns.live.runtime import run
+from ikns.live.runtime.listener import LoopListener
 from ikns.live.stream import Source, open_source
 from ikns.live.stream.lsl_library import lsl
 from ikns.live.stream.replay import Replay, wait_until
 from ikns.recording.recording import Recording
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+import ros_graph
+
 RATE, MARKERS = 100.0, 39
 CONTEXT = multiprocessing.get_context("spawn")
-KINDS = ("nothing", "LSL, no listener", "LSL, one listener", "blocked for ever")
+NOTHING, TOGETHER, BLOCKED, DYING = "nothing", "all together", "blocked", "dying"
+LSL, LSL_HEARD = "LSL, no listener", "LSL, one listener"
+ROS, ROS_HEARD = "ROS 2, no listener", "ROS 2, one listener"
+KINDS = (NOTHING, LSL, LSL_HEARD, ROS, ROS_HEARD, TOGETHER, BLOCKED, DYING)
+TOPICS = {
+    "/heard/c": "std_msgs/msg/Float64",
+    "/heard/flexion": "std_msgs/msg/Float64",
+    "/heard/joint_states": "sensor_msgs/msg/JointState",
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+}
 
 
 def swinging(frames: int) -> tuple[ikns.Subject, Recording]:
@@ -75,7 +95,7 @@ def listen(name: str, ready: Connection) -> None:
 class Stuck:
     """A sink whose first call never returns."""
 
-    def sample(self, at: float, values: tuple[float, ...]) -> None:
+    def sample(self, at: float, sample: object) -> None:
         """Wait for ever."""
         threading.Event().wait()
 
@@ -87,34 +107,75 @@ class Stuck:
         """Do nothing."""
 
 
-def published(rounds: int) -> dict[str, dict[str, float]]:
+class Dying(Stuck):
+    """A sink whose first call fails."""
+
+    def sample(self, at: float, sample: object) -> None:
+        """Fail."""
+        raise OSError("the cable is out")
+
+    def event(self, at: float, words: str) -> None:
+        """Fail."""
+        raise OSError("the cable is out")
+
+
+def opened(
+    stack: ExitStack, subject: ikns.Subject, own: str, port: int
+) -> dict[str, list[Publisher]]:
+    """Open the publishers of each kind."""
+    joints = joint_places(subject.skeleton, subject.chain)
+
+    def open_one(address: str) -> Publisher:
+        return stack.enter_context(
+            open_publisher(address, rate=RATE, joints=joints, simulated=True)
+        )
+
+    router = f"?router=127.0.0.1:{port}&domain=0"
+    kinds = {
+        NOTHING: [],
+        LSL: [open_one(f"lsl:{own}-alone")],
+        LSL_HEARD: [open_one(f"lsl:{own}-heard")],
+        ROS: [open_one(f"ros2:alone{router}")],
+        ROS_HEARD: [open_one(f"ros2:heard{router}")],
+        BLOCKED: [stack.enter_context(Publisher("stuck", Stuck()))],
+        DYING: [stack.enter_context(Publisher("dying", Dying()))],
+    }
+    kinds[TOGETHER] = kinds[LSL_HEARD] + kinds[ROS_HEARD]
+    if importlib.util.find_spec("rerun"):
+        from ikns.view.timeline import RerunLog, RerunSink
+
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        sink = RerunSink(RerunLog(folder / "a.rrd", title="a"), subject.skeleton)
+        kinds[TOGETHER].append(stack.enter_context(Publisher("rerun", sink)))
+    return kinds
+
+
+def published(seconds: float) -> dict[str, dict[str, float]]:
     """Percentiles of the loop in ms, by kind of publisher."""
-    subject, recording = swinging(round(RATE))
+    subject, recording = swinging(round(RATE * min(seconds, 1.0)))
     own = f"ikns-benchmark-{os.getpid()}"
     times: dict[str, tuple[list[list[float]], list[float]]] = {
         kind: ([], []) for kind in KINDS
     }
-    publishers: dict[str, Publisher | None] = {"nothing": None}
     ours, theirs = CONTEXT.Pipe()
-    with ExitStack() as stack:
-        for kind in KINDS[1:3]:
-            name = f"{own}-{KINDS.index(kind)}"
-            publishers[kind] = stack.enter_context(
-                open_publisher(f"lsl:{name}", rate=RATE, simulated=True)
-            )
-        publishers[KINDS[3]] = stack.enter_context(Publisher("stuck", Stuck()))
-        reader = CONTEXT.Process(target=listen, args=(f"{own}-2", theirs))
-        reader.start()
-        ours.recv()
-        for _ in range(rounds):
-            for kind in KINDS:
-                one(subject, recording, publishers[kind], times[kind])
-        ours.send(None)
-        pulled = ours.recv()
-        reader.join()
+    with ros_graph.Graph(TOPICS) as graph:
+        with ExitStack() as stack:
+            kinds = opened(stack, subject, own, graph.port)
+            reader = CONTEXT.Process(target=listen, args=(f"{own}-heard", theirs))
+            reader.start()
+            ours.recv()
+            for _ in range(max(1, round(seconds))):
+                for kind in KINDS:
+                    one(subject, recording, Publishers(kinds[kind]), times[kind])
+            while any(each.sent + each.dropped < 1 for each in kinds[TOGETHER]):
+                time.sleep(0.01)
+            ours.send(None)
+            pulled = ours.recv()
+            reader.join()
+        heard = graph.end()
     result = {}
     for kind, (command, end) in times.items():
-        each = publishers[kind]
+        counts = Publishers(kinds[kind]).counts
         p50, p99 = 1e3 * np.median(command, axis=0)
         last50, last99 = 1e3 * np.percentile(end, [50, 99])
         result[kind] = {
@@ -122,17 +183,19 @@ def published(rounds: int) -> dict[str, dict[str, float]]:
             "p99": p99,
             "end p50": last50,
             "p99 ": last99,
-            "sent": each.sent if each else 0,
-            "dropped": each.dropped if each else 0,
+            "sent": counts["sent"],
+            "dropped": counts["dropped"],
         }
-    result[KINDS[2]]["pulled"] = pulled
+    result[LSL_HEARD]["pulled"] = pulled
+    result[ROS_HEARD]["heard"] = len(heard["/heard/c"])
+    result[TOGETHER]["added at p99"] = result[TOGETHER]["p99"] - result[NOTHING]["p99"]
     return result
 
 
 def one(
     subject: ikns.Subject,
     recording: Recording,
-    publisher: Publisher | None,
+    publisher: LoopListener,
     into: tuple[list[list[float]], list[float]],
 ) -> None:
     """Run the loop for a second."""
@@ -151,7 +214,6 @@ def one(
 
 def serve(frames: int, result: Connection) -> None:
     """Send simulated markers by NatNet; their time is that of sending."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
     from natnet_server import NatNetServer
 
     points = np.random.default_rng(0).normal(size=(MARKERS, 3))
@@ -188,21 +250,116 @@ def over_natnet(seconds: float) -> dict[str, float]:
     }  # fmt: skip
 
 
+def serve_ros(port: int, frames: int, result: Connection) -> None:
+    """Publish simulated markers to ROS 2; their stamp is the time of sending."""
+    peer = ros_graph.Peer(port)
+    put = peer.publisher("/markers", "mocap4r2_msgs/msg/Markers")
+    points = np.random.default_rng(0).normal(size=(MARKERS, 3)).tolist()
+    markers = [
+        {
+            "id_type": 0,
+            "marker_index": k,
+            "marker_name": f"M{k}",
+            "x": x,
+            "y": y,
+            "z": z,
+        }
+        for k, (x, y, z) in enumerate(points)
+    ]
+    start = time.monotonic() + 0.5
+    for k in range(frames):
+        wait_until(start + k / RATE)
+        now = time.monotonic_ns()
+        put(
+            {
+                "stamp.sec": now // 10**9,
+                "stamp.nanosec": now % 10**9,
+                "frame_id": "map",
+                "frame_number": k,
+                "markers": markers,
+            }
+        )
+    result.recv()
+    peer.close()
+
+
+def over_ros(seconds: float) -> dict[str, float]:
+    """Latency of ROS 2 frames in ms, and what was lost."""
+    frames = round(seconds * RATE) + 40
+    ours, theirs = CONTEXT.Pipe()
+    late, number = [], -1
+    with ros_graph.Graph() as graph:
+        sender = CONTEXT.Process(target=serve_ros, args=(graph.port, frames, theirs))
+        sender.start()
+        router = f"router=127.0.0.1:{graph.port}&domain=0&timeout=60&rate={RATE}"
+        with open_source(f"ros2:/markers?{router}") as source:
+            first = None
+            while number < frames - 1:
+                frame = next(source)
+                number = frame.number
+                # Stamps count from the whole second of the first one.
+                late.append((frame.receive_time - frame.device_time) % 1)
+                first = number if first is None else first
+            lost = number - first + 1 - len(late)
+            ours.send(None)
+        sender.join()
+    p50, p99, most = 1e3 * np.percentile(late, [50, 99, 100])
+    return {
+        "frames": len(late), "p50": p50, "p99": p99, "max": most, "dropped": lost,
+    }  # fmt: skip
+
+
+def faults_of_a_ros_finger(repeats: int) -> dict[str, dict[str, float]]:
+    """Time from a fault to the safe state, ms."""
+    result = {}
+    for fault in ("router killed", "router stopped", "feedback silent"):
+        took = []
+        for _ in range(repeats):
+            with ros_graph.Graph() as graph:
+                robot = ros_graph.Robot(graph.port, position=0.5)
+                with open_finger(
+                    "ros2:finger/commands?type=joint_trajectory&joint=finger&open=0"
+                    f"&closed=1&router=127.0.0.1:{graph.port}&domain=0&safe=hold"
+                    "&feedback=joint_states"
+                ) as finger:
+                    began = time.monotonic()
+                    while time.monotonic() - began < 0.2:
+                        finger.command(0.5)
+                        time.sleep(0.002)
+                    began = time.monotonic()
+                    if fault == "router killed":
+                        graph.process.kill()
+                    elif fault == "router stopped":
+                        graph.pause()
+                    else:
+                        robot.quiet.set()
+                    while finger.state().mode == "active":
+                        finger.command(0.5)
+                        time.sleep(0.001)
+                    took.append(1e3 * (time.monotonic() - began))
+                    graph.go_on()
+                robot.close()
+        result[fault] = {"n": repeats, "p50": np.median(took), "max": max(took)}
+    return result
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a second each")
+    parser.add_argument("--quick", action="store_true", help="0.3 seconds each")
     parser.add_argument("--seconds", type=float, help="of each row")
     parser.add_argument("--json", action="store_true", help="one JSON object instead")
     options = parser.parse_args()
-    seconds = options.seconds or (1.0 if options.quick else 60.0)
+    seconds = options.seconds or (0.3 if options.quick else 60.0)
     ikns.warm_up()
     told: dict[str, Any] = {
         "cores": os.cpu_count(),
         "load": round(os.getloadavg()[0], 1),
         "seconds": seconds,
-        "publish": published(max(1, round(seconds))),
+        "publish": published(seconds),
         "natnet": over_natnet(seconds),
+        "ros": over_ros(seconds),
+        "ros finger": faults_of_a_ros_finger(1 if options.quick else 10),
     }
     if options.json:
         print(json.dumps(told, indent=2))
@@ -211,8 +368,11 @@ def main() -> None:
     for kind, row in told["publish"].items():
         cells = "  ".join(f"{name} {value:.3f}" for name, value in row.items())
         print(f"{kind:<18} {cells}")
-    cells = "  ".join(f"{name} {value:.3f}" for name, value in told["natnet"].items())
-    print(f"{'NatNet, ms':<18} {cells}")
+    rest = {"NatNet, ms": told["natnet"], "ROS 2, ms": told["ros"]}
+    rest |= {f"finger, {fault}, ms": row for fault, row in told["ros finger"].items()}
+    for name, row in rest.items():
+        cells = "  ".join(f"{key} {value:.3f}" for key, value in row.items())
+        print(f"{name:<18} {cells}")
 
 
 if __name__ == "__main__":

@@ -211,7 +211,7 @@ def test_addresses_make_fingers():
 @pytest.mark.parametrize(
     ("address", "sentence"),
     [
-        ("gpio:7", "expected sim:, dynamixel:PORT or lerobot:TYPE"),
+        ("gpio:7", "expected sim:, dynamixel:PORT, ros2:TOPIC or lerobot:TYPE"),
         ("sim", "unknown finger 'sim'"),
         ("sim:width=fat", "width=fat, expected a number"),
         ("sim:width", "should end in options like name=value"),

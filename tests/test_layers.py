@@ -11,7 +11,7 @@ import pytest
 # floor do not know each other.
 FLOORS = (
     "arrays errors endings",
-    "_kernels output",
+    "_kernels output ros2",
     "numerics",
     "recording finger statistics",
     "body",
@@ -53,6 +53,8 @@ ONLY_IN = {
     "serial": {"finger"},
     "statsmodels": {"statistics"},
     "vicon_dssdk": {"live"},
+    "zenoh": {"ros2"},
+    "rerun": {"view"},
     "typer": {"cli"},
     "rich": {"cli"},
 }

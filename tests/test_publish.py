@@ -165,10 +165,17 @@ def test_what_a_recorder_keeps_is_what_the_session_has(subject, name, tmp_path):
 
 
 DECISION = SimpleNamespace(
-    solved=SimpleNamespace(c=np.array([0.5]), residual=0.001),
+    solved=SimpleNamespace(
+        c=np.array([0.5]), residual=0.001, q=np.zeros(31), uncertainty=np.zeros(1)
+    ),
     flexions=(0.5,),
     state="active",
+    rejection="",
+    valid=True,
 )
+
+
+MARKERS = np.zeros((1, 3))
 
 
 class Stuck:
@@ -199,7 +206,7 @@ def test_a_sink_that_blocks_holds_nobody_up(monkeypatch):
     publisher = Publisher("x", sink, on_fault=told.append)
     for k in range(5000):
         began = time.perf_counter()
-        publisher.decision(k / 100, DECISION)
+        publisher.decision(k / 100, DECISION, MARKERS)
         slowest = max(slowest, time.perf_counter() - began)
     publisher.event(50.0, "safe", "no pose")  # events still fit
     began = time.perf_counter()
@@ -217,7 +224,7 @@ def test_after_a_jam_it_goes_on_and_says_how_many_are_missing():
     sink = Stuck()
     with Publisher("x", sink) as publisher:
         for k in range(3000):
-            publisher.decision(k / 100, DECISION)
+            publisher.decision(k / 100, DECISION, MARKERS)
         sink.go.set()
     assert sink.closed
     assert sink.got == publisher.sent

@@ -42,7 +42,10 @@ Frame#\tTime\tA\t\t
 @pytest.mark.parametrize(
     ("address", "says"),
     [
-        ("walk.c3d", "replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or natnet:HOST"),
+        (
+            "walk.c3d",
+            "replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, natnet:HOST or",
+        ),
         ("optitrack:host", "unknown source 'optitrack:host', expected replay:FILE"),
         ("", "unknown source ''"),
         ("replay:", "expected replay:FILE"),

@@ -58,18 +58,34 @@ SOURCE = [
     "",
     "x",
     "natnet:",
+    "ros2:",
+    "ros2:/markers?rate=0",
     "replay:",
     "replay:{nowhere}",
     "replay:{binary}",
     "replay:{folder}",
 ]
-PUBLISH = ["", "x", "lsl:", "lsl: ", "udp:c", "lsl:c?scope=moon", "lsl:c?x=1"]
+PUBLISH = [
+    "",
+    "x",
+    "lsl:",
+    "lsl: ",
+    "udp:c",
+    "lsl:c?scope=moon",
+    "lsl:c?x=1",
+    "ros2:",
+    "ros2:9",
+    "ros2:a?router=x",
+]
 FINGER = [
     "",
     "x",
     "sim:?safe=x",
     "dynamixel:",
     "dynamixel:{nowhere}?id=-1",
+    "ros2:",
+    "ros2:/f",
+    "ros2:/f?type=position&open=0&closed=1",
     "lerobot:x",
 ]
 TEXT = ["", "a\udcff"]
@@ -143,6 +159,7 @@ WRONG = {
     "png": PICTURE,
     "animation": PICTURE,
     "publish": PUBLISH,
+    "rrd": [*WRITE_FILE, "x.exe", "x"],
     "point": [*COUNT, "99"],
     "point_seconds": POSITIVE,
     "points": COUNT,
@@ -206,7 +223,7 @@ WRONG = {
 FLAGS = {
     *("as_json", "auto", "browser", "clavicle", "dry_run", "everywhere", "force"),
     *("guess", "live", "loop", "open_page", "quick", "realtime", "resume", "simulated"),
-    *("rewear", "short", "smooth", "view"),
+    *("rerun", "rewear", "short", "smooth", "view"),
 }
 #: Options that count only together with others.
 WITH = {

@@ -67,8 +67,8 @@ def calibrate(
     source: Annotated[
         str | None,
         typer.Option(
-            help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or "
-            "natnet:HOST (OptiTrack)."
+            help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, "
+            "natnet:HOST (OptiTrack), or ros2:TOPIC."
         ),
     ] = None,
     recordings: Annotated[

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import ikns
+from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.live.publish import Publisher
+    from ikns.live.publish import Publisher, Publishers
     from ikns.live.session import RunWriter
 
 
@@ -92,22 +93,79 @@ def live_session(
 
 @contextmanager
 def publishing(
-    address: str | None, subject: ikns.Subject | None, *, rate: float, simulated: bool
-) -> Iterator[Publisher | None]:
-    """Publish at an address, if there is one; without a subject, events only."""
-    if address is None:
+    addresses: Sequence[str],
+    subject: ikns.Subject | None,
+    *,
+    rate: float,
+    simulated: bool,
+    timeline: Timeline | None = None,
+) -> Iterator[Publishers | None]:
+    """Publish at addresses and to Rerun; None where nothing is asked for.
+
+    Without a subject, events only.
+    """
+    if not addresses and timeline is None:
         yield None
         return
-    from ikns.live.publish import open_publisher
+    from ikns.live.publish import Publishers, joint_places, open_publisher
 
-    with open_publisher(
-        address,
-        rate=rate,
-        n_dof=0 if subject is None else subject.null_space_map.n_dof,
-        simulated=simulated,
-        on_fault=say,
-    ) as publisher:
-        yield publisher
+    joints = {} if subject is None else joint_places(subject.skeleton, subject.chain)
+    with ExitStack() as stack:
+        opened = [
+            stack.enter_context(
+                open_publisher(
+                    address,
+                    rate=rate,
+                    n_dof=0 if subject is None else subject.null_space_map.n_dof,
+                    joints=joints,
+                    simulated=simulated,
+                    on_fault=say,
+                )
+            )
+            for address in addresses
+        ]
+        if timeline is not None:
+            title = "live, simulated" if simulated else "live"
+            opened.append(stack.enter_context(_timeline(timeline, subject, title)))
+        yield Publishers(opened)
+
+
+class Timeline(NamedTuple):
+    """Where a live loop is logged for Rerun: a file, or a viewer where it is None."""
+
+    file: Path | None
+
+
+def timeline_of(
+    *,
+    rerun: bool,
+    rrd: Path | None,
+    force: bool | None = None,
+    inputs: Iterable[Path | None] = (),
+) -> Timeline | None:
+    """Check the options ``--rerun`` and ``--rrd``, before anything is opened.
+
+    `force` is None where the command has no such option.
+    """
+    if not rerun and rrd is None:
+        return None
+    from ikns.view.timeline.rerun import check_rrd, load_rerun
+
+    if rerun and rrd is not None:
+        raise InvalidInput("expected --rerun or --rrd, found both.")
+    if rrd is not None:
+        check_rrd(rrd, force=force, inputs=inputs)
+    load_rerun()
+    return Timeline(rrd)
+
+
+def _timeline(where: Timeline, subject: ikns.Subject | None, title: str) -> Publisher:
+    from ikns.live.publish import Publisher
+    from ikns.view.timeline import RerunLog, RerunSink
+
+    log = RerunLog(where.file, title=title)
+    sink = RerunSink(log, None if subject is None else subject.skeleton)
+    return Publisher("rerun", sink, on_fault=say)
 
 
 def say_undriven(n_dof: int, dofs: Sequence[int]) -> None:

@@ -64,16 +64,30 @@ Fingers = Annotated[
     typer.Option(
         "--finger",
         metavar="ADDRESS",
-        help="sim:, dynamixel:/dev/ttyUSB0 or lerobot:TYPE; again with ?dof=2 for the "
-        "second freedom of the map.",
+        help="sim:, dynamixel:/dev/ttyUSB0, ros2:TOPIC or lerobot:TYPE; again with "
+        "dof=2 for the second freedom of the map.",
     ),
 ]
 Publish = Annotated[
-    str | None,
+    list[str] | None,
     typer.Option(
         help="lsl:NAME: c, flexion, state and residual as an LSL stream, and events as "
-        "another; on this machine only without lsl:NAME?scope=network.",
+        "another; on this machine only without lsl:NAME?scope=network. "
+        "ros2:NAMESPACE: topics of ROS 2, by the router of this machine without "
+        "ros2:NAMESPACE?router=HOST:PORT. Again for more.",
     ),
+]
+Rerun = Annotated[
+    bool,
+    typer.Option(
+        "--rerun",
+        help="Show markers, arms, c, residuals and events in Rerun's viewer, on this "
+        "machine.",
+    ),
+]
+Rrd = Annotated[
+    Path | None,
+    typer.Option(help="Write the same to a file of Rerun, FILE.rrd."),
 ]
 OptionalMarkerSet = Annotated[
     str | None,

@@ -7,7 +7,16 @@ from typing import Annotated, Any
 
 import typer
 
-from ikns.cli.options import AsJson, Fingers, LabelFile, Publish, Rename
+from ikns.cli.live_session import timeline_of
+from ikns.cli.options import (
+    AsJson,
+    Fingers,
+    LabelFile,
+    Publish,
+    Rename,
+    Rerun,
+    Rrd,
+)
 from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
@@ -108,6 +117,8 @@ def pick(
         ),
     ] = None,
     publish: Publish = None,
+    rerun: Rerun = False,
+    rrd: Rrd = None,
     view: View = True,
     method: LiveMethod = "paper",
     max_uncertainty: MaxUncertainty = 0.025,
@@ -168,6 +179,7 @@ def pick(
             method=method,
             names=label_names(rename, labels),
             publish=publish,
+            timeline=timeline_of(rerun=rerun, rrd=rrd),
             max_uncertainty=max_uncertainty,
         ),
         PageOptions(host, port, browser, _RATE),

@@ -23,7 +23,7 @@ from ikns.output.inputs import refuse_input, refuse_input_folder
 Read = Callable[..., Any]
 
 #: Options of these commands that name something to write.
-_OUTPUTS = ("out", "png", "animation", "figure")
+_OUTPUTS = ("out", "png", "animation", "figure", "rrd")
 _OPTIONS = {
     "subject_prefix": (SubjectPrefix, None),
     "rename": (Rename, None),

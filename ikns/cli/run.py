@@ -21,6 +21,7 @@ from ikns.cli.live_session import (
     say,
     say_undriven,
     software,
+    timeline_of,
     written,
 )
 from ikns.cli.options import (
@@ -29,6 +30,8 @@ from ikns.cli.options import (
     LabelFile,
     Publish,
     Rename,
+    Rerun,
+    Rrd,
     SubjectFolder,
 )
 from ikns.cli.output import show, table
@@ -38,7 +41,7 @@ from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.live.publish.publisher import Publisher
+    from ikns.live.publish import Publishers
     from ikns.live.runtime import AxisStatus, LoopStatus, Report
 
 #: Interval of the status line on the terminal, s.
@@ -50,8 +53,8 @@ def run(
     source: Annotated[
         str,
         typer.Option(
-            help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or "
-            "natnet:HOST (OptiTrack)."
+            help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, "
+            "natnet:HOST (OptiTrack), or ros2:TOPIC."
         ),
     ],
     rename: Rename = None,
@@ -107,6 +110,8 @@ def run(
         ),
     ] = "paper",
     publish: Publish = None,
+    rerun: Rerun = False,
+    rrd: Rrd = None,
     view: Annotated[
         bool, typer.Option("--view", help="Show the body live in a browser.")
     ] = False,
@@ -138,8 +143,9 @@ def run(
 
     if realtime:
         check_realtime()
-    if publish is not None:
-        check_publish(publish)
+    for address in publish or []:
+        check_publish(address)
+    timeline = timeline_of(rerun=rerun, rrd=rrd)
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
     names = label_names(rename, labels)
@@ -157,7 +163,13 @@ def run(
         stream = stack.enter_context(opened)
         simulated = is_simulated(calibrated, subject, played_files(source))
         pace = stream.rate * stream.speed
-        shared = publishing(publish, calibrated, rate=pace, simulated=simulated)
+        shared = publishing(
+            publish or [],
+            calibrated,
+            rate=pace,
+            simulated=simulated,
+            timeline=timeline,
+        )
         publisher = stack.enter_context(shared)
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
@@ -241,7 +253,7 @@ def _show_report(
     title: str,
     session: Path | None,
     losses: list[str],
-    publisher: Publisher | None,
+    publisher: Publishers | None,
     *,
     as_json: bool,
 ) -> None:

@@ -8,7 +8,16 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from ikns.cli.options import AsJson, Fingers, LabelFile, Publish, Rename
+from ikns.cli.live_session import timeline_of
+from ikns.cli.options import (
+    AsJson,
+    Fingers,
+    LabelFile,
+    Publish,
+    Rename,
+    Rerun,
+    Rrd,
+)
 from ikns.cli.reading import label_names
 from ikns.cli.visit import conduct
 from ikns.cli.visit_drivers import ArmOptions, PageOptions
@@ -119,6 +128,8 @@ def track(
         typer.Option(help="Gamepad input: left stick, up, or right trigger."),
     ] = "left",
     publish: Publish = None,
+    rerun: Rerun = False,
+    rrd: Rrd = None,
     view: View = True,
     method: LiveMethod = "paper",
     max_uncertainty: MaxUncertainty = 0.025,
@@ -196,6 +207,7 @@ def track(
             method=method,
             names=label_names(rename, labels),
             publish=publish,
+            timeline=timeline_of(rerun=rerun, rrd=rrd),
             max_uncertainty=max_uncertainty,
         ),
         PageOptions(host, port, browser, rate, stick),

@@ -11,9 +11,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import ikns
-from ikns.cli.options import MARKER_FILES, AnyMethod, AsJson, Force, From, To
+from ikns.cli.live_session import timeline_of
+from ikns.cli.options import (
+    MARKER_FILES,
+    AnyMethod,
+    AsJson,
+    Force,
+    From,
+    Rerun,
+    Rrd,
+    To,
+)
 from ikns.cli.output import progress, show, table
 from ikns.cli.reading import Read, check_inputs, reads_markers
+from ikns.cli.view_in_rerun import tell_faults, view_in_rerun
 from ikns.errors import InvalidInput, naming
 from ikns.output.file import refuse_overwriting, write_bytes, write_text
 
@@ -30,7 +41,10 @@ def view(
         Path | None,
         typer.Argument(help=f"Recording to play: {MARKER_FILES}."),
     ] = None,
-    out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("view.html"),
+    out: Annotated[
+        Path | None,
+        typer.Option(help="HTML file to write.", show_default="view.html"),
+    ] = None,
     png: Annotated[
         Path | None, typer.Option(help="Also write a picture, .png.")
     ] = None,
@@ -49,6 +63,8 @@ def view(
     open_page: Annotated[
         bool, typer.Option("--open", help="Show the page in the browser.")
     ] = False,
+    rerun: Rerun = False,
+    rrd: Rrd = None,
     from_: From = None,
     to: To = None,
     force: Force = False,
@@ -57,9 +73,30 @@ def view(
     """Show PCA points, volume and null space around the body, in one HTML file.
 
     With a recording the page plays it, together with the map and the c that --method
-    reads; also one that must not be used, and says what is wrong with it.
+    reads; also one that must not be used, and says what is wrong with it. --rerun and
+    --rrd show it on a timeline instead, with every marker, c and the residuals.
     """
     inputs = [subject, recording]
+    if rerun or rrd is not None:
+        others = (out, png, animation, point) != (None,) * 4 or open_page
+        if recording is None or others:
+            raise InvalidInput(
+                "--rerun and --rrd show a recording, and no page or picture with it; "
+                "leave out --out, --png, --animation, --open and --point."
+            )
+        where = timeline_of(rerun=rerun, rrd=rrd, force=force, inputs=inputs)
+        assert where is not None
+        view_in_rerun(
+            partial(read, recording, start=from_, end=to),
+            subject,
+            recording,
+            where,
+            method=method,
+            force=force,
+            as_json=as_json,
+        )
+        return
+    out = Path("view.html") if out is None else out
     refuse_overwriting(out, force=force, inputs=inputs)
     pictures = [path for path in (png, animation) if path is not None]
     for path in pictures:
@@ -117,9 +154,7 @@ def view(
         else _animation(scene, person, animation, held=recording is None)
     )
     write_text(out, page, force=force)
-    remarks = [] if frames is None else _faults(person, frames)
-    for fault in remarks:
-        sys.stderr.write(f"ikns: note: {fault}\n")
+    remarks = [] if frames is None else tell_faults(person, frames)
     if png is not None and picture is not None:
         write_bytes(png, picture.png, force=force)
         if picture.note:
@@ -170,16 +205,6 @@ def _animation(scene: Scene, person: ikns.Subject, path: Path, *, held: bool) ->
         else "The finger bends with c.",
         format=FORMATS[path.suffix.lower()],
     )
-
-
-def _faults(person: ikns.Subject, frames: ikns.Recording) -> list[str]:
-    """Say what is wrong with a recording, which is shown all the same."""
-    from ikns.calibration.judged_motion import known_findings
-
-    found = known_findings(
-        person.skeleton, frames, chain=person.chain, measured=person.measured
-    )
-    return [fault.sentence for fault in found if fault.severity != "note"]
 
 
 def _scene(

@@ -95,7 +95,13 @@ def conduct(
             with open_arm_source(arm, subject) as source:
                 ikns.warm_up()
                 rate = source.rate * source.speed
-        shared = publishing(arm.publish, subject, rate=rate, simulated=simulated)
+        shared = publishing(
+            arm.publish or [],
+            subject,
+            rate=rate,
+            simulated=simulated,
+            timeline=arm.timeline,
+        )
         publisher = stack.enter_context(shared)
         common = _about(identity, arm, pages, conditions, simulated=simulated)
         common |= {
@@ -214,10 +220,11 @@ def _checked(
     opener = fingers_opener(arm, n_dof)
     if n_dof is not None and opener is not None:
         say_undriven(n_dof, opener().dofs)
-    if arm.publish is not None:
+    if arm.publish:
         from ikns.live.publish import check_publish
 
-        check_publish(arm.publish)
+        for address in arm.publish:
+            check_publish(address)
     check_port(pages.host, pages.port)
     _check_session(arm.session)
     simulated = virtual or (subject is not None and arm_is_simulated(subject, arm))

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import ikns
-from ikns.cli.live_session import live_session, software, written
+from ikns.cli.live_session import Timeline, live_session, software, written
 from ikns.errors import InvalidInput
 
 if TYPE_CHECKING:
     from ikns.experiments.conduct import Driver
     from ikns.finger import Finger, FingerGroup
-    from ikns.live.publish import Publisher
+    from ikns.live.publish import Publishers
     from ikns.live.runtime import LoopStatus
     from ikns.live.session import RunWriter
     from ikns.live.stream import Source
@@ -52,8 +52,10 @@ class ArmOptions:
         What reads c off the posture.
     names : dict
         Other labels for markers of the source, new by old.
-    publish : str or None
+    publish : list of str or None
         Where signals and events are published.
+    timeline : Timeline or None
+        Where they are logged for Rerun.
     max_uncertainty : float
         Largest standard deviation of c with which the finger moves.
     """
@@ -70,7 +72,8 @@ class ArmOptions:
     method: Literal["paper", "intent"]
     names: dict[str, str]
     max_uncertainty: float
-    publish: str | None = None
+    publish: list[str] | None = None
+    timeline: Timeline | None = None
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,7 @@ def arm_driver(
     participant: str,
     shown: Sequence[Callable[[LoopStatus], None]],
     losses: list[str],
-    publisher: Publisher | None = None,
+    publisher: Publishers | None = None,
 ) -> AbstractContextManager[Driver]:
     """Run the live loop as driver, with a session of its own.
 

@@ -41,8 +41,8 @@ ForIkns = Annotated[
 SourceAddress = Annotated[
     str | None,
     typer.Option(
-        help="For ikns: replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or "
-        "natnet:HOST (OptiTrack)."
+        help="For ikns: replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, "
+        "natnet:HOST (OptiTrack), or ros2:TOPIC."
     ),
 ]
 SessionFolder = Annotated[

@@ -14,6 +14,7 @@ from ikns.finger.lerobot import LeRobotFinger
 from ikns.finger.limiter import Limiter, Limits
 from ikns.finger.opening import open_finger, open_fingers
 from ikns.finger.relay import RelayFinger
+from ikns.finger.ros import RosFinger
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import MODES, SAFE_STATES, Finger, FingerState
 
@@ -30,6 +31,7 @@ __all__ = [
     "Limiter",
     "Limits",
     "RelayFinger",
+    "RosFinger",
     "Safety",
     "SimulatedFinger",
     "check_finger",

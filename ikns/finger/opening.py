@@ -8,14 +8,17 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import parse_qsl
 
-from ikns.errors import InvalidInput
+from ikns.errors import InvalidInput, naming
 from ikns.finger.dynamixel import DynamixelFinger
 from ikns.finger.group import FingerGroup
 from ikns.finger.guard import Safety
 from ikns.finger.lerobot import LeRobotFinger
 from ikns.finger.lerobot_robot import make_robot
+from ikns.finger.ros import RosFinger
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import Finger
+from ikns.ros2.address import OPTIONS as ROS_OPTIONS
+from ikns.ros2.address import ros_address
 
 _SIMULATED: dict[str, Callable[[str], Any]] = {"width": float, "effort": float}
 _DYNAMIXEL: dict[str, Callable[[str], Any]] = {
@@ -27,6 +30,17 @@ _DYNAMIXEL: dict[str, Callable[[str], Any]] = {
     "effort": float,
     "watchdog": float,
 }
+_ROS: dict[str, Callable[[str], Any]] = {
+    "type": str,
+    "open": float,
+    "closed": float,
+    "joint": str,
+    "feedback": str,
+    "rate": float,
+    "router": str,
+    "domain": str,
+}
+_KNOWN = "sim:, dynamixel:PORT, ros2:TOPIC or lerobot:TYPE"
 #: What else an address has is the robot's own configuration.
 _LEROBOT: dict[str, Callable[[str], Any]] = {
     "joint": str,
@@ -43,11 +57,15 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
     address : str
         ``sim:`` or ``sim:width=60`` (width of an object, mm; also ``effort``), or
         ``dynamixel:PORT?id=1&baud=57600&model=xl430`` (also ``open`` and ``closed``,
-        ticks; ``effort``; ``watchdog``, s), or a joint of a robot of lerobot,
+        ticks; ``effort``; ``watchdog``, s), or
+        ``ros2:TOPIC?type=joint_trajectory&joint=NAME&open=0&closed=1.2`` for a joint of
+        a robot under ROS 2 (``type=position`` for a plain number; also ``feedback``, a
+        topic of joint states; ``rate``, Hz; ``router=HOST:PORT``; ``domain``), or a
+        joint of a robot of lerobot,
         ``lerobot:TYPE?joint=gripper.pos&open=100&closed=0`` with the robot's own
-        options such as ``port`` and ``id``. All take ``safe=limp``, ``safe=hold`` or
-        ``safe=open``, which takes precedence over `safety`, and ``dof=1``, which only
-        :func:`open_fingers` uses.
+        options such as ``port`` and ``id``. All take ``safe=limp``, but for ROS 2,
+        ``safe=hold`` or ``safe=open``, which takes precedence over `safety`, and
+        ``dof=1``, which only :func:`open_fingers` heeds.
     safety : Safety, optional
 
     Returns
@@ -65,10 +83,10 @@ def open_finger(address: str, *, safety: Safety | None = None) -> Finger:
     --------
     >>> open_finger("sim:width=60").object_width
     0.06
-    >>> open_finger("gpio:7")
+    >>> open_finger("gpio:7")  # doctest: +NORMALIZE_WHITESPACE
     Traceback (most recent call last):
-    ikns.errors.InvalidInput: unknown finger 'gpio:7', expected sim:, dynamixel:PORT \
-or lerobot:TYPE.
+    ikns.errors.InvalidInput: unknown finger 'gpio:7', expected sim:, dynamixel:PORT,
+    ros2:TOPIC or lerobot:TYPE.
     """
     return _opened(address, Safety() if safety is None else safety)[0]
 
@@ -183,12 +201,39 @@ def _opened(address: str, safety: Safety) -> tuple[Finger, int]:
             if end in values:
                 values[f"{end}_ticks"] = values.pop(end)
         return DynamixelFinger(port, safety=safety, **values), dof
+    if scheme == "ros2" and colon:
+        return _ros_finger(address, rest, safety)
     if scheme == "lerobot" and colon:
         kind, _, query = rest.partition("?")
         return _lerobot_finger(address, kind, query, safety)
-    raise InvalidInput(
-        f"unknown finger '{address}', expected sim:, dynamixel:PORT or lerobot:TYPE."
-    )
+    raise InvalidInput(f"unknown finger '{address}', expected {_KNOWN}.")
+
+
+def _ros_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
+    topic, _, query = rest.partition("?")
+    values = _options(address, query, _ROS)
+    missing = [name for name in ("type", "open", "closed") if name not in values]
+    if missing:
+        raise InvalidInput(
+            f"'{address}' lacks {' and '.join(missing)}, expected something like "
+            "ros2:/finger/joint_trajectory?type=joint_trajectory&joint=finger&open=0"
+            "&closed=1.2."
+        )
+    dof = _dof(address, values.pop("dof", 1))
+    with naming(f"'{address}'"):
+        safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
+        where: dict[str, str] = {
+            key: values.pop(key) for key in ROS_OPTIONS if key in values
+        }
+        finger = RosFinger(
+            ros_address(topic, where),
+            command=values.pop("type"),
+            open_position=values.pop("open"),
+            closed_position=values.pop("closed"),
+            safety=safety,
+            **values,
+        )
+    return finger, dof
 
 
 def _lerobot_finger(

@@ -1,9 +1,20 @@
 """Publish what the live loop decides, without ever delaying it.
 
-`publisher` has the queue and the thread, `lsl` the streams, `address` opens them.
+`publisher` has the queue and the thread, `lsl` the streams, `ros` the topics of ROS 2,
+`address` opens them, and `several` makes several of them one.
 """
 
 from ikns.live.publish.address import check_publish, open_publisher
-from ikns.live.publish.publisher import Publisher, Sink
+from ikns.live.publish.publisher import Publisher, Sample, Sink
+from ikns.live.publish.ros import joint_places
+from ikns.live.publish.several import Publishers
 
-__all__ = ["Publisher", "Sink", "check_publish", "open_publisher"]
+__all__ = [
+    "Publisher",
+    "Publishers",
+    "Sample",
+    "Sink",
+    "check_publish",
+    "joint_places",
+    "open_publisher",
+]

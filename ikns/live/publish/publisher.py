@@ -5,8 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from queue import SimpleQueue
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
+from ikns.arrays import Array
 from ikns.live.control.controller import Decision
 from ikns.live.session.channels import STATES
 
@@ -17,14 +18,41 @@ _ITEMS = 2000
 #: What is still queued at the end has so long to be published, s.
 _LAST = 2.0
 
-Item = tuple[float, tuple[float, ...] | str]
+
+class Sample(NamedTuple):
+    """What is published of a frame.
+
+    Parameters
+    ----------
+    markers : (M, 3) array
+        As used, m in the world, in the order of the marker set; NaN = not seen.
+    decision : Decision
+    """
+
+    markers: Array
+    decision: Decision
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Every c, every flexion, the index of the state, and the residual in m."""
+        solved = self.decision.solved
+        state = float(STATES.index(self.decision.state))
+        return (
+            *solved.c.tolist(),
+            *self.decision.flexions,
+            state,
+            solved.residual,
+        )
+
+
+Item = tuple[float, Sample | str]
 
 
 class Sink(Protocol):
     """Where samples and events go; only the publisher's thread calls it."""
 
-    def sample(self, at: float, values: tuple[float, ...]) -> None:
-        """Publish the values of a frame, received at a time of `time.monotonic`."""
+    def sample(self, at: float, sample: Sample) -> None:
+        """Publish a frame, received at a time of `time.monotonic`."""
 
     def event(self, at: float, words: str) -> None:
         """Publish an event."""
@@ -57,8 +85,8 @@ class Publisher:
     Examples
     --------
     >>> class Printing:
-    ...     def sample(self, at, values):
-    ...         print(at, values)
+    ...     def sample(self, at, sample):
+    ...         print(at, sample.numbers)
     ...     def event(self, at, words):
     ...         print(at, words)
     ...     def close(self):
@@ -93,15 +121,9 @@ class Publisher:
         """What was sent and dropped so far, and the fault."""
         return {"sent": self.sent, "dropped": self.dropped, "fault": self.fault}
 
-    def decision(self, received: float, decision: Decision) -> None:
-        """Queue the result of a frame: c, flexion, state and residual."""
-        values = (
-            *decision.solved.c.tolist(),
-            *decision.flexions,
-            float(STATES.index(decision.state)),
-            decision.solved.residual,
-        )
-        self._put((received, values), _SAMPLES)
+    def decision(self, received: float, decision: Decision, markers: Array) -> None:
+        """Queue the result of a frame."""
+        self._put((received, Sample(markers, decision)), _SAMPLES)
 
     def event(self, at: float, name: str, text: str) -> None:
         """Queue an event."""

@@ -159,7 +159,7 @@ class FrameLoop:
                 durations=(decided - began, done - received),
             )
         if self._listener:
-            self._listener.decision(received, decision)
+            self._listener.decision(received, decision, markers)
         report.stages["loop"].add(time.monotonic() - began)
         return decision
 

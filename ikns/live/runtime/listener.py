@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from ikns.arrays import Array
 from ikns.live.control.controller import Decision
 
 
@@ -13,8 +14,12 @@ class LoopListener(Protocol):
     Times are in s of `time.monotonic`.
     """
 
-    def decision(self, received: float, decision: Decision) -> None:
-        """Take the result of a frame, received at a time, once it was commanded."""
+    def decision(self, received: float, decision: Decision, markers: Array) -> None:
+        """Take the result of a frame, received at a time, once it was commanded.
+
+        The markers are those that were used, (M, 3) m in the world; nobody changes them
+        any more.
+        """
 
     def event(self, at: float, name: str, text: str) -> None:
         """Take an event, as the session has it."""

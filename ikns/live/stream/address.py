@@ -15,12 +15,15 @@ from ikns.live.stream.lsl_feed import LslFeed
 from ikns.live.stream.lsl_search import Wanted
 from ikns.live.stream.renamed import RenamedFeed
 from ikns.live.stream.replay import Replay
+from ikns.live.stream.ros import RosFeed
 from ikns.live.stream.size_check import check_size, first_frames
 from ikns.live.stream.source import Source
 from ikns.live.stream.subjects import SubjectFeed, check_one_subject, subjects_of
 from ikns.recording.files import read
+from ikns.ros2.address import OPTIONS as ROS_OPTIONS
+from ikns.ros2.address import ros_address
 
-_KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST or natnet:HOST"
+_KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, natnet:HOST or ros2:TOPIC"
 #: So many frames of a recording show the size of the body.
 _GLANCES = 1000
 
@@ -47,7 +50,9 @@ def open_source(
         only, ``?source_id=ID`` and ``?host=HOST`` for one of several streams of that
         name, ``?unit=mm``, cm or m for positions whose description names no unit or a
         wrong one), ``qualisys:HOST``, ``vicon:HOST``, or ``natnet:HOST`` for OptiTrack
-        (also ``HOST:PORT``). All take
+        (also ``HOST:PORT``), or ``ros2:TOPIC`` for ``mocap4r2_msgs/msg/Markers``
+        (``?router=HOST:PORT``, 127.0.0.1:7447 by default, ``?domain=NUMBER``, and
+        ``?rate=FRAMES`` where stamps are too uneven to show it). All take
         ``?subject=NAME`` for one of several subjects (``NAME:RSHO`` or ``NAME_RSHO``),
         and all but a replay ``?timeout=SECONDS``; options are joined by ``&``.
     needs : MarkerSet, optional
@@ -200,12 +205,23 @@ def _natnet(host: str, options: Options) -> Feed:
     return natnet.NatNetFeed(*_host(host, natnet.PORT), timeout=_timeout(options))
 
 
+def _ros(topic: str, options: Options) -> Feed:
+    rate = None
+    if "rate" in options:
+        rate = _number("rate", options["rate"])
+        if not 0 < rate < 1e6:
+            raise InvalidInput(f"expected a rate above 0 frames/s, found {rate:g}.")
+    address = ros_address(topic, options)
+    return RosFeed(address, timeout=_timeout(options), rate=rate)
+
+
 _KINDS: dict[str, tuple[Callable[[str, Options], Feed], tuple[str, ...]]] = {
     "replay": (_replay, ("speed", "loop", "subject")),
     "lsl": (_lsl, ("timeout", "scope", "source_id", "host", "unit", "subject")),
     "qualisys": (_qualisys, ("timeout", "subject")),
     "vicon": (_vicon, ("timeout", "subject")),
     "natnet": (_natnet, ("timeout", "subject")),
+    "ros2": (_ros, (*ROS_OPTIONS, "rate", "timeout", "subject")),
 }
 
 

@@ -1,0 +1,82 @@
+"""A recording on Rerun's timeline, for ``ikns view --rerun`` and ``--rrd``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import ikns
+from ikns.cli.live_session import Timeline
+from ikns.cli.output import progress, show, table
+from ikns.cli.reading import check_inputs
+from ikns.errors import naming
+
+if TYPE_CHECKING:
+    from ikns.nullspace.readout import Method
+
+
+def view_in_rerun(
+    read: Callable[[], ikns.Recording],
+    subject: Path,
+    recording: Path,
+    where: Timeline,
+    *,
+    method: Method,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Track a recording, log it, and print how much that was."""
+    check_inputs([recording], subject)
+
+    from ikns.calibration.simulated import is_simulated
+    from ikns.motion.unseen import warn_unseen
+    from ikns.view.timeline import RerunLog, log_recording
+
+    person = ikns.Subject.load(subject)
+    with naming(str(subject)):
+        readout = person.readout(method)  # before anything is tracked
+    simulated = is_simulated(person, subject, [recording])
+    frames, body = read(), person.skeleton
+    warn_unseen(body, frames, person.chain)
+    with progress() as report:
+        motion = ikns.MarkerIK(body).track(
+            frames, chain=person.chain, progress=partial(report, recording.name)
+        )
+    c = readout.control_signal(body, motion)
+    title = f"{recording.name}, {subject.resolve().name}"
+    title += " (simulated)" * simulated
+    log = RerunLog(where.file, title=title, force=force)
+    count = log_recording(log, body, motion, frames, c)
+    log.close()
+    remarks = tell_faults(person, frames)
+    shown = {
+        "subject": subject,
+        "recording": recording,
+        "simulated": simulated,
+        "method": method,
+        "rrd": where.file,
+        "frames": count,
+        "notes": remarks,
+    }
+    show(
+        shown,
+        table(title, {"quantity": "s", "value": "s"}, [["frames", str(count)]]),
+        "In Rerun's viewer" if where.file is None else f"Wrote {where.file}",
+        as_json=as_json,
+    )
+
+
+def tell_faults(person: ikns.Subject, frames: ikns.Recording) -> list[str]:
+    """Say what is wrong with a recording, which is shown all the same."""
+    from ikns.calibration.judged_motion import known_findings
+
+    found = known_findings(
+        person.skeleton, frames, chain=person.chain, measured=person.measured
+    )
+    faults = [fault.sentence for fault in found if fault.severity != "note"]
+    for fault in faults:
+        sys.stderr.write(f"ikns: note: {fault}\n")
+    return faults
