@@ -11,7 +11,7 @@ import pytest
 # floor do not know each other.
 FLOORS = (
     "arrays errors endings",
-    "_kernels output ros2",
+    "_kernels output",
     "numerics",
     "recording finger statistics",
     "body",
@@ -53,7 +53,7 @@ ONLY_IN = {
     "serial": {"finger"},
     "statsmodels": {"statistics"},
     "vicon_dssdk": {"live"},
-    "zenoh": {"ros2"},
+    "zenoh": {"finger"},
     "rerun": {"view"},
     "typer": {"cli"},
     "rich": {"cli"},

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ikns.errors import InvalidInput
-from ikns.ros2 import RosNode, ros_address
-from ikns.ros2.cdr import decode, encode
-from ikns.ros2.definitions import definitions, type_hash
-from ikns.ros2.keys import endpoint_token, read_token, topic_key
+from ikns.finger.ros2 import RosNode, ros_address
+from ikns.finger.ros2.cdr import decode, encode
+from ikns.finger.ros2.definitions import definitions, type_hash
+from ikns.finger.ros2.keys import endpoint_token, read_token, topic_key
 
 NUMBERS = {
     "int8": st.integers(-128, 127),
@@ -107,7 +107,7 @@ def test_a_domain_comes_from_the_address_or_from_the_environment(monkeypatch):
 
 def test_a_router_for_trying_things_serves_this_machine_only():
     port = str(ros_graph.free_port())
-    command = [sys.executable, "-m", "ikns.ros2.router", port]
+    command = [sys.executable, "-m", "ikns.finger.ros2.router", port]
     router = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
         assert "listens at tcp/127.0.0.1" in router.stderr.readline()

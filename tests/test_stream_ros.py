@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from ros_graph import Graph, Peer
 
 from ikns.errors import InvalidInput, StreamError
+from ikns.finger.ros2.cdr import decode
 from ikns.live.stream import open_source
 from ikns.live.stream.ros_markers import MarkersReader
-from ikns.ros2.cdr import decode
 
 TYPE = "mocap4r2_msgs/msg/Markers"
 LABELS = ("RSHO", "RELB", "RWRA")

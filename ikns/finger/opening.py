@@ -15,10 +15,10 @@ from ikns.finger.guard import Safety
 from ikns.finger.lerobot import LeRobotFinger
 from ikns.finger.lerobot_robot import make_robot
 from ikns.finger.ros import RosFinger
+from ikns.finger.ros2.address import OPTIONS as ROS_OPTIONS
+from ikns.finger.ros2.address import ros_address
 from ikns.finger.simulated import SimulatedFinger
 from ikns.finger.state import Finger
-from ikns.ros2.address import OPTIONS as ROS_OPTIONS
-from ikns.ros2.address import ros_address
 
 _SIMULATED: dict[str, Callable[[str], Any]] = {"width": float, "effort": float}
 _DYNAMIXEL: dict[str, Callable[[str], Any]] = {

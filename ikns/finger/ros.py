@@ -11,9 +11,9 @@ from typing import Self, get_args
 from ikns.errors import InvalidInput
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.relax_at_exit import forget, relax_at_exit
+from ikns.finger.ros2.address import RosAddress, ros_name
 from ikns.finger.ros_joint import RosCommand, RosJoint, RosTarget
 from ikns.finger.state import FingerState
-from ikns.ros2.address import RosAddress, ros_name
 
 #: A trajectory's one point is to be reached in so many periods.
 _AHEAD = 2

@@ -10,9 +10,9 @@ from typing import Any, Literal, NamedTuple
 
 from ikns.errors import StreamError
 from ikns.finger.errors import FingerError
-from ikns.ros2.address import RosAddress
-from ikns.ros2.cdr import Message, decode
-from ikns.ros2.node import RosNode, RosPublisher, stamp
+from ikns.finger.ros2.address import RosAddress
+from ikns.finger.ros2.cdr import Message, decode
+from ikns.finger.ros2.node import RosNode, RosPublisher, stamp
 
 RosCommand = Literal["joint_trajectory", "position"]
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 from urllib.parse import parse_qsl
 
 from ikns.errors import InvalidInput, naming
+from ikns.finger.ros2.address import OPTIONS, RosAddress, ros_address
 from ikns.live.publish.lsl import LslSink
 from ikns.live.publish.publisher import Publisher
 from ikns.live.publish.ros import RosSink
-from ikns.ros2.address import OPTIONS, RosAddress, ros_address
 
 _KNOWN = "lsl:NAME or ros2:NAMESPACE"
 _OPTIONS = {"lsl": ("scope",), "ros2": OPTIONS}

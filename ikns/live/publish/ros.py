@@ -16,10 +16,10 @@ from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.model import NQ_ROOT
 from ikns.errors import StreamError
+from ikns.finger.ros2.address import RosAddress
+from ikns.finger.ros2.node import RosNode, stamp
 from ikns.live.publish.publisher import Sample
 from ikns.nullspace.signal_names import signal_names
-from ikns.ros2.address import RosAddress
-from ikns.ros2.node import RosNode, stamp
 
 #: Where tools look for diagnostics, by ROS's REP 107.
 DIAGNOSTICS = "/diagnostics"

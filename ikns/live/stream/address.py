@@ -9,6 +9,8 @@ from urllib.parse import parse_qsl
 from ikns.body.marker_set import MarkerSet
 from ikns.calibration.subject import Subject
 from ikns.errors import IknsError, InvalidInput, MarkerMismatch
+from ikns.finger.ros2.address import OPTIONS as ROS_OPTIONS
+from ikns.finger.ros2.address import ros_address
 from ikns.live.stream import natnet, qualisys, vicon
 from ikns.live.stream.frame import Feed
 from ikns.live.stream.lsl_feed import LslFeed
@@ -20,8 +22,6 @@ from ikns.live.stream.size_check import check_size, first_frames
 from ikns.live.stream.source import Source
 from ikns.live.stream.subjects import SubjectFeed, check_one_subject, subjects_of
 from ikns.recording.files import read
-from ikns.ros2.address import OPTIONS as ROS_OPTIONS
-from ikns.ros2.address import ros_address
 
 _KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, natnet:HOST or ros2:TOPIC"
 #: So many frames of a recording show the size of the body.

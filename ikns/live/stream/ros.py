@@ -13,12 +13,12 @@ import time
 import numpy as np
 
 from ikns.errors import StreamError
+from ikns.finger.ros2.address import RosAddress
+from ikns.finger.ros2.definitions import type_hash
+from ikns.finger.ros2.node import RosNode
 from ikns.live.stream.client_thread import ClientThread
 from ikns.live.stream.frame import Frame
 from ikns.live.stream.ros_markers import MARKERS, MarkersReader, RosMarkers
-from ikns.ros2.address import RosAddress
-from ikns.ros2.definitions import type_hash
-from ikns.ros2.node import RosNode
 
 #: The message has neither a list of names nor a rate; so many frames show them.
 _FIRST = 20

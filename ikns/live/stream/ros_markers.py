@@ -58,7 +58,7 @@ class MarkersReader:
 
     Examples
     --------
-    >>> from ikns.ros2.cdr import encode
+    >>> from ikns.finger.ros2.cdr import encode
     >>> marker = {"id_type": 0, "marker_index": 0, "marker_name": "C7"}
     >>> marker["translation"] = {"x": 0.1, "y": 0.2, "z": 0.3}
     >>> header = {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": "map"}

@@ -1,6 +1,6 @@
 """A zenoh router on this machine, to try things without ROS.
 
-``python -m ikns.ros2.router [PORT]``; without a port, 7447. A ROS 2 system has
+``python -m ikns.finger.ros2.router [PORT]``; without a port, 7447. A ROS 2 system has
 its own: ``ros2 run rmw_zenoh_cpp rmw_zenohd``.
 """
 

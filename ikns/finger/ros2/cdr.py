@@ -10,7 +10,7 @@ import struct
 from collections.abc import Mapping
 from typing import Any
 
-from ikns.ros2.definitions import definitions
+from ikns.finger.ros2.definitions import definitions
 
 #: Format characters and sizes of the basic types.
 _FORMATS = {

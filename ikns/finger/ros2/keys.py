@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ikns.ros2.definitions import type_hash
+from ikns.finger.ros2.definitions import type_hash
 
 #: Quality of service in a token: reliable, volatile, the last ten kept, no deadline. An
 #: empty place means rmw_zenoh's default, which all others are.

@@ -5,7 +5,7 @@ names under which a ROS graph finds them, `address` reads what a user types, and
 is the connection to a router.
 """
 
-from ikns.ros2.address import RosAddress, ros_address
-from ikns.ros2.node import RosNode, RosPublisher
+from ikns.finger.ros2.address import RosAddress, ros_address
+from ikns.finger.ros2.node import RosNode, RosPublisher
 
 __all__ = ["RosAddress", "RosNode", "RosPublisher", "ros_address"]

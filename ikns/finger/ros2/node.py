@@ -17,9 +17,9 @@ from collections.abc import Callable
 from typing import Any
 
 from ikns.errors import StreamError
-from ikns.ros2.address import RosAddress
-from ikns.ros2.cdr import Message, encode
-from ikns.ros2.keys import (
+from ikns.finger.ros2.address import RosAddress
+from ikns.finger.ros2.cdr import Message, encode
+from ikns.finger.ros2.keys import (
     RosEndpoint,
     endpoint_token,
     endpoints_key,
