@@ -94,7 +94,8 @@ def test_every_command_and_option_shown_is_known(
             extras = re.findall(r"\[(.*)\]", line[-1])
             assert all(extra in EXTRAS for extra in ",".join(extras).split(",")), line
         elif program == "python":
-            assert words[0] == "-c" or (ROOT / words[0]).is_file(), line
+            named = importlib.util.find_spec(words[1]) if words[0] == "-m" else None
+            assert words[0] == "-c" or named or (ROOT / words[0]).is_file(), line
         else:
             assert program == "ikns", line
             command = words[:2] if words[0] in GROUPS else words[:1]
