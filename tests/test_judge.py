@@ -324,7 +324,7 @@ def test_a_recording_mirrored_after_a_right_static_trial_is_told():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (uneven, "left and right carry"),
+        (uneven, "left and right are swapped"),
         (generic, "labels of left and right, or export"),
     ],
 )

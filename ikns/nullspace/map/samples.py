@@ -127,7 +127,7 @@ def no_still_sample(
     rejected = [text for m in motions if (text := rejection_sentence(m, chain))]
     found = "none has a known hand speed"
     if lost := [segment for m in motions for segment in m.never_seen(chain)]:
-        found = f"none shows it: {lost[0]} is never in sight"
+        found = f"none shows it: {lost[0]} is never visible"
     elif rejected and believed.mean() < 0.5:
         found = rejected[0]
     elif slow:
