@@ -156,9 +156,7 @@ def test_without_a_joystick_of_linux_it_is_said(tmp_path):
 def test_whoever_can_use_it_is_told_so():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     systems = {c for c in project["classifiers"] if c.startswith("Operating System")}
-    assert systems == {
-        "Operating System :: MacOS",
-        "Operating System :: POSIX :: Linux",
-    }
+    # Wheels resolve on macOS, but nothing has been run there.
+    assert systems == {"Operating System :: POSIX :: Linux"}
     # It has no wheel for Linux on ARM, where everything else of the base has one.
     assert not any("ezc3d" in name for name in project["dependencies"])
