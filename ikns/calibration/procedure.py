@@ -183,15 +183,7 @@ def calibrate(
     report = {
         "chain": chain,
         "marker_set": skeleton.marker_set.name,
-        "settings": {
-            "n_points": n_points,
-            "n_dof": n_dof,
-            "variance": variance,
-            "max_hand_speed_m_s": max_hand_speed,
-            "min_rest_s": min_rest,
-            "min_samples": learned.min_samples,
-            "clusters_start": learned.start_,
-        },
+        "settings": _settings(learned, max_hand_speed, min_rest),
         "methods": methods,
         "static": static_report(static, measured.scaling),
         "body": body_report(measured.fitted),
@@ -213,6 +205,20 @@ def calibrate(
     if other_methods:
         methods["summary"] = method_summary(subject, natural=measured.natural, own=True)
     return subject
+
+
+def _settings(
+    learned: NullSpaceMap, max_hand_speed: float, min_rest: float
+) -> dict[str, Any]:
+    return {
+        "n_points": learned.n_points,
+        "n_dof": learned.n_dof,
+        "variance": learned.variance,
+        "max_hand_speed_m_s": max_hand_speed,
+        "min_rest_s": min_rest,
+        "min_samples": learned.min_samples,
+        "clusters_start": learned.start_,
+    }
 
 
 def _check_seconds(**given: float) -> None:

@@ -162,7 +162,7 @@ def _time_left(bars: Any, estimates: Mapping[str, Estimate]) -> Any:
     """Return a column of rich with the time left, or since when without an end."""
     from rich.text import Text
 
-    class TimeLeft(bars.ProgressColumn):
+    class TimeLeftColumn(bars.ProgressColumn):
         def render(self, task: Any) -> Any:
             fields, done = task.fields, int(task.completed)
             if task.total is None:
@@ -183,7 +183,7 @@ def _time_left(bars: Any, estimates: Mapping[str, Estimate]) -> Any:
             shown = "-:--:--" if left is None else str(timedelta(seconds=round(left)))
             return Text(shown, style="progress.remaining")
 
-    return TimeLeft()
+    return TimeLeftColumn()
 
 
 def _display(bars: Any, estimates: Mapping[str, Estimate]) -> Any:

@@ -7,7 +7,7 @@ import shutil
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -43,6 +43,7 @@ from ikns.errors import DataLoss, InvalidInput
 if TYPE_CHECKING:
     from ikns.live.publish import Publishers
     from ikns.live.runtime import AxisStatus, LoopStatus, Report
+    from ikns.live.session.writer import RunWriter
 
 #: Interval of the status line on the terminal, s.
 _LINE_EVERY = 0.2
@@ -130,21 +131,15 @@ def run(
 
     Research software, not a medical device.
     """
-    _check_options(duration, session, resume=resume)
-    check_subject_folder(subject)
+    _check_options(subject, duration, session, resume=resume)
 
     from ikns.calibration.simulated import is_simulated, played_files
     from ikns.finger import Safety, open_fingers
     from ikns.live.control.settings import ControlSettings
-    from ikns.live.publish import check_publish
-    from ikns.live.runtime import check_realtime
     from ikns.live.runtime import run as drive
     from ikns.live.stream import open_source
 
-    if realtime:
-        check_realtime()
-    for address in publish or []:
-        check_publish(address)
+    _check_machine(publish or [], realtime=realtime)
     timeline = timeline_of(rerun=rerun, rrd=rrd)
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
@@ -162,11 +157,10 @@ def run(
         opened = open_source(source, subject=calibrated, names=names)
         stream = stack.enter_context(opened)
         simulated = is_simulated(calibrated, subject, played_files(source))
-        pace = stream.rate * stream.speed
         shared = publishing(
             publish or [],
             calibrated,
-            rate=pace,
+            rate=stream.rate * stream.speed,
             simulated=simulated,
             timeline=timeline,
         )
@@ -174,32 +168,30 @@ def run(
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
         losses: list[str] = []
-        writer = None
-        if session is not None:
-            started = {
-                "source": source,
-                "source_labels": list(stream.labels),
-                "renamed": names,
-                "finger": None if dry_run else written(addresses),
-                "safe_state": safe_state,
-                "publish": publish,
-            }
-            log = live_session(
-                session,
-                calibrated,
-                subject,
-                software() | started | {"settings": settings.table()},
-                rate=stream.rate,
-                participant=participant,
-                resume=resume,
-                losses=losses,
-            )
-            writer = stack.enter_context(log)
+        started = {
+            "source": source,
+            "source_labels": list(stream.labels),
+            "renamed": names,
+            "finger": None if dry_run else written(addresses),
+            "safe_state": safe_state,
+            "publish": publish,
+            "settings": settings.table(),
+        }
+        log = _recorded(
+            session,
+            calibrated,
+            subject,
+            started,
+            rate=stream.rate,
+            participant=participant,
+            resume=resume,
+            losses=losses,
+        )
+        writer = stack.enter_context(log)
         arm = threading.Event()
         shown = [stack.enter_context(_status_line(arm))]
         if view:
-            name = subject.resolve().name
-            shown.append(_body(stack, calibrated, name, simulated=simulated))
+            shown.append(_body(stack, calibrated, subject, simulated=simulated))
         report = drive(
             stream,
             calibrated,
@@ -215,32 +207,66 @@ def run(
             listener=publisher,
             realtime=realtime,
         )
-    if writer is not None:
-        report.lost_rows = writer.lost  # counted on disk once it is closed
-    if writer is not None and not report.frames:
-        session = None
-        sys.stderr.write("ikns: no frame arrived, so no session was kept.\n")
-    driven = "nothing (dry run)" if dry_run else " and ".join(addresses)
-    title = f"{source} to {driven}"
+    session = _kept(report, writer, session)
+    title = f"{source} to {'nothing (dry run)' if dry_run else ' and '.join(addresses)}"
     _show_report(report, title, session, losses, publisher, as_json=as_json)
     _exit(report, losses)
 
 
 def _check_options(
-    duration: float | None, session: Path | None, *, resume: bool
+    subject: Path, duration: float | None, session: Path | None, *, resume: bool
 ) -> None:
     if duration is not None and not 0 < duration < math.inf:
         raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
     if resume and session is None:
         raise InvalidInput("--resume needs the --session to continue.")
+    check_subject_folder(subject)
+
+
+def _check_machine(publish: list[str], *, realtime: bool) -> None:
+    """Refuse addresses and priorities that this machine does not have."""
+    from ikns.live.publish import check_publish
+    from ikns.live.runtime import check_realtime
+
+    if realtime:
+        check_realtime()
+    for address in publish:
+        check_publish(address)
+
+
+def _recorded(
+    session: Path | None,
+    calibrated: ikns.Subject,
+    subject: Path,
+    started: dict[str, Any],
+    **options: Any,
+) -> AbstractContextManager[RunWriter | None]:
+    """Open the session, if there is one; options as of :func:`live_session`."""
+    if session is None:
+        return nullcontext()
+    return live_session(session, calibrated, subject, software() | started, **options)
+
+
+def _kept(
+    report: Report, writer: RunWriter | None, session: Path | None
+) -> Path | None:
+    """Count what is lost, and return the session if there is one."""
+    if writer is None:
+        return None
+    report.lost_rows = writer.lost  # counted on disk once it is closed
+    if report.frames:
+        return session
+    sys.stderr.write("ikns: no frame arrived, so no session was kept.\n")
+    return None
 
 
 def _body(
-    stack: ExitStack, calibrated: ikns.Subject, name: str, *, simulated: bool
+    stack: ExitStack, calibrated: ikns.Subject, subject: Path, *, simulated: bool
 ) -> Callable[[LoopStatus], None]:
     """Open the window with the body, and return what draws it."""
     from ikns.view.scene import body_view
 
+    name = subject.resolve().name
     shown = body_view(calibrated, simulated=simulated, name=name)
     window, take = stack.enter_context(shown)
     sys.stderr.write(f"ikns: the view is at {window.url} on this machine.\n")

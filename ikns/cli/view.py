@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import ikns
-from ikns.cli.live_session import timeline_of
 from ikns.cli.options import (
     MARKER_FILES,
     AnyMethod,
@@ -31,6 +30,11 @@ from ikns.output.file import refuse_overwriting, write_bytes, write_text
 if TYPE_CHECKING:
     from ikns.nullspace.readout import Method
     from ikns.view.scene import Scene
+    from ikns.view.scene.picture import ScenePicture
+
+
+#: Of the table.
+_COLUMNS = {"quantity": "s", "value": "s"}
 
 
 @reads_markers
@@ -78,50 +82,23 @@ def view(
     """
     inputs = [subject, recording]
     if rerun or rrd is not None:
-        others = (out, png, animation, point) != (None,) * 4 or open_page
-        if recording is None or others:
-            raise InvalidInput(
-                "--rerun and --rrd show a recording, and no page or picture with it; "
-                "leave out --out, --png, --animation, --open and --point."
-            )
-        where = timeline_of(rerun=rerun, rrd=rrd, force=force, inputs=inputs)
-        assert where is not None
         view_in_rerun(
-            partial(read, recording, start=from_, end=to),
+            partial(read, start=from_, end=to),
             subject,
             recording,
-            where,
+            rrd,
+            alone=(out, png, animation, point) == (None,) * 4 and not open_page,
+            rerun=rerun,
             method=method,
             force=force,
             as_json=as_json,
         )
         return
     out = Path("view.html") if out is None else out
-    refuse_overwriting(out, force=force, inputs=inputs)
     pictures = [path for path in (png, animation) if path is not None]
-    for path in pictures:
-        refuse_overwriting(path, force=force, inputs=inputs)
-    if len({path.resolve() for path in (out, *pictures)}) <= len(pictures):
-        raise InvalidInput(
-            f"{pictures[-1]}: expected different files for each picture and for "
-            "the page, found the same one twice."
-        )
-    if png is not None and png.suffix.lower() != ".png":
-        raise InvalidInput(
-            f"{png}: expected a picture file that ends in .png, found '{png.suffix}'."
-        )
-    if animation is not None and animation.suffix.lower() not in (".gif", ".png"):
-        raise InvalidInput(
-            f"{animation}: expected an animation file that ends in .gif or .png, "
-            f"found '{animation.suffix}'."
-        )
-    if recording is None and (from_, to) != (None, None):
-        raise InvalidInput("expected a recording for --from and --to, found none.")
-    if recording is None and method != "paper":
-        raise InvalidInput(
-            f"expected a recording to compute c from with --method {method}, "
-            "found none; without one, the map is the paper's."
-        )
+    _check_files(out, png, animation, inputs, force=force)
+    if recording is None:
+        _check_without_recording((from_, to), method)
     check_inputs([recording], subject)
 
     from ikns.calibration.simulated import is_simulated
@@ -156,40 +133,78 @@ def view(
     write_text(out, page, force=force)
     remarks = [] if frames is None else tell_faults(person, frames)
     if png is not None and picture is not None:
-        write_bytes(png, picture.png, force=force)
-        if picture.note:
-            remarks.append(picture.note)
-            sys.stderr.write(f"ikns: {picture.note}.\n")
+        remarks += _write_picture(png, picture, force=force)
     if animation is not None and moving is not None:
         write_bytes(animation, moving, force=force)
     if open_page:
         webbrowser.open(out.resolve().as_uri())
     given = 0 if frames is None else len(frames.time)
     size = len(page.encode())
-    show(
-        {
-            "subject": subject,
-            "recording": recording,
-            "simulated": simulated,
-            "method": method,
-            "html": out,
-            "png": png,
-            "animation": animation,
-            "points": len(learned.centers_),
-            "frames_of_the_recording": given,
-            "frames_played": len(scene.times),
-            "seconds": _seconds(scene),
-            "page_bytes": size,
-            "notes": remarks,
-        },
-        table(
-            scene.title + (" (simulated)" if simulated else ""),
-            {"quantity": "s", "value": "s"},
-            _rows(scene, points=len(learned.centers_), given=given, size=size),
-        ),
-        f"Wrote {' and '.join(map(str, (out, *pictures)))}",
-        as_json=as_json,
-    )
+    result = {
+        "subject": subject,
+        "recording": recording,
+        "simulated": simulated,
+        "method": method,
+        "html": out,
+        "png": png,
+        "animation": animation,
+        "points": len(learned.centers_),
+        "frames_of_the_recording": given,
+        "frames_played": len(scene.times),
+        "seconds": _seconds(scene),
+        "page_bytes": size,
+        "notes": remarks,
+    }
+    rows = _rows(scene, points=len(learned.centers_), given=given, size=size)
+    name = scene.title + (" (simulated)" if simulated else "")
+    written = f"Wrote {' and '.join(map(str, (out, *pictures)))}"
+    show(result, table(name, _COLUMNS, rows), written, as_json=as_json)
+
+
+def _check_files(
+    out: Path,
+    png: Path | None,
+    animation: Path | None,
+    inputs: list[Path | None],
+    *,
+    force: bool,
+) -> None:
+    """Refuse files that exist, that are the same, or whose endings are wrong."""
+    files = [path for path in (out, png, animation) if path is not None]
+    for path in files:
+        refuse_overwriting(path, force=force, inputs=inputs)
+    if len({path.resolve() for path in files}) < len(files):
+        raise InvalidInput(
+            f"{files[-1]}: expected different files for each picture and for "
+            "the page, found the same one twice."
+        )
+    if png is not None and png.suffix.lower() != ".png":
+        raise InvalidInput(
+            f"{png}: expected a picture file that ends in .png, found '{png.suffix}'."
+        )
+    if animation is not None and animation.suffix.lower() not in (".gif", ".png"):
+        raise InvalidInput(
+            f"{animation}: expected an animation file that ends in .gif or .png, "
+            f"found '{animation.suffix}'."
+        )
+
+
+def _check_without_recording(part: tuple[str | None, ...], method: Method) -> None:
+    if part != (None, None):
+        raise InvalidInput("expected a recording for --from and --to, found none.")
+    if method != "paper":
+        raise InvalidInput(
+            f"expected a recording to compute c from with --method {method}, "
+            "found none; without one, the map is the paper's."
+        )
+
+
+def _write_picture(path: Path, picture: ScenePicture, *, force: bool) -> list[str]:
+    """Write a picture; return what there is to say of it, which is on stderr too."""
+    write_bytes(path, picture.png, force=force)
+    if picture.note:
+        sys.stderr.write(f"ikns: {picture.note}.\n")
+    return [picture.note] if picture.note else []
 
 
 def _animation(scene: Scene, person: ikns.Subject, path: Path, *, held: bool) -> bytes:

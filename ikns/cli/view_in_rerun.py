@@ -9,26 +9,37 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import ikns
-from ikns.cli.live_session import Timeline
+from ikns.cli.live_session import timeline_of
 from ikns.cli.output import progress, show, table
 from ikns.cli.reading import check_inputs
-from ikns.errors import naming
+from ikns.errors import InvalidInput, naming
 
 if TYPE_CHECKING:
     from ikns.nullspace.readout import Method
 
 
 def view_in_rerun(
-    read: Callable[[], ikns.Recording],
+    read: Callable[[Path], ikns.Recording],
     subject: Path,
-    recording: Path,
-    where: Timeline,
+    recording: Path | None,
+    rrd: Path | None,
     *,
+    alone: bool,
+    rerun: bool,
     method: Method,
     force: bool,
     as_json: bool,
 ) -> None:
-    """Track a recording, log it, and print how much that was."""
+    """Track a recording, log it, and print how much that was.
+
+    `alone` is whether no page and no picture was asked for.
+    """
+    if recording is None or not alone:
+        raise InvalidInput(
+            "--rerun and --rrd show a recording, and no page or picture with it; "
+            "leave out --out, --png, --animation, --open and --point."
+        )
+    timeline_of(rerun=rerun, rrd=rrd, force=force, inputs=[subject, recording])
     check_inputs([recording], subject)
 
     from ikns.calibration.simulated import is_simulated
@@ -39,7 +50,7 @@ def view_in_rerun(
     with naming(str(subject)):
         readout = person.readout(method)  # before anything is tracked
     simulated = is_simulated(person, subject, [recording])
-    frames, body = read(), person.skeleton
+    frames, body = read(recording), person.skeleton
     warn_unseen(body, frames, person.chain)
     with progress() as report:
         motion = ikns.MarkerIK(body).track(
@@ -48,7 +59,7 @@ def view_in_rerun(
     c = readout.control_signal(body, motion)
     title = f"{recording.name}, {subject.resolve().name}"
     title += " (simulated)" * simulated
-    log = RerunLog(where.file, title=title, force=force)
+    log = RerunLog(rrd, title=title, force=force)
     count = log_recording(log, body, motion, frames, c)
     log.close()
     remarks = tell_faults(person, frames)
@@ -57,14 +68,14 @@ def view_in_rerun(
         "recording": recording,
         "simulated": simulated,
         "method": method,
-        "rrd": where.file,
+        "rrd": rrd,
         "frames": count,
         "notes": remarks,
     }
     show(
         shown,
         table(title, {"quantity": "s", "value": "s"}, [["frames", str(count)]]),
-        "In Rerun's viewer" if where.file is None else f"Wrote {where.file}",
+        "In Rerun's viewer" if rrd is None else f"Wrote {rrd}",
         as_json=as_json,
     )
 

@@ -103,14 +103,11 @@ def conduct(
             timeline=arm.timeline,
         )
         publisher = stack.enter_context(shared)
+        kept = _relative(session, identity.folder) if subject else None
         common = _about(identity, arm, pages, conditions, simulated=simulated)
-        common |= {
-            "seed": seed,
-            "session": _relative(session, identity.folder) if subject else None,
-        }
+        common |= {"seed": seed, "session": kept}
         log = _open_log(stack, identity, common | dict(about))
-        # Tracking's has a trial to follow.
-        experiment: Any = make_experiment(log.attempts)
+        experiment: Any = make_experiment(log.attempts)  # tracking's has a trial
         virtual = "virtual" in conditions
         conductor = Conductor(
             experiment,
@@ -142,9 +139,7 @@ def conduct(
             )
         presses: SimpleQueue[None] = SimpleQueue()
         if "ring" in conditions:
-            from ikns.experiments.conduct.ring import ring_driver
-
-            drivers["ring"] = lambda: ring_driver(presses, ring_finger(arm))
+            drivers["ring"] = _ring(presses, arm)
         shown_about = {
             "participant": identity.participant,
             "simulated": simulated,
@@ -163,6 +158,22 @@ def conduct(
         _announce(cockpit.url, cockpit.panel_url, browser=pages.browser)
         run_visit(conductor, drivers, stop=stop, rate=pages.rate)
     _show_attempts(identity, conductor, losses, as_json=as_json)
+    _exit(losses)
+
+
+def _ring(
+    presses: SimpleQueue[None], arm: ArmOptions
+) -> Callable[[], AbstractContextManager[Driver]]:
+    def driver() -> AbstractContextManager[Driver]:
+        from ikns.experiments.conduct.ring import ring_driver
+
+        return ring_driver(presses, ring_finger(arm))
+
+    return driver
+
+
+def _exit(losses: list[str]) -> None:
+    """Say what must not be missed, and exit with its code."""
     if losses:
         raise DataLoss("; ".join(losses))
     if code := signal_exit_code():

@@ -5,14 +5,14 @@
 """
 
 from ikns.live.publish.address import check_publish, open_publisher
-from ikns.live.publish.publisher import Publisher, Sample, Sink
+from ikns.live.publish.publisher import PublishedFrame, Publisher, Sink
 from ikns.live.publish.ros import joint_places
 from ikns.live.publish.several import Publishers
 
 __all__ = [
     "Publisher",
     "Publishers",
-    "Sample",
+    "PublishedFrame",
     "Sink",
     "check_publish",
     "joint_places",

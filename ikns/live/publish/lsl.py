@@ -12,7 +12,7 @@ import time
 from typing import Any
 
 from ikns.errors import StreamError
-from ikns.live.publish.publisher import Sample
+from ikns.live.publish.publisher import PublishedFrame
 from ikns.live.session.channels import STATES
 from ikns.live.stream.loopback import only_from_this_machine
 from ikns.live.stream.lsl_library import lsl, only_this_machine
@@ -86,7 +86,7 @@ class LslSink:
         # On some systems LSL's clock differs from time.monotonic.
         self._lsl_ahead = self._pylsl.local_clock() - time.monotonic()
 
-    def sample(self, at: float, sample: Sample) -> None:
+    def sample(self, at: float, sample: PublishedFrame) -> None:
         """Send a sample, stamped with a time of `time.monotonic`."""
         if self._samples is not None:
             self._samples.push_sample(sample.numbers, at + self._lsl_ahead)

@@ -19,7 +19,7 @@ _ITEMS = 2000
 _LAST = 2.0
 
 
-class Sample(NamedTuple):
+class PublishedFrame(NamedTuple):
     """What is published of a frame.
 
     Parameters
@@ -45,13 +45,13 @@ class Sample(NamedTuple):
         )
 
 
-Item = tuple[float, Sample | str]
+Item = tuple[float, PublishedFrame | str]
 
 
 class Sink(Protocol):
     """Where samples and events go; only the publisher's thread calls it."""
 
-    def sample(self, at: float, sample: Sample) -> None:
+    def sample(self, at: float, sample: PublishedFrame) -> None:
         """Publish a frame, received at a time of `time.monotonic`."""
 
     def event(self, at: float, words: str) -> None:
@@ -123,7 +123,7 @@ class Publisher:
 
     def decision(self, received: float, decision: Decision, markers: Array) -> None:
         """Queue the result of a frame."""
-        self._put((received, Sample(markers, decision)), _SAMPLES)
+        self._put((received, PublishedFrame(markers, decision)), _SAMPLES)
 
     def event(self, at: float, name: str, text: str) -> None:
         """Queue an event."""

@@ -18,7 +18,7 @@ from ikns.body.skeleton.model import NQ_ROOT
 from ikns.errors import StreamError
 from ikns.finger.ros2.address import RosAddress
 from ikns.finger.ros2.node import RosNode, stamp
-from ikns.live.publish.publisher import Sample
+from ikns.live.publish.publisher import PublishedFrame
 from ikns.nullspace.signal_names import signal_names
 
 #: Where tools look for diagnostics, by ROS's REP 107.
@@ -108,7 +108,7 @@ class RosSink:
                     f"{space}/joint_states", "sensor_msgs/msg/JointState"
                 )
 
-    def sample(self, at: float, sample: Sample) -> None:
+    def sample(self, at: float, sample: PublishedFrame) -> None:
         """Publish a frame, received at a time of `time.monotonic`."""
         self._check_router()
         decision, ns = sample.decision, self._ns(at)
@@ -149,7 +149,7 @@ class RosSink:
                 + ("does not answer" if self._node.connected else "went away")
             )
 
-    def _diagnostics(self, ns: int, sample: Sample) -> dict[str, object]:
+    def _diagnostics(self, ns: int, sample: PublishedFrame) -> dict[str, object]:
         decision = sample.decision
         solved = decision.solved
         values = {

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ikns.body.skeleton import Skeleton
-from ikns.live.publish import Sample
+from ikns.live.publish import PublishedFrame
 from ikns.nullspace.signal_names import signal_names
 from ikns.view.timeline.entries import frame_entries
 from ikns.view.timeline.rerun import RerunLog
@@ -30,7 +30,7 @@ class RerunSink:
         self._log, self._skeleton = log, skeleton
         self._start = math.nan
 
-    def sample(self, at: float, sample: Sample) -> None:
+    def sample(self, at: float, sample: PublishedFrame) -> None:
         """Log a frame, received at a time of `time.monotonic`."""
         assert self._skeleton is not None
         decision = sample.decision
