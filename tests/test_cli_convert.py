@@ -14,7 +14,10 @@ from ikns.cli.repairs import repairs, tell
 from ikns.recording.files.storage import read_storage
 
 DOUBLED = c3d_bytes(labels=["RSHO", "RKNE", "RKNE"])
-NOTE = "2 markers are named RKNE, read as RKNE #1, RKNE #2; which of them is meant"
+NOTE = (
+    "2 markers are named RKNE, read as RKNE #1, RKNE #2; it is unclear which of them "
+    "is meant"
+)
 
 
 def test_a_repair_is_told_once_whatever_the_number_of_files(

@@ -28,7 +28,7 @@ FILES_OUT = {
     "compare": ["figure"],
     "robot": ["figure"],
     "ucm": ["figure"],
-    "view": ["out", "png", "animation"],
+    "view": ["out", "png", "animation", "rrd"],
     "replay": ["export"],
     "study plan": ["figure"],
 }
@@ -42,10 +42,10 @@ FOLDERS_OUT = {
 #: not offered.
 NEW_OUT = {
     "calibrate": ["recordings"],
-    "run": ["session"],
+    "run": ["session", "rrd"],
     "servo": ["link"],
-    "track": ["visit", "session"],
-    "pick": ["visit", "session"],
+    "track": ["visit", "session", "rrd"],
+    "pick": ["visit", "session", "rrd"],
     "study init": ["folder"],
 }
 #: A command that reads, and one valid use of all paths that it reads, by option.
@@ -171,6 +171,7 @@ SUFFIX = {
     "png": ".png",
     "animation": ".gif",
     "export": ".csv",
+    "rrd": ".rrd",
 }
 READERS = [
     (name, output, option)

@@ -99,7 +99,7 @@ def test_two_freedoms_drive_two_servos_of_a_port_and_replay_bit_for_bit(
     heard = []
 
     class Hears:
-        def decision(self, received, decision):
+        def decision(self, received, decision, markers):
             heard.append(decision)
 
         def event(self, at, name, text):
@@ -262,7 +262,7 @@ def test_what_is_published_has_each_signal_and_flexion():
                 listener=publisher,
                 on_decision=lambda *told: decided.append(told[2]),
             )
-    assert [values[:4] for values in sent] == [
+    assert [values.numbers[:4] for values in sent] == [
         (*made.solved.c.tolist(), *made.flexions) for made in decided
     ]
 

@@ -208,7 +208,7 @@ def test_the_map_of_another_chain_is_refused(folder, tmp_path):
     shutil.copytree(folder, other)
     path = other / "intent.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"chain": "left_arm"}))
-    with pytest.raises(ValueError, match=r"intent.json.*of left_arm.*can go"):
+    with pytest.raises(ValueError, match=r"intent.json.*of left_arm.*can be deleted"):
         Subject.load(other)
 
 
