@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.calibration.method_summary import method_summary
+from ikns.calibration.method_summary import method_summary, no_range_learned
 from ikns.calibration.subject import Subject
 from ikns.cli.calibration_tables import calibration_parts
 from ikns.live.control.recorded import control_table
@@ -72,6 +72,18 @@ def test_a_method_is_recommended_for_live_use(moved):
     cost = {m: rows[m]["natural"] + rows[m]["turned_hand"] for m in ("paper", "intent")}
     assert best == min(cost, key=cost.get)
     assert f"{rows[best]['turned_hand']:.2f} with a turned hand" in found["why"]
+
+
+def test_a_range_smaller_than_a_reach_s_change_is_no_range(moved):
+    found = method_summary(moved[0], natural=[moved[1]])
+    assert no_range_learned(found) == ""
+    for row in found["methods"].values():
+        row["between_places"] = row["natural"] = 1.2
+    found["methods"]["intent"] |= {"between_places": 1.1, "natural": 1.1}
+    assert "by more than its whole range (by 1.1 at least)" in no_range_learned(found)
+    found["methods"]["intent"]["between_places"] = 0.9
+    found["methods"]["intent"]["natural"] = 0.9
+    assert no_range_learned(found) == ""
 
 
 def test_a_folder_of_before_says_what_there_is(moved, tmp_path):

@@ -96,6 +96,24 @@ def method_summary(
     return found | _recommended(rows, counts)
 
 
+def no_range_learned(summary: dict[str, Any]) -> str:
+    """Say that reaches move c by more than its range, whatever the method; or nothing.
+
+    Then nobody turned the elbow with the hand held: the range that was learned is that
+    of small movements, or of noise.
+    """
+    counts, rows = summary["reaches"], summary["methods"].values()
+    for kind in ("between_places", "natural"):
+        changes = [row[kind] for row in rows if row[kind] is not None]
+        if counts[kind] >= _FEWEST and changes and min(changes) > 1.0:
+            return (
+                f"a reach moves c of every method by more than its whole range (by "
+                f"{min(changes):.1f} at least): no one turned the elbow with the hand "
+                "held; hold the hand at each place, and turn the elbow to both ends."
+            )
+    return ""
+
+
 def _reaches(motion: Motion, chain: str, speed: float) -> Indices:
     """First and last frame of each reach, (R, 2)."""
     return find_reaches(

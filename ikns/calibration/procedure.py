@@ -15,7 +15,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.freedoms import check_freedoms, freedom_motions
 from ikns.calibration.measured_body import measured_body
-from ikns.calibration.method_summary import method_summary
+from ikns.calibration.method_summary import method_summary, no_range_learned
 from ikns.calibration.places import check_places, recorded_places
 from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.report import (
@@ -203,7 +203,9 @@ def calibrate(
     shown = _shown(hands, learned)
     subject = Subject(skeleton, learned, chain, report, motions, shown, readouts)
     if other_methods:
-        methods["summary"] = method_summary(subject, natural=measured.natural, own=True)
+        summary = method_summary(subject, natural=measured.natural, own=True)
+        methods["summary"] = summary
+        methods["warnings"] += filter(None, [no_range_learned(summary)])
     return subject
 
 

@@ -143,6 +143,9 @@ def _name_values(command: Any) -> None:
     """Name what options take as people do: NUMBER and PATH, not <float range>."""
     for part in getattr(command, "commands", {}).values():
         _name_values(part)
+    # Lines of a docstring are not those of a terminal.
+    paragraphs = (command.help or "").split("\n\n")
+    command.help = "\n\n".join(" ".join(text.split()) for text in paragraphs)
     for option in command.get_params(typer.Context(command)):  # --help too
         kind = option.type_descriptor.annotation
         kind = get_args(kind)[0] if get_origin(kind) is list else kind

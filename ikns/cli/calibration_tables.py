@@ -111,7 +111,12 @@ def methods_parts(report: dict[str, Any]) -> list[Any]:
     if found is None:
         return [" ".join(parts)]
     counts = found["reaches"]
-    parts.append(f"Recommended: --method {found['recommended']}; {found['why']}.")
+    from ikns.calibration.method_summary import no_range_learned
+
+    if no_range_learned(found):
+        parts.append("No method is recommended: c has no range that means anything.")
+    else:
+        parts.append(f"Recommended: --method {found['recommended']}; {found['why']}.")
     return [
         table(
             "Change of c when nothing is intended (mean; 1 is the whole range)",

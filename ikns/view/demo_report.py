@@ -49,8 +49,8 @@ _LEAD = (
 )
 _NEXT_STEPS = (
     NextStep(
-        "ikns view subject recordings/points.c3d --open",
-        "See body, map and motion in 3-D, as in `view.html` next to this page:",
+        "ikns view subject recordings/free.c3d --out free.html --open",
+        "In this folder: see body, map and motion in 3-D, as in `view.html`:",
     ),
     NextStep(
         "ikns calibrate --static static.c3d --exploration points.c3d --out person",

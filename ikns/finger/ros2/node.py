@@ -210,7 +210,8 @@ class RosNode:
         return StreamError(
             f"{self._needed_by}: expected a zenoh router at {self.address.router}, "
             f"found {found}; start one with 'ros2 run rmw_zenoh_cpp rmw_zenohd' or "
-            "zenohd, or name another with ?router=HOST:PORT."
+            "'python -m ikns.finger.ros2.router', or name another with "
+            "?router=HOST:PORT."
         )
 
 

@@ -138,7 +138,7 @@ def _next_steps(summary: StudySummary) -> list[NextStep]:
     if all(group.simulated for group in summary.groups):
         return [
             NextStep(
-                "ikns study plan",
+                "ikns study plan STUDY",
                 "How many people a study needs to find, or to exclude, a difference:",
             ),
             NextStep(
