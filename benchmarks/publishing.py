@@ -244,6 +244,11 @@ def over_natnet(seconds: float) -> dict[str, float]:
         lost = source.continuity.counts.dropped
         ours.send(None)
     sender.join()
+    return lateness(late, lost)
+
+
+def lateness(late: list[float], lost: int) -> dict[str, float]:
+    """Percentiles, in ms, of how late frames were, s, and how many were lost."""
     p50, p99, most = 1e3 * np.percentile(late, [50, 99, 100])
     return {
         "frames": len(late), "p50": p50, "p99": p99, "max": most, "dropped": lost,
@@ -303,10 +308,7 @@ def over_ros(seconds: float) -> dict[str, float]:
             lost = number - first + 1 - len(late)
             ours.send(None)
         sender.join()
-    p50, p99, most = 1e3 * np.percentile(late, [50, 99, 100])
-    return {
-        "frames": len(late), "p50": p50, "p99": p99, "max": most, "dropped": lost,
-    }  # fmt: skip
+    return lateness(late, lost)
 
 
 def faults_of_a_ros_finger(repeats: int) -> dict[str, dict[str, float]]:

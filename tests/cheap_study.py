@@ -18,6 +18,7 @@ STUDY = {
 
 
 def write_study(folder: Path, **tables: dict) -> Path:
+    """Declare a study in a new folder, by tables instead of the cheap ones."""
     folder.mkdir()
     (folder / "study.toml").write_text(tomli_w.dumps(STUDY | tables))
     return folder

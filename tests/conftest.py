@@ -2,7 +2,9 @@
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import small_person
@@ -43,6 +45,24 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         small_person.write(folder, trial.name, trial.recording)
     small_person.subject().save(folder / "person")
     return folder
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """A browser without a window, driven by playwright."""
+    from playwright.sync_api import sync_playwright
+
+    from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
+
+    browser = find_browser()
+    if browser is None:
+        pytest.skip(HOW_TO_GET_ONE)
+    with sync_playwright() as driver:
+        chromium = driver.chromium.launch(
+            executable_path=browser, args=browser_options()
+        )
+        yield chromium
+        chromium.close()
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -35,7 +35,6 @@ from ikns.experiments.picking import pick_schedule
 from ikns.experiments.tracking import measure, schedule
 from ikns.experiments.visits import read_visit, tracking_record
 from ikns.finger import Safety, SimulatedFinger
-from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
 
 NEXT_WHILE_TRACKING = (
     "The participant follows the line. Abort if something went wrong; the trial comes "
@@ -176,21 +175,6 @@ def says(page: Any, id: str, text: str) -> None:
         "([id, text]) => document.getElementById(id).textContent === text",
         arg=[id, text],
     )
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    browser = find_browser()
-    if browser is None:
-        pytest.skip(HOW_TO_GET_ONE)
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver:
-        chromium = driver.chromium.launch(
-            executable_path=browser, args=browser_options()
-        )
-        yield chromium
-        chromium.close()
 
 
 @contextmanager

@@ -26,6 +26,7 @@ from ikns.finger.geometry import (
     opening,
 )
 from ikns.finger.laws import LAWS
+from ikns.finger.relax_at_exit import forget
 
 URDF = Path(__file__).parents[1] / "urdf" / "finger.urdf"
 
@@ -103,6 +104,7 @@ def test_a_finger_that_breaks_laws_is_found_out(time):
 
         def relax(self):
             self._connected = False
+            forget(self)  # so that no later test finds it
 
     def make():
         return Careless(clock=time)

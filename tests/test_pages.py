@@ -29,24 +29,8 @@ from ikns.view.report import (
     report_html,
 )
 from ikns.view.scene import LiveView, map_scene, recording_scene, scene_html
-from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
 from ikns.view.scene.playback import kept_frames
 from ikns.view.study_report import study_page
-
-
-@pytest.fixture(scope="module", name="chromium")
-def _chromium() -> Iterator[Any]:
-    browser = find_browser()
-    if browser is None:
-        pytest.skip(HOW_TO_GET_ONE)
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver:
-        chromium = driver.chromium.launch(
-            executable_path=browser, args=browser_options()
-        )
-        yield chromium
-        chromium.close()
 
 
 @contextmanager

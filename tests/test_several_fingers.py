@@ -20,6 +20,10 @@ from ikns.finger import (
 PATIENCE = 20.0
 
 
+ROS = "ros2:/goals?type=joint_trajectory&open=0&closed=1&safe=hold"
+NUMBER = ROS.replace("joint_trajectory", "position")
+
+
 # --- addresses -----------------------------------------------------------------------
 
 
@@ -82,11 +86,21 @@ def test_addresses_are_taken_or_refused_in_a_sentence(known, n_dof):
             ["dynamixel:/dev/z", "dynamixel:/dev/z?dof=2&id=2&model=ax12"],
             "one baud rate and protocol",
         ),
+        ([f"{ROS}&joint=a", f"{ROS}&joint=a&dof=2"], "are the same joint"),
+        # One number a message: a joint's name does not make two of a topic.
+        ([f"{NUMBER}&joint=a", f"{NUMBER}&joint=b&dof=2"], "are the same joint"),
+        (["sim:safe=x"], r"'sim:safe=x'.*safe"),
     ],
 )
 def test_what_is_wrong_with_an_address_is_said(texts, words):
     with pytest.raises(InvalidInput, match=words):
         open_fingers(texts, n_dof=2)
+
+
+def test_two_joints_of_a_trajectory_topic_are_two_fingers():
+    texts = [f"{ROS}&joint=a", f"{ROS}&joint=b&dof=2"]
+    assert open_fingers(texts, n_dof=2).dofs == (1, 2)
+    assert open_fingers([ROS + "&joint=a", ROS + "&joint=a&dof=2&domain=3"])
 
 
 def test_a_link_to_a_port_is_that_port(tmp_path):

@@ -4,6 +4,7 @@ import logging
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -99,19 +100,22 @@ def test_two_workers_of_which_one_is_killed_make_the_bits_of_one_process(
         study.mkdir()
         (study / "study.toml").write_text(tomli_w.dumps(STUDY))
     run_study(studies[0], n_jobs=1)
-    killed = []
+    killed: list[int] = []
     with dask(2) as made:
 
-        def kill(step: str, done: int, total: int) -> None:
-            if done == 1 and not killed:
-                # The one that still computes.
-                (busy, *_) = (
-                    ws for ws in made.scheduler.workers.values() if ws.processing
-                )
-                killed.append(made.workers[busy.name].pid)
-                os.kill(killed[0], signal.SIGKILL)
+        def kill() -> None:
+            """Kill the first worker that is seen to compute, which takes it seconds."""
+            while not killed:
+                for state in list(made.scheduler.workers.values()):
+                    if state.processing and not killed:
+                        killed.append(made.workers[state.name].pid)
+                        os.kill(killed[0], signal.SIGKILL)
+                time.sleep(0.01)
 
-        run_study(studies[1], scheduler=made.scheduler_address, on_progress=kill)
+        killer = threading.Thread(target=kill, daemon=True)
+        killer.start()
+        run_study(studies[1], scheduler=made.scheduler_address)
+        killer.join(10.0)
     assert killed
     one, other = (
         {

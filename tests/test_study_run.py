@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from cheap_study import contents, write_study
 
 from ikns.calibration.subject import Subject
 from ikns.errors import FileError, InvalidInput, StreamError
@@ -45,19 +46,7 @@ if __name__ == "__main__":
 
 
 def make(folder: Path, **tables: dict) -> Path:
-    folder.mkdir()
-    (folder / "study.toml").write_text(tomli_w.dumps(STUDY | tables))
-    return folder
-
-
-def contents(study: Path) -> dict[str, bytes]:
-    """Everything that a run leaves, by name; the lock is empty."""
-    visits = study / "visits"
-    return {
-        path.relative_to(visits).as_posix(): path.read_bytes()
-        for path in sorted(visits.rglob("*"))
-        if path.is_file()
-    }
+    return write_study(folder, **(STUDY | tables))
 
 
 def children(process: int) -> list[int]:

@@ -5,7 +5,6 @@ between frames in double precision what a page stores as float32: 1e-6 m.
 """
 
 import io
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -27,7 +26,6 @@ from ikns.view.scene import (
 from ikns.view.scene.body import drawn_links
 from ikns.view.scene.picture import (
     HOW_TO_GET_ONE,
-    browser_options,
     find_browser,
     screenshot,
 )
@@ -73,26 +71,16 @@ class Tab:
 
 
 @pytest.fixture(scope="module", name="tab")
-def _tab() -> Iterator[Tab]:
-    browser = find_browser()
-    if browser is None:
-        pytest.skip(HOW_TO_GET_ONE)
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver:
-        chromium = driver.chromium.launch(
-            executable_path=browser, args=browser_options()
-        )
-        page = chromium.new_page(viewport={"width": 400, "height": 300})
-        tab = Tab(page)
-        page.on(
-            "console",
-            lambda said: said.type == "error" and tab.complaints.append(said.text),
-        )
-        page.on("pageerror", lambda error: tab.complaints.append(str(error)))
-        page.on("requestfailed", lambda asked: tab.complaints.append(asked.url))
-        yield tab
-        chromium.close()
+def _tab(chromium: Any) -> Tab:
+    page = chromium.new_page(viewport={"width": 400, "height": 300})
+    tab = Tab(page)
+    page.on(
+        "console",
+        lambda said: said.type == "error" and tab.complaints.append(said.text),
+    )
+    page.on("pageerror", lambda error: tab.complaints.append(str(error)))
+    page.on("requestfailed", lambda asked: tab.complaints.append(asked.url))
+    return tab
 
 
 @cache

@@ -10,6 +10,7 @@ from typing import Self
 
 from ikns.endings import ending_requested
 from ikns.errors import InvalidInput
+from ikns.finger.attempt import Attempt, relax_after
 from ikns.finger.bus import Bus
 from ikns.finger.configuration import ServoConfiguration
 from ikns.finger.drive import Drive
@@ -118,7 +119,7 @@ class DynamixelFinger:
         self._drive = Drive(self._bus, self._configuration, self._guard, self._lock)
         self._access = threading.Lock()  # held while connecting or relaxing
         self._thread: threading.Thread | None = None
-        self._attempt: _Attempt | None = None
+        self._attempt: Attempt | None = None
         self._stop = threading.Event()
         self._torque_owed = False  # torque may be on since an earlier connection
         self._confirmed = True
@@ -137,7 +138,7 @@ class DynamixelFinger:
             the torque off until :meth:`relax`.
         """
         with self._access:
-            attempt = _Attempt()
+            attempt = Attempt()
             relax_at_exit(self)
             try:
                 self._begin(attempt)
@@ -209,14 +210,9 @@ class DynamixelFinger:
 
     def __exit__(self, *exception: object) -> None:
         """Relax; a failure is added as a note to an exception already raised."""
-        try:
-            self.relax()
-        except FingerError as error:
-            if not isinstance(exception[1], BaseException):
-                raise
-            exception[1].add_note(str(error))
+        relax_after(self.relax, exception[1])
 
-    def _begin(self, attempt: _Attempt) -> None:
+    def _begin(self, attempt: Attempt) -> None:
         """Hand an attempt to connect to the thread that owns the bus."""
         thread = self._thread
         if thread is not None and self._stop.is_set():  # an interrupted relaxing
@@ -260,7 +256,7 @@ class DynamixelFinger:
             late.error = FingerError(f"{self._bus.port}: connecting was aborted.")
             late.done.set()
 
-    def _open(self, attempt: _Attempt) -> bool:
+    def _open(self, attempt: Attempt) -> bool:
         """Connect, on the thread; return whether the bus is still needed."""
         connected_before = self._torque_owed
         with self._lock:
@@ -294,11 +290,3 @@ class DynamixelFinger:
         self._torque_owed = False
         self._bus.close()
         forget(self)
-
-
-class _Attempt:
-    """An attempt to connect, made by the finger's thread for a caller that waits."""
-
-    def __init__(self) -> None:
-        self.done = threading.Event()
-        self.error: BaseException | None = None

@@ -11,6 +11,7 @@ from typing import Self
 
 from ikns.endings import ending_requested, exit_on_signals
 from ikns.errors import InvalidInput
+from ikns.finger.attempt import relax_after
 from ikns.finger.state import Finger, FingerState
 
 #: While one connects, those that are connected already are told to hold this often, s.
@@ -196,22 +197,13 @@ class FingerGroup:
         try:
             self.connect()
         except BaseException as error:
-            self._relax_after(error)
+            relax_after(self.relax, error)
             raise
         return self
 
     def __exit__(self, *exception: object) -> None:
         """Relax; a failure is added as a note to an exception already raised."""
-        if isinstance(exception[1], BaseException):
-            self._relax_after(exception[1])
-        else:
-            self.relax()
-
-    def _relax_after(self, error: BaseException) -> None:
-        try:
-            self.relax()
-        except Exception as failure:
-            error.add_note(str(failure))
+        relax_after(self.relax, exception[1])
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from typing import Self
 
 from ikns.endings import ending_requested
 from ikns.errors import InvalidInput
+from ikns.finger.attempt import Attempt, relax_after
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.lerobot_joint import RobotDevice, RobotJoint
@@ -70,7 +71,7 @@ class LeRobotFinger:
         self._lock = threading.RLock()  # guard and results, never during a call
         self._access = threading.Lock()  # held while connecting or relaxing
         self._thread: threading.Thread | None = None
-        self._connecting: _Connecting | None = None
+        self._connecting: Attempt | None = None
         self._stop = threading.Event()
         self._known = FingerState()
         self._sent = self._responded = math.nan
@@ -97,7 +98,7 @@ class LeRobotFinger:
                 if thread.is_alive():
                     raise FingerError(f"{self._name} does not answer.")
             relax_at_exit(self)
-            request = self._connecting = _Connecting()
+            request = self._connecting = Attempt()
             if thread is None or not thread.is_alive():
                 self._stop.clear()
                 thread = self._thread = threading.Thread(
@@ -174,12 +175,7 @@ class LeRobotFinger:
 
     def __exit__(self, *exception: object) -> None:
         """Relax; a failure is added as a note to an exception already raised."""
-        try:
-            self.relax()
-        except FingerError as error:
-            if not isinstance(exception[1], BaseException):
-                raise
-            exception[1].add_note(str(error))
+        relax_after(self.relax, exception[1])
 
     @property
     def _name(self) -> str:
@@ -236,7 +232,7 @@ class LeRobotFinger:
         with contextlib.suppress(Exception):
             self._joint.disconnect()
 
-    def _open(self, request: _Connecting) -> None:
+    def _open(self, request: Attempt) -> None:
         """Connect, on the thread; note what went wrong in the request."""
         try:
             with self._lock:
@@ -288,14 +284,6 @@ class LeRobotFinger:
                 self._guard.fail(
                     f"no answer from the robot for {timeout:g} s ({_first_line(error)})"
                 )
-
-
-class _Connecting:
-    """A request to connect, carried out by the finger's thread for who waits."""
-
-    def __init__(self) -> None:
-        self.done = threading.Event()
-        self.error: BaseException | None = None
 
 
 def _first_line(error: Exception) -> str:

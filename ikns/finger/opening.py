@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from typing import Any
 from urllib.parse import parse_qsl
@@ -150,63 +150,69 @@ def open_fingers(
 
 
 def _check_ports(addresses: list[str], fingers: list[Finger]) -> None:
-    """Refuse two fingers on one servo or robot, and servos that cannot share a port."""
-    seen: dict[str, list[tuple[str, DynamixelFinger]]] = {}
-    robots: dict[str, str] = {}
+    """Refuse two fingers on one device, and servos that cannot share a port."""
+    devices: dict[Hashable, str] = {}
+    ports: dict[str, tuple[str, DynamixelFinger]] = {}
     for address, finger in zip(addresses, fingers, strict=True):
-        if isinstance(finger, LeRobotFinger) and finger.port:
+        device, remedy = _device(finger)
+        if device is not None and device in devices:
+            raise InvalidInput(
+                f"'{devices[device]}' and '{address}' are the same {remedy}."
+            )
+        devices[device] = address
+        if isinstance(finger, DynamixelFinger):
             port = os.path.realpath(finger.port)
-            if (other := robots.setdefault(port, address)) != address:
-                raise InvalidInput(
-                    f"'{other}' and '{address}' are the same robot, of which "
-                    "only one joint can be a finger."
-                )
-        if not isinstance(finger, DynamixelFinger):
-            continue
-        others = seen.setdefault(os.path.realpath(finger.port), [])
-        for other, one in others:
-            if one.id == finger.id:
-                raise InvalidInput(
-                    f"'{other}' and '{address}' are the same servo, expected another "
-                    "port or id."
-                )
-            if one.speech != finger.speech:
+            other, first = ports.setdefault(port, (address, finger))
+            if first.speech != finger.speech:
                 raise InvalidInput(
                     f"'{other}' and '{address}' are on the same port, expected one "
                     "baud rate and protocol."
                 )
-        others.append((address, finger))
+
+
+def _device(finger: Finger) -> tuple[Hashable, str]:
+    """Return what a finger moves, None if it is its own; and what would be right."""
+    if isinstance(finger, DynamixelFinger):
+        servo = os.path.realpath(finger.port), finger.id
+        return servo, "servo, expected another port or id"
+    if isinstance(finger, LeRobotFinger) and finger.port:
+        robot = os.path.realpath(finger.port)
+        return robot, "robot, of which only one joint can be a finger"
+    if isinstance(finger, RosFinger):
+        target = finger.target
+        named = target.joint if target.command == "joint_trajectory" else ""
+        return (target.address, named), "joint, expected another topic or joint"
+    return None, ""
 
 
 def _opened(address: str, safety: Safety) -> tuple[Finger, int]:
     """Make a finger; return it and the freedom that its address names."""
     scheme, colon, rest = address.partition(":")
-    if scheme == "sim" and colon:
-        values = _options(address, rest.removeprefix("?"), _SIMULATED)
-        safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
-        dof = _dof(address, values.pop("dof", 1))
-        if "width" in values:
-            values["object_width"] = values.pop("width") / 1000
-        return SimulatedFinger(safety=safety, **values), dof
-    if scheme == "dynamixel" and colon:
-        port, _, query = rest.partition("?")
-        if not port:
-            raise InvalidInput(
-                f"'{address}' names no port, such as dynamixel:/dev/ttyUSB0."
-            )
-        values = _options(address, query, _DYNAMIXEL)
-        safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
-        dof = _dof(address, values.pop("dof", 1))
-        for end in ("open", "closed"):
-            if end in values:
-                values[f"{end}_ticks"] = values.pop(end)
-        return DynamixelFinger(port, safety=safety, **values), dof
-    if scheme == "ros2" and colon:
-        return _ros_finger(address, rest, safety)
-    if scheme == "lerobot" and colon:
-        kind, _, query = rest.partition("?")
-        return _lerobot_finger(address, kind, query, safety)
-    raise InvalidInput(f"unknown finger '{address}', expected {_KNOWN}.")
+    if scheme not in _MAKERS or not colon:
+        raise InvalidInput(f"unknown finger '{address}', expected {_KNOWN}.")
+    return _MAKERS[scheme](address, rest, safety)
+
+
+def _simulated_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
+    values = _options(address, rest.removeprefix("?"), _SIMULATED)
+    safety, dof = _common(address, values, safety)
+    if "width" in values:
+        values["object_width"] = values.pop("width") / 1000
+    return SimulatedFinger(safety=safety, **values), dof
+
+
+def _dynamixel_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
+    port, _, query = rest.partition("?")
+    if not port:
+        raise InvalidInput(
+            f"'{address}' names no port, such as dynamixel:/dev/ttyUSB0."
+        )
+    values = _options(address, query, _DYNAMIXEL)
+    safety, dof = _common(address, values, safety)
+    for end in ("open", "closed"):
+        if end in values:
+            values[f"{end}_ticks"] = values.pop(end)
+    return DynamixelFinger(port, safety=safety, **values), dof
 
 
 def _ros_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
@@ -219,12 +225,9 @@ def _ros_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
             "ros2:/finger/joint_trajectory?type=joint_trajectory&joint=finger&open=0"
             "&closed=1.2."
         )
-    dof = _dof(address, values.pop("dof", 1))
+    safety, dof = _common(address, values, safety)
+    where: dict[str, str] = {k: values.pop(k) for k in ROS_OPTIONS if k in values}
     with naming(f"'{address}'"):
-        safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
-        where: dict[str, str] = {
-            key: values.pop(key) for key in ROS_OPTIONS if key in values
-        }
         finger = RosFinger(
             ros_address(topic, where),
             command=values.pop("type"),
@@ -236,9 +239,8 @@ def _ros_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
     return finger, dof
 
 
-def _lerobot_finger(
-    address: str, kind: str, query: str, safety: Safety
-) -> tuple[Finger, int]:
+def _lerobot_finger(address: str, rest: str, safety: Safety) -> tuple[Finger, int]:
+    kind, _, query = rest.partition("?")
     pairs = _pairs(address, query)
     ours = {*_LEROBOT, "safe", "dof"}
     values = _values(address, [pair for pair in pairs if pair[0] in ours], _LEROBOT)
@@ -248,16 +250,26 @@ def _lerobot_finger(
             f"'{address}' lacks {', '.join(missing) or 'the type of the robot'}, as in "
             "lerobot:so101_follower?joint=gripper.pos&open=100&closed=0&port=PORT&id=ID."
         )
-    safety = replace(safety, safe_state=values.pop("safe", safety.safe_state))
-    dof = _dof(address, values.pop("dof", 1))
+    safety, dof = _common(address, values, safety)
     robot = make_robot(kind, {name: text for name, text in pairs if name not in ours})
     return LeRobotFinger(robot, safety=safety, **values), dof
 
 
-def _dof(address: str, dof: int) -> int:
+_MAKERS = {
+    "sim": _simulated_finger,
+    "dynamixel": _dynamixel_finger,
+    "ros2": _ros_finger,
+    "lerobot": _lerobot_finger,
+}
+
+
+def _common(address: str, values: dict[str, Any], safety: Safety) -> tuple[Safety, int]:
+    """Take what every address may have out of its options: safe and dof."""
+    dof = values.pop("dof", 1)
     if dof < 1:
         raise InvalidInput(f"'{address}' has dof={dof}, expected 1 or more.")
-    return dof
+    with naming(f"'{address}'"):
+        return replace(safety, safe_state=values.pop("safe", safety.safe_state)), dof
 
 
 def _options(

@@ -99,6 +99,11 @@ class RosFinger:
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
 
+    @property
+    def target(self) -> RosTarget:
+        """Where its goals go."""
+        return self._target
+
     def connect(self) -> None:
         """Connect and follow commands from the present position; leave the safe state.
 

@@ -12,6 +12,7 @@ import time
 
 from ikns.errors import StreamError
 from ikns.live.stream import natnet_packets as packets
+from ikns.live.stream.client_feed import ClientFeed
 from ikns.live.stream.client_thread import RECONNECT, ClientThread
 from ikns.live.stream.frame import Frame
 from ikns.live.stream.natnet_link import NatNetLink
@@ -27,7 +28,7 @@ _KEEP_ALIVE = 0.5
 _SILENCE = 2.0
 
 
-class NatNetFeed:
+class NatNetFeed(ClientFeed):
     """Read the labeled markers that a NatNet server streams; reconnect after a break.
 
     Rigid bodies are ignored, and so are frames that come from another server.
@@ -55,46 +56,24 @@ class NatNetFeed:
         labeled markers or no rate, or sends no frames.
     """
 
-    speed = 1.0
-
     def __init__(self, host: str, port: int = PORT, *, timeout: float = 5.0) -> None:
-        self.name = f"natnet:{host}" + (f":{port}" if port != PORT else "")
-        self._natnet = load_client("natnet", needed_by=self.name, remedy=_REMEDY)
+        name = f"natnet:{host}" + (f":{port}" if port != PORT else "")
+        self._natnet = load_client("natnet", needed_by=name, remedy=_REMEDY)
         self._address = (host, port)
-        self._client = ClientThread(
-            self.name, "a NatNet server", f"{host}:{port}", timeout
+        super().__init__(
+            ClientThread(name, "a NatNet server", f"{host}:{port}", timeout)
         )
-        self.events = self._client.events
         self._latency = {"latency": math.nan, "largest_latency": math.nan}
         self._link: NatNetLink
         self._facts: packets.ServerFacts
         self._models: packets.Models
-        try:
-            # Connecting, names, rate and first frame have `timeout` each at most.
-            self._client.start(self._serve, timeout=4 * timeout + 1)
-        except BaseException:
-            self.close()
-            raise
-        self.labels, self.rate = self._client.labels, self._client.rate
-
-    @property
-    def ended(self) -> bool:
-        """Whether it was closed; the server may come back."""
-        return self._client.closed
+        # Connecting, names, rate and first frame have `timeout` each at most.
+        self._start(self._serve, timeout=4 * timeout + 1)
 
     @property
     def device(self) -> dict[str, float]:
         """What the server reports, and overruns."""
-        return {**self._latency, "overruns": float(self._client.inbox.overruns)}
-
-    def poll(self, timeout: float) -> Frame | None:
-        """Return the next frame, None after `timeout` seconds."""
-        return self._client.inbox.get(timeout)
-
-    def close(self) -> None:
-        """Disconnect."""
-        self._client.close()
-        self._client.join(1.0)
+        return self._latency | super().device
 
     def _serve(self) -> None:
         while not self._client.closed:

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ikns.errors import StreamError
+from ikns.live.stream.client_feed import ClientFeed
 from ikns.live.stream.client_thread import RECONNECT, ClientThread
 from ikns.live.stream.frame import Frame
 from ikns.live.stream.optional import load_client
@@ -26,7 +27,7 @@ _VERSION = "1.25"  # of the protocol; the default of qtm-rt
 _REMEDY = "pip install 'ikns[qualisys]'"
 
 
-class QualisysFeed:
+class QualisysFeed(ClientFeed):
     """Read the labeled 3D markers that QTM streams; reconnect after a break.
 
     Parameters
@@ -49,43 +50,24 @@ class QualisysFeed:
         When QTM does not answer or sends no frames, has no labeled markers or no rate.
     """
 
-    speed = 1.0
-
     def __init__(self, host: str, port: int = PORT, *, timeout: float = 5.0) -> None:
-        self.name = f"qualisys:{host}" + (f":{port}" if port != PORT else "")
-        self._qtm = load_client("qtm_rt", needed_by=self.name, remedy=_REMEDY)
+        name = f"qualisys:{host}" + (f":{port}" if port != PORT else "")
+        self._qtm = load_client("qtm_rt", needed_by=name, remedy=_REMEDY)
         self._host, self._port = host, port
-        self._client = ClientThread(self.name, "QTM", f"{host}:{port}", timeout)
-        self.events = self._client.events
+        super().__init__(ClientThread(name, "QTM", f"{host}:{port}", timeout))
         self._rates = dict.fromkeys(
             ("drop_rate", "out_of_sync_rate", "largest_drop_rate",
              "largest_out_of_sync_rate"), 0.0
         )  # fmt: skip
         self._loop: asyncio.AbstractEventLoop | None = None
         self._wake: asyncio.Event
-        try:
-            # Connecting, settings and first frame have `timeout` each at most.
-            self._client.start(
-                lambda: asyncio.run(self._serve()), timeout=3 * timeout + 1
-            )
-        except BaseException:
-            self.close()
-            raise
-        self.labels, self.rate = self._client.labels, self._client.rate
-
-    @property
-    def ended(self) -> bool:
-        """Whether it was closed; QTM may come back."""
-        return self._client.closed
+        # Connecting, settings and first frame have `timeout` each at most.
+        self._start(lambda: asyncio.run(self._serve()), timeout=3 * timeout + 1)
 
     @property
     def device(self) -> dict[str, float]:
         """What QTM reports of its cameras, and overruns."""
-        return {**self._rates, "overruns": float(self._client.inbox.overruns)}
-
-    def poll(self, timeout: float) -> Frame | None:
-        """Return the next frame, None after `timeout` seconds."""
-        return self._client.inbox.get(timeout)
+        return self._rates | super().device
 
     def close(self) -> None:
         """Disconnect."""
@@ -93,7 +75,7 @@ class QualisysFeed:
         if self._loop is not None:
             with suppress(RuntimeError):  # the loop has ended already
                 self._loop.call_soon_threadsafe(self._wake.set)
-        self._client.join(1.0)
+        super().close()
 
     async def _serve(self) -> None:
         self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()

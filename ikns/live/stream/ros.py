@@ -16,6 +16,7 @@ from ikns.errors import StreamError
 from ikns.finger.ros2.address import RosAddress
 from ikns.finger.ros2.definitions import type_hash
 from ikns.finger.ros2.node import RosNode
+from ikns.live.stream.client_feed import ClientFeed
 from ikns.live.stream.client_thread import ClientThread
 from ikns.live.stream.frame import Frame
 from ikns.live.stream.ros_markers import MARKERS, MarkersReader, RosMarkers
@@ -27,7 +28,7 @@ _SILENCE = 2.0
 _LOOK = 0.1  # time between looks at the router, s
 
 
-class RosFeed:
+class RosFeed(ClientFeed):
     """Read the named markers of a topic; go on after a break.
 
     A hidden marker is at zero (as Vicon's driver has it), NaN, or not in the message.
@@ -53,45 +54,18 @@ class RosFeed:
         have names, or with stamps that do not advance.
     """
 
-    speed = 1.0
-
     def __init__(
         self, address: RosAddress, *, timeout: float = 5.0, rate: float | None = None
     ) -> None:
-        self.name = f"ros2:{address.name}"
+        name = f"ros2:{address.name}"
         self._address, self._rate = address, rate
-        self._client = ClientThread(self.name, "the router", address.router, timeout)
-        self.events = self._client.events
+        super().__init__(ClientThread(name, "the router", address.router, timeout))
         self._reader = MarkersReader()
         self._first: list[RosMarkers] = []
         self._enough = threading.Event()
         self._since = 0
         self._columns: dict[tuple[str, ...], np.typing.NDArray[np.int64]] = {}
-        try:
-            self._client.start(self._serve, timeout=2 * timeout + 10)
-        except BaseException:
-            self.close()
-            raise
-        self.labels, self.rate = self._client.labels, self._client.rate
-
-    @property
-    def ended(self) -> bool:
-        """Whether it was closed; the publisher may come back."""
-        return self._client.closed
-
-    @property
-    def device(self) -> dict[str, float]:
-        """Overruns."""
-        return {"overruns": float(self._client.inbox.overruns)}
-
-    def poll(self, timeout: float) -> Frame | None:
-        """Return the next frame, None after `timeout` seconds."""
-        return self._client.inbox.get(timeout)
-
-    def close(self) -> None:
-        """Disconnect."""
-        self._client.close()
-        self._client.join(1.0)
+        self._start(self._serve, timeout=2 * timeout + 10)
 
     def _serve(self) -> None:
         node = RosNode(self._address, needed_by=self.name)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ikns.errors import StreamError
+from ikns.live.stream.client_feed import ClientFeed
 from ikns.live.stream.client_thread import RECONNECT, ClientThread
 from ikns.live.stream.frame import Frame
 from ikns.live.stream.optional import load_client
@@ -26,7 +27,7 @@ _REMEDY = (
 _SDK_BUFFER = 100  # frames that the SDK buffers
 
 
-class ViconFeed:
+class ViconFeed(ClientFeed):
     """Read the labeled markers of all subjects, as ``subject:marker``.
 
     Frames carry no camera time, so the device time is the frame number over the rate.
@@ -51,39 +52,21 @@ class ViconFeed:
         there is no labeled marker or no rate.
     """
 
-    speed = 1.0
-
     def __init__(self, host: str, port: int = PORT, *, timeout: float = 5.0) -> None:
-        self.name = f"vicon:{host}" + (f":{port}" if port != PORT else "")
+        name = f"vicon:{host}" + (f":{port}" if port != PORT else "")
         self._sdk = load_client(
-            "vicon_dssdk.ViconDataStream", needed_by=self.name, remedy=_REMEDY
+            "vicon_dssdk.ViconDataStream", needed_by=name, remedy=_REMEDY
         )
         self._address = f"{host}:{port}"
-        self._client = ClientThread(self.name, "Vicon", self._address, timeout)
-        self.events = self._client.events
+        super().__init__(ClientThread(name, "Vicon", self._address, timeout))
         self._latency = 0.0
         self._markers: list[tuple[str, str]] = []
-        try:
-            self._client.start(self._serve, timeout=2 * timeout + 1)
-        except BaseException:
-            self.close()
-            raise
-        self.labels, self.rate = self._client.labels, self._client.rate
-
-    @property
-    def ended(self) -> bool:
-        """Whether it was closed; Vicon may come back."""
-        return self._client.closed
+        self._start(self._serve, timeout=2 * timeout + 1)
 
     @property
     def device(self) -> dict[str, float]:
         """What Vicon reports, and overruns."""
-        overruns = float(self._client.inbox.overruns)
-        return {"latency": self._latency, "overruns": overruns}
-
-    def poll(self, timeout: float) -> Frame | None:
-        """Return the next frame, None after `timeout` seconds."""
-        return self._client.inbox.get(timeout)
+        return {"latency": self._latency} | super().device
 
     def close(self) -> None:
         """Disconnect as soon as the SDK returns."""
