@@ -6,8 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import typer
-
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 MADE = HERE / "generated"
@@ -65,9 +63,9 @@ def _link(found: re.Match[str], *, source: Path, page: Path) -> str:
 
 def commands() -> str:
     """Make a page of every command with its arguments and options, from the program."""
-    from ikns.cli.app import make_app
+    from ikns.cli.app import command_parser
 
-    app = typer.main.get_command(make_app())
+    app = command_parser()
     parts = [
         "# Commands\n",
         "Exit codes: 0 done, 1 something recorded is not on disk, 2 bad input, 3 the "
@@ -96,11 +94,7 @@ def _row(option: Any, context: Any) -> str:
 
 
 def _plain(text: str) -> str:
-    return (
-        re.sub(r"(?<!\n)[ \t]*\n(?!\n)", " ", text.strip())
-        .replace("<", "\\<")
-        .replace("|", "\\|")
-    )
+    return text.strip().replace("<", "\\<").replace("|", "\\|")
 
 
 def api() -> str:

@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 import small_person
-import typer
 from command_line import calibrate, contents, one_sentence, read_csv
 from rich.markup import render
 
 import ikns
 from ikns.cli import main
-from ikns.cli.app import make_app
+from ikns.cli.app import command_parser
 from ikns.recording.recording import Recording
 
 HEAVY = {
@@ -69,7 +68,7 @@ def commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:
         yield from commands(below, f"{name} {part}")
 
 
-COMMANDS = dict(commands(typer.main.get_command(make_app()), "ikns"))
+COMMANDS = dict(commands(command_parser(), "ikns"))
 
 
 @pytest.mark.parametrize("name", COMMANDS)

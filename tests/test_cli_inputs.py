@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 from command_line import check_refused
 
-from ikns.cli.app import make_app
+from ikns.cli.app import command_parser
 
 #: Options and arguments that name something to write, by command.
 FILES_OUT = {
@@ -97,7 +96,7 @@ def leaves(command: Any, name: str = "") -> Iterator[tuple[str, Any]]:
         yield from leaves(each, f"{name} {part}".strip())
 
 
-COMMANDS = dict(leaves(typer.main.get_command(make_app())))
+COMMANDS = dict(leaves(command_parser()))
 
 
 def paths(command: Any) -> list[str]:

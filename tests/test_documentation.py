@@ -13,7 +13,7 @@ from documentation import PAGES, ROOT, Block, blocks
 
 import ikns
 from ikns.cli import main
-from ikns.cli.app import make_app
+from ikns.cli.app import command_parser
 from ikns.recording.part import between
 
 CONSOLE = blocks("console")
@@ -114,9 +114,7 @@ def test_most_blocks_run_and_every_command_is_shown_somewhere() -> None:
 
 
 def _commands() -> list[str]:
-    import typer
-
-    return list(typer.main.get_command(make_app()).commands)
+    return list(command_parser().commands)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

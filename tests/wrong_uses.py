@@ -4,9 +4,7 @@ The tree of commands gives the options; the tables below say what each of them i
 that a new option without an entry is noticed.
 """
 
-import typer
-
-from ikns.cli.app import make_app
+from ikns.cli.app import command_parser
 
 __all__ = ["ALL", "options", "undescribed"]
 
@@ -401,7 +399,7 @@ def _leaves(group: object, name: Command = ()) -> dict[str, list]:
 
 def options() -> dict[str, list]:
     """Parameters of each command, as typer knows them."""
-    return _leaves(typer.main.get_command(make_app()))
+    return _leaves(command_parser())
 
 
 def _wrong(command: str, name: str) -> list[str] | None:

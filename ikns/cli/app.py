@@ -98,7 +98,7 @@ def _run(given: list[str]) -> int:
     try:
         _refuse_empty(given)
         # Not standalone: typer then raises errors instead of printing several lines.
-        code = _parser(*(name for name in given[:1] if name in _COMMANDS)).main(
+        code = command_parser(*(name for name in given[:1] if name in _COMMANDS)).main(
             args=_repeat("--exploration", given),
             prog_name="ikns",
             standalone_mode=False,
@@ -132,8 +132,8 @@ def _run(given: list[str]) -> int:
 
 
 @functools.cache
-def _parser(*names: str) -> Any:
-    """Return the parser of commands, built once for all calls."""
+def command_parser(*names: str) -> Any:
+    """Return the parser of commands, by default of all; built once for all calls."""
     parser = typer.main.get_command(make_app(*names))
     _name_values(parser)
     return parser
