@@ -28,6 +28,14 @@ PROGRAM = "import sys; from ikns.cli import main; sys.exit(main())"
 IMPORTS = "import numpy, numba, pinocchio"
 COMPILE = "from ikns.live.warm_up import warm_up; warm_up()"
 OURS = Path(__file__).parents[1]
+#: With --quick; the tests run all commands.
+QUICK = (
+    "import numpy, numba, pinocchio",
+    "--help",
+    "ik",
+    "run, 0.2 s",
+    "a wrong option",
+)
 
 
 class Process(NamedTuple):
@@ -104,7 +112,9 @@ def timed(arguments: list[str], code: int, version: Path, cache: str) -> Process
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="short files, one round")
+    parser.add_argument(
+        "--quick", action="store_true", help="short files, few commands, one round"
+    )
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--before", type=Path, help="checkout of another version")
     parser.add_argument("--seed", type=int, default=0)
@@ -127,6 +137,8 @@ def main() -> None:
         ]
         loaded = ("warm_up, all compiled before", (0, ["python", COMPILE]))
         steps = dict([loaded]) | commands(folder)
+        if options.quick:
+            steps = {name: steps[name] for name in QUICK}
         made = ["calibrate", "--static", f"{folder}/static.c3d", "--exploration"]
         made += [f"{folder}/points.c3d", "--out", f"{folder}/person"]
         timed(made, 0, OURS, caches[-1])
