@@ -110,6 +110,13 @@ def test_a_report_fits_and_is_accessible(report_page: Any) -> None:
     page = report_page
     page.evaluate("document.querySelectorAll('details').forEach(x => x.open = true)")
     judge(page)
+    # On the phone what goes on beyond an edge fades there, and nothing else does.
+    faded = page.evaluate(
+        """[...document.querySelectorAll(".scroll, pre")].map(
+            x => [x.scrollWidth > x.clientWidth, getComputedStyle(x).maskImage !== "none"])"""
+    )
+    assert all(more == fades for more, fades in faded)
+    assert len({more for more, _ in faded}) == 2
     # Every link of the contents leads to a heading of that name.
     for link in page.locator("nav a").all():
         name = link.get_attribute("href")[1:]

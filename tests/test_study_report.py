@@ -194,6 +194,33 @@ def test_the_forest_plot_draws_the_tests_of_the_answers(simulated):
         assert high > test.high
 
 
+def test_one_participant_has_no_interval_and_does_not_set_an_axis(tmp_path):
+    study = tmp_path / "study"
+    for who in (1, 2, 3):
+        errors = {("ikns", "T1"): 2.0 + who % 2, ("gamepad", "T1"): 3.0}
+        errors |= {("mouse", "T1"): 8.0} if who == 1 else {}
+        small.tracking(study, who, errors)
+    picks = {("ikns", "A"): ("success", 5.0), ("ring", "A"): ("dropped", 4.0)}
+    small.visit(study, 1, "picking", small.picking_rows(picks))
+    summary = summarize(study)
+    page, drawn = study_page(summary)
+    figures = {name: each.figure for name, each in drawn}
+    (axes,) = figures["simulated_answers"].axes  # none of picking
+    tracked = {c.names: c for c in summary.groups[0].tracking.comparisons}
+    assert tracked["ikns", "mouse"].subjects == 1
+    said = {text.get_text() for text in axes.texts}
+    assert "ikns minus mouse\nno interval for one participant" in said
+    test = tracked["ikns", "gamepad"].analysis.subjects
+    assert axes.get_xlim()[1] == pytest.approx(1.15 * max(-test.low, test.high))
+    upper, _ = figures["simulated_picking_objects"].axes
+    assert not any(bar.has_yerr for bar in upper.containers)
+    reader = Reader(page)
+    (row, _) = reader.table("ikns: succeeded", "success (%)")
+    assert row["ikns: succeeded"].replace("\u00a0", " ") == "1 of 1"
+    assert row["success (%)"] == "0"  # the ring's, the last that is called so
+    assert "".join(reader.text).count("no interval for one participant") == 2
+
+
 def test_simulated_is_said_large_in_every_heading_caption_figure_and_file(simulated):
     summary, page, drawn = simulated
     reader = Reader(page)

@@ -43,8 +43,8 @@ _GATE = 0.05
 _DPI = 110
 
 _LEAD = (
-    "A simulated person went through the calibration of the paper. The C3D files alone "
-    "gave a scaled skeleton, joint angles, a null-space map and the control signal c; "
+    "A simulated person went through the paper's calibration. From the C3D files alone "
+    "came a scaled skeleton, joint angles, a null-space map and the control signal c; "
     "this page compares them with the simulated truth."
 )
 _NEXT_STEPS = (
@@ -173,30 +173,40 @@ def _key_numbers(summary: Mapping[str, Any]) -> list[KeyNumber]:
         KeyNumber(
             "c against the true elbow swivel",
             f"r = {worst:+.3f} at the worst point",
-            "1 means that c is the swivel; one sign everywhere means that lifting "
-            "the elbow never turns the robot the other way.",
+            "Correlation. 1 means that c rises exactly with the swivel; one sign "
+            "everywhere means that lifting the elbow never moves the finger the wrong "
+            "way.",
         ),
         KeyNumber(
             "learned against analytic direction",
             f"{np.nanmax(_angles_deg(summary)):.1f} deg at the worst point",
             "The analytic direction is the null space of the Jacobian, averaged "
-            "over the visited postures.",
+            "over the visited postures; 0 would be the same direction.",
         ),
         KeyNumber(
             "leak",
             f"{1000 * np.nanmedian(corrected):.1f} mm at the median point",
-            "How far the hand goes with c from 0 to 1, without what noise adds; it "
-            f"should stay. With noise it is {1000 * np.median(leaks):.1f} mm.",
+            "How far the hand moves while c goes from 0 to 1, corrected for noise; "
+            f"ideally 0. Uncorrected: {1000 * np.median(leaks):.1f} mm.",
+        ),
+        KeyNumber(
+            "c on a reach",
+            ", ".join(
+                f"{method} {change:.2f}"
+                for method, change in _changes(summary["methods"]).items()
+            ),
+            "Mean change of c while nothing is intended; ideally 0.",
         ),
         KeyNumber(
             "segment lengths",
             f"{1000 * max(map(abs, lengths.values())):.1f} mm off at most",
-            "The static trial settles the body that all angles rest on.",
+            "The static trial determines the body that all joint angles depend on.",
         ),
         KeyNumber(
             "marker residual",
             f"{1000 * summary['residual_median_m']:.1f} mm",
-            "Median over frames; simulated cameras have 1 mm of noise per axis.",
+            "Distance between seen and modeled markers, median over frames; the "
+            "simulated cameras have 1 mm of noise per axis.",
         ),
     ]
 
@@ -206,10 +216,10 @@ def _elbow_section(demo: Demo) -> Section:
     return Section(
         "Move the elbow yourself",
         [
-            "The hand holds its place and its orientation; what is left to this arm is "
-            "to turn the elbow about the line from shoulder to wrist. Drag it: c "
-            "follows, and so does the finger. Everything is computed in this page from "
-            "the map's own numbers. The person is simulated.",
+            "The hand keeps its position and orientation; all that is left to the arm "
+            "is to turn the elbow about the line from shoulder to wrist. Drag the "
+            "elbow: c follows, and so does the finger. The page computes this itself "
+            "from the map. The person is simulated.",
         ],
         widget=elbow_widget(demo.subject),
     )
@@ -220,20 +230,21 @@ def _signal_section(figures: Mapping[str, Figure]) -> Section:
     return Section(
         "Control signal",
         [
-            "While the hand reaches elsewhere c moves too (crosstalk): the map "
-            "only promises meaning while the hand is held."
+            "c is meaningful while the hand is held. While the hand moves, c changes "
+            "too (crosstalk)."
         ],
         [
             Picture(
                 figures["swivel"],
-                "c against the true elbow swivel while the hand is still. Same "
-                "slope everywhere: same sign.",
+                "c against the true elbow swivel while the hand is still. Slopes of "
+                "one sign mean that lifting the elbow moves the finger the same way "
+                "everywhere.",
                 "Scatter plots, one per PCA point",
             ),
             Picture(
                 figures["control"],
-                "The free exploration, which the map has not seen; "
-                "`control.csv` holds it clipped to 0 to 1.",
+                "c during the free exploration, which was not used to learn the map; "
+                "`control.csv` has it clipped to 0 to 1.",
                 "Time series of c and of the hand speed",
             ),
         ],
@@ -288,42 +299,47 @@ def _methods_section(
     return Section(
         "Posture or intent",
         [
-            "A posture is not a wish: people turn the elbow whenever they reach, "
-            "and the paper's c follows posture. `paper` reads all joints of the chain, "
-            "so a turned hand moves it; `proximal` reads the upper arm and the elbow's "
-            "flexion only; `intent` reads the elbow's swivel less what this person's "
-            "ordinary movement does at that place. None of them knows what a person "
-            "wants: c is how far the elbow departs from what is usual.",
+            "Posture is not intent: people turn the elbow whenever they reach, and "
+            "the paper's c follows posture. `paper` reads all joints of the chain, so "
+            "turning the hand changes it; `proximal` reads the upper arm and elbow "
+            "flexion only; `intent` reads the elbow's swivel minus what is usual for "
+            "this person with the hand there. No method knows what a person wants: "
+            "even `intent` only says how far the elbow departs from the usual.",
             f"Recommended for this subject: {found['recommended']}, as {found['why']}.",
         ],
         [
             Picture(
                 figures["methods"],
-                f"Left: a reach of {reach}, with nothing meant; it should leave c "
-                "alone. Middle: the forearm turns while elbow and wrist stay. Right: "
-                "the hand is held and the elbow lifted; here c should follow.",
-                "Three panels of the control signal, one line or cloud a method",
+                f"Left: a reach of {reach} without intent; c should not change. "
+                "Middle: the forearm turns while elbow and wrist stay; c should not "
+                "change. Right: the hand is held and the elbow lifted; c should follow.",
+                "Three panels of the control signal, one line or cloud per method",
             )
         ],
         [
             Table(
-                ["method", "a reach", "more than 0.2", "turned hand"],
                 [
-                    [
-                        method,
-                        *(
-                            "-" if row[name] is None else f"{row[name]:.2f}"
-                            for name in _reach_columns(found)
-                        ),
-                    ]
+                    "method",
+                    "change on a reach",
+                    "share of reaches above 0.2",
+                    "change with a turned hand",
+                ],
+                [
+                    [method, *(row[name] for name in _reach_columns(found))]
                     for method, row in found["methods"].items()
                 ],
-                "Mean change of c where nothing is meant, and the share of reaches "
-                f"with more than 0.2; the forearm turns by {found['turned_deg']:.0f} "
-                "deg.",
+                "Mean change of c while nothing is intended; the forearm turns by "
+                f"{found['turned_deg']:.0f} deg.",
             )
         ],
     )
+
+
+def _changes(found: Mapping[str, Any]) -> dict[str, float]:
+    """Return the mean change of c on a reach, by method, where it is known."""
+    kind = _reach_columns(found)[0]
+    rows = found["methods"].items()
+    return {method: row[kind] for method, row in rows if row[kind] is not None}
 
 
 def _reach_columns(found: Mapping[str, Any]) -> tuple[str, str, str]:

@@ -25,6 +25,7 @@ from ikns.view.style import (
 )
 
 NO_MARGIN = "No margin was declared beforehand, so equivalence was not tested."
+NO_INTERVAL = "no interval for one participant"
 NO_TRIAL = "No trial was finished, so there is nothing to draw or to test."
 _BOX = {"facecolor": GREEN, "alpha": 0.13, "lw": 0}
 _STYLES = (*MARKS, (INK, "v"))

@@ -38,10 +38,11 @@ def picking_figure(found: PickingSummary) -> Figure:
                 if not cell.trials:
                     continue
                 share = 100 * cell.succeeded / cell.trials
+                ends = [[share - 100 * cell.low], [100 * cell.high - share]]
                 upper.errorbar(
                     place + offset,
                     share,
-                    [[share - 100 * cell.low], [100 * cell.high - share]],
+                    ends if cell.subjects > 1 else None,
                     fmt=mark,
                     color=color,
                     ms=4.5,

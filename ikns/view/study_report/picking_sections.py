@@ -15,6 +15,7 @@ from ikns.experiments.study.summary.answers import people, worded
 from ikns.view.cells import Cell
 from ikns.view.parts import Picture, Section, Table
 from ikns.view.study_report.comparisons import (
+    NO_INTERVAL,
     NO_MARGIN,
     NO_TRIAL,
     ReportFigure,
@@ -30,13 +31,18 @@ def picking_figures(found: PickingSummary) -> list[ReportFigure]:
     """All figures of experiment 2; none without a trial."""
     if not len(found.trials()["success"]):
         return []
+    share = (
+        f"; {NO_INTERVAL}"
+        if _one(found)
+        else ", with 95 % intervals (Clopper and Pearson)"
+    )
     return [
         ReportFigure(
             "picking_objects",
             picking_figure(found),
-            "Above: share of trials that succeeded, with 95 % intervals (Clopper and "
-            "Pearson). Below: time of every trial; crosses are failures, at the "
-            "limit; black bars: mean time with failures counted at the limit.",
+            f"Above: share of trials that succeeded{share}. Below: time of every "
+            "trial; crosses are failures, at the limit; black bars: mean time with "
+            "failures counted at the limit.",
             "Success and time by object and condition",
         ),
         *difference_figures(
@@ -48,6 +54,11 @@ def picking_figures(found: PickingSummary) -> list[ReportFigure]:
             simulated=found.simulated,
         ),
     ]
+
+
+def _one(found: PickingSummary) -> bool:
+    """Whether no condition has more than one participant."""
+    return max(cell.subjects for cell in found.cells) <= 1
 
 
 def picking_sections(
@@ -115,20 +126,24 @@ def _success_table(found: PickingSummary) -> Table:
     def cells(cell: ObjectResult) -> list[Cell]:
         if not cell.trials:
             return ["–", None, None, "–"]
-        share = 100 * cell.succeeded / cell.trials
+        share = f"{100 * cell.succeeded / cell.trials:.0f}"
+        if cell.subjects > 1:
+            share += f" ({100 * cell.low:.0f} to {100 * cell.high:.0f})"
         return [
             _whole(f"{cell.succeeded} of {cell.trials}"),
             cell.dropped,
             cell.late,
-            _whole(f"{share:.0f} ({100 * cell.low:.0f} to {100 * cell.high:.0f})"),
+            _whole(share),
         ]
 
+    interval, words = ", 95 %", "its 95 % interval, which counts trials as independent"
+    if _one(found):
+        interval, words = "", NO_INTERVAL
     return _object_table(
         found,
-        ["succeeded", "dropped", "out of time", "success (%), 95 %"],
+        ["succeeded", "dropped", "out of time", f"success (%){interval}"],
         cells,
-        "Success by object: trials, how the others ended, and the share with its 95 % "
-        "interval, which counts trials as independent.",
+        f"Success by object: trials, how the others ended, and the share with {words}.",
     )
 
 

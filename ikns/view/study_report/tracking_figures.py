@@ -144,7 +144,7 @@ def rmse_figure(found: TrackingSummary) -> Figure:
                     fmt=mark,
                     color=INK,
                     ms=5,
-                    capsize=3,
+                    capsize=3 if half else 0,
                     label="mean, 95 % interval",
                 )
             n = max((cells[c, level].subjects for c in found.conditions), default=0)

@@ -13,6 +13,7 @@ from ikns.statistics.wording import p_text
 from ikns.view.cells import Cell
 from ikns.view.parts import Picture, Section, Table
 from ikns.view.study_report.comparisons import (
+    NO_INTERVAL,
     NO_MARGIN,
     NO_TRIAL,
     ReportFigure,
@@ -43,6 +44,8 @@ def tracking_figures(found: TrackingSummary) -> list[ReportFigure]:
     """All figures of experiment 1; none without a trial."""
     if not len(found.trials()["rmse"]):
         return []
+    most = max(cell.over.subjects for cell in found.rmse)
+    spread = f", {NO_INTERVAL}" if most == 1 else " with its 95 % interval"
     return [
         ReportFigure(
             "tracking_traces",
@@ -63,7 +66,7 @@ def tracking_figures(found: TrackingSummary) -> list[ReportFigure]:
             "tracking_rmse",
             rmse_figure(found),
             "RMSE: a dot is a participant's mean over repeats, a line joins the same "
-            "participant; black: mean over participants with its 95 % interval.",
+            f"participant; black: mean over participants{spread}.",
             "Dots by condition, one panel per trajectory and one for all",
         ),
         ReportFigure(
