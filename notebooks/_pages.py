@@ -17,6 +17,7 @@ INCLUDED = {
     "benchmarks/README.md": "benchmarks",
     "urdf/README.md": "body",
 }
+_NAME = r"(?m)^    (\w+) +"  # in the package's help
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?://|#)([^)#\s]*)(#[^)\s]*)?\)")
 
 
@@ -28,7 +29,8 @@ def make_pages() -> None:
         text = lead_to_pages(text, (ROOT / source).parent, MADE)
         _write(MADE / f"{name}.md", text)
     _write(MADE / "commands.md", commands())
-    _write(MADE / "api.md", api())
+    for name, text in api().items():
+        _write(MADE / name, text)
 
 
 def _write(path: Path, text: str) -> None:
@@ -81,7 +83,7 @@ def _command(command: Any, name: str, level: int) -> list[str]:
     context = command.make_context(name, [], resilient_parsing=True)
     rows = [_row(p, context) for p in command.params if p.name != "help"]
     if rows:
-        own += ["| | |", "|---|---|", *rows, ""]
+        own += ["| option | what it does |", "|---|---|", *rows, ""]
     for inner, sub in getattr(command, "commands", {}).items():
         own += _command(sub, f"{name} {inner}", level + 1)
     return own
@@ -97,22 +99,47 @@ def _plain(text: str) -> str:
     return text.strip().replace("<", "\\<").replace("|", "\\|")
 
 
-def api() -> str:
-    """Make a page of every public name, by the sections of the package's help."""
+def api() -> dict[str, str]:
+    """Make a page of each section of the package's help, and one that leads to them.
+
+    Returns file names with their texts, in the order in which data pass.
+    """
     import ikns
 
-    stub = Path(ikns.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-    parts = ["# Python\n", "Everything here is `from ikns import ...`.\n"]
-    for title, body in re.findall(
-        r"^# (\w+)\n((?:(?!^# ).*\n)*)", stub, flags=re.MULTILINE
-    ):
-        names = re.findall(r" as (\w+)", body)
-        parts += [f"## {title}\n", "```{eval-rst}", ".. currentmodule:: ikns\n"]
-        for name in names:
-            kind = (
-                "autoclass" if isinstance(getattr(ikns, name), type) else "autofunction"
-            )
-            parts += [f".. {kind}:: {name}"]
-            parts += ["   :members:\n" if kind == "autoclass" else ""]
-        parts += ["```\n"]
-    return "\n".join(parts)
+    sections = re.findall(
+        r"^([A-Z]\w+)(?:: (.*))?\n((?:    .+\n)+)", ikns.__doc__ or "", re.MULTILINE
+    )
+    pages = {
+        f"python_{title.lower()}.md": _section(title, what, lines)
+        for title, what, lines in sections
+    }
+    parts = [
+        "# Python\n",
+        "Everything here is `from ikns import ...`, in the order in which data pass.\n",
+    ]
+    for title, what, lines in sections:
+        heading = f"[{title}](python_{title.lower()}.md)"
+        parts += [f"## {heading}\n", f"{what[0].upper()}{what[1:]}.\n" if what else ""]
+        parts += [_names(lines)]
+    listed = [f"{title} <python_{title.lower()}>" for title, _, _ in sections]
+    parts += ["```{toctree}\n:hidden:\n", *listed, "```\n"]
+    return {"python.md": "\n".join(parts)} | pages
+
+
+def _section(title: str, what: str, lines: str) -> str:
+    import ikns
+
+    name = f"{title}: {what}" if what else title
+    parts = [f"# {name}\n", _names(lines), "```{eval-rst}", ".. currentmodule:: ikns\n"]
+    for name in re.findall(_NAME, lines):
+        kind = "class" if isinstance(getattr(ikns, name), type) else "function"
+        parts += [f".. auto{kind}:: {name}"]
+        parts += ["   :members:\n" if kind == "class" else ""]
+    return "\n".join([*parts, "```\n"])
+
+
+def _names(lines: str) -> str:
+    """Table of names with what each is, leading to where it is described."""
+    rows = re.findall(rf"{_NAME}(.+)", lines)
+    table = [f"| {{py:obj}}`~ikns.{name}` | {_plain(what)} |" for name, what in rows]
+    return "\n".join(["| name | what it is |", "|---|---|", *table, ""])

@@ -172,10 +172,18 @@ def test_the_page_of_commands_has_every_option_of_the_program(
         assert options - {"--help"} <= set(re.findall(r"--[a-z][a-z-]+", section))
 
 
-def test_the_page_of_python_has_every_public_name() -> None:
-    page = _pages().api()
-    listed = re.findall(r"^\.\. auto(?:class|function):: (\w+)$", page, re.MULTILINE)
-    assert sorted(listed) == sorted(ikns.__all__)
+def test_the_pages_of_python_have_every_public_name_once_and_an_example() -> None:
+    leading, *pages = _pages().api().values()
+    described = [
+        re.findall(r"^\.\. auto(?:class|function):: (\w+)$", page, re.MULTILINE)
+        for page in pages
+    ]
+    # Each page, and the one that leads to them, lists what is described, in its order.
+    linked = [re.findall(r"`~ikns\.(\w+)`", page) for page in (leading, *pages)]
+    assert linked == [[name for page in described for name in page], *described]
+    assert sorted(linked[0]) == sorted(ikns.__all__)
+    for name in ikns.__all__:
+        assert ">>> " in getattr(ikns, name).__doc__, name
 
 
 def test_docs_opens_what_is_built_or_says_how(

@@ -112,8 +112,9 @@ def test_a_report_fits_and_is_accessible(report_page: Any) -> None:
     judge(page)
     # On the phone what goes on beyond an edge fades there, and nothing else does.
     faded = page.evaluate(
-        """[...document.querySelectorAll(".scroll, pre")].map(
-            x => [x.scrollWidth > x.clientWidth, getComputedStyle(x).maskImage !== "none"])"""
+        """[...document.querySelectorAll(".scroll, pre")].map(x => [
+            x.scrollWidth > x.clientWidth, getComputedStyle(x).maskImage !== "none"
+        ])"""
     )
     assert all(more == fades for more, fades in faded)
     assert len({more for more, _ in faded}) == 2

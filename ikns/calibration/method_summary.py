@@ -59,6 +59,16 @@ def method_summary(
         either kind, the share of reaches ``above_0.2``, the mean change with the
         ``turned_hand`` at the held places, all None where unknown; ``recommended`` for
         live use, and ``why``.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
+    >>> subject = ikns.calibrate(run.static.recording, [run.points.recording])
+    >>> found = method_summary(subject)
+    >>> sorted(found["methods"]), round(found["methods"]["intent"]["turned_hand"], 2)
+    (['intent', 'paper', 'proximal'], 0.0)
     """
     motions = [*(subject.motions if explorations is None else explorations)]
     kinds = {"between_places": motions, "natural": [*natural]}

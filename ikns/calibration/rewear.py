@@ -82,6 +82,16 @@ def rewear(
         As :func:`ikns.calibrate` raises it.
     InvalidInput
         When there is no natural movement, or the marker set is no longer known.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> person = ikns.virtual_subject(1)
+    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
+    >>> subject = ikns.calibrate(run.static.recording, [run.points.recording])
+    >>> again = rewear(subject, run.static.recording, [run.free.recording])
+    >>> sorted(again.report["rewear"])
+    []
     """
     if not natural:
         raise InvalidInput("expected natural movement of the new wearing, found none.")

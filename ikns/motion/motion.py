@@ -64,6 +64,18 @@ class Motion:
         :func:`ikns.motion.marker_ik.rejection.count_rejections`.
     reasons : tuple of str
         In words.
+
+    Examples
+    --------
+    >>> import ikns
+    >>> run = ikns.simulate_protocol(
+    ...     ikns.virtual_subject(1), seed=1, n_points=1, rate=25, quick=True
+    ... )
+    >>> motion = ikns.MarkerIK(run.subject.skeleton).track(run.static.recording)
+    >>> motion.hand_in_thorax.shape == (len(motion.time), 2, 3)
+    True
+    >>> bool(motion.hand_speed("right_arm").max() < 0.05)
+    True
     """
 
     time: Array
