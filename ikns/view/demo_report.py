@@ -310,9 +310,9 @@ def _methods_section(
         [
             Picture(
                 figures["methods"],
-                f"Left: a reach of {reach} without intent; c should not change. "
-                "Middle: the forearm turns while elbow and wrist stay; c should not "
-                "change. Right: the hand is held and the elbow lifted; c should follow.",
+                f"Left: a reach of {reach} without intent. Middle: the forearm turns "
+                "while elbow and wrist stay. In both c should not change. Right: the "
+                "hand is held and the elbow lifted; c should follow.",
                 "Three panels of the control signal, one line or cloud per method",
             )
         ],
