@@ -260,6 +260,20 @@ def test_the_3d_pages_fit_and_curves_seek(page: Any, tmp_path: Path) -> None:
     )
     assert legend["x"] + legend["width"] <= pane["x"]
     judge(page)
+    # On the phone every label is in sight; half a word takes 0.06 of half the width.
+    labels = page.evaluate(
+        """() => {
+            const places = [], place = viewer.camera.position.clone();
+            viewer.scene.updateMatrixWorld();
+            viewer.scene.traverse(x => {
+                if (x.isSprite)
+                    places.push(place.setFromMatrixPosition(x.matrixWorld).project(viewer.camera).x);
+            });
+            return places;
+        }"""
+    )
+    assert len(labels) > 3
+    assert max(map(abs, labels)) < 0.94
     with LiveView(map_scene(body, learned, chain, simulated=True), body) as live:
         page.goto(live.url)
         live.show(body.neutral(), time=1.0, c=0.5)
