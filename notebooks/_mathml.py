@@ -18,7 +18,9 @@ def visit_block(writer: Any, node: nodes.math_block) -> None:
         number = get_node_equation_number(writer, node)
         writer.body.append(f'<span class="eqno">({number})</span>')
     # A phone scrolls what is too wide; the number keeps its place.
-    writer.body.append('<div style="overflow-x: auto; margin-right: 3rem">')
+    writer.body.append(
+        '<div tabindex="0" style="overflow: auto hidden; margin-right: 3rem">'
+    )
     writer.body.append(tex2mathml(node.astext(), as_block=True))
     writer.body.append("</div></div>")
     raise nodes.SkipNode

@@ -1,5 +1,6 @@
 """Sphinx: pages and notebooks. Build with ``sphinx-build -W notebooks build/docs``."""
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,29 @@ def _lead_to_pages(app: Any, name: str, text: list[str]) -> None:
         text[0] = lead_to_pages(text[0], path.parent, path.parent)
 
 
+def _reach_by_keyboard(
+    app: Any, page: str, template: str, context: dict[str, Any], tree: Any
+) -> None:
+    """Let keys scroll what is wide, and captions of the sidebar say their level.
+
+    These are the serious findings of axe-core (WCAG 2.1) in what Sphinx and Furo write.
+    """
+    body = context.get("body", "")
+    body = re.sub(
+        r'<(pre|div class="table-wrapper[^"]*")(?=[ >])', r'<\1 tabindex="0"', body
+    )
+    # The formula in it scrolls, beside its number.
+    outer = '<div class="math-wrapper'
+    context["body"] = body.replace(
+        outer, outer.replace(" ", ' style="overflow: visible" ')
+    )
+    sidebar = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = sidebar.replace(
+        'role="heading"', 'role="heading" aria-level="2"'
+    )
+
+
 def setup(app: Any) -> None:
     """Links in pages lead to files, as a reader of the repository needs them."""
     app.connect("source-read", _lead_to_pages)
+    app.connect("html-page-context", _reach_by_keyboard, priority=900)  # after Furo
