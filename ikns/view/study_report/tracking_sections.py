@@ -241,6 +241,7 @@ def _metric_table(found: TrackingSummary) -> Table:
 def _with_spread(mean: float, deviation: float, decimals: int) -> str:
     if math.isnan(mean):
         return "–"
+    mean = round(mean, decimals) + 0.0  # no minus before a zero
     if math.isnan(deviation):
         return f"{mean:.{decimals}f}"
     return f"{mean:.{decimals}f}\u00a0±\u00a0{deviation:.{decimals}f}"
