@@ -64,7 +64,7 @@ def method_summary(
     --------
     >>> import ikns
     >>> person = ikns.virtual_subject(1)
-    >>> run = ikns.simulate_protocol(person, seed=1, rate=25, quick=True)
+    >>> run = ikns.simulate_protocol(person, seed=1, n_points=4, rate=25, quick=True)
     >>> subject = ikns.calibrate(run.static.recording, [run.points.recording])
     >>> found = method_summary(subject)
     >>> sorted(found["methods"]), round(found["methods"]["intent"]["turned_hand"], 2)
