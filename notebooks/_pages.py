@@ -31,6 +31,7 @@ def make_pages() -> None:
     _write(MADE / "commands.md", commands())
     for name, text in api().items():
         _write(MADE / name, text)
+    _write(MADE / "pages.css", style())
 
 
 def _write(path: Path, text: str) -> None:
@@ -97,6 +98,22 @@ def _row(option: Any, context: Any) -> str:
 
 def _plain(text: str) -> str:
     return text.strip().replace("<", "\\<").replace("|", "\\|")
+
+
+def style() -> str:
+    """Let what goes on beyond an edge fade there, as in the package's reports."""
+    report = (ROOT / "ikns" / "view" / "report.css").read_text(encoding="utf-8")
+    (edges,) = re.findall(
+        r"@keyframes edges \{.*?^\}$", report, re.DOTALL | re.MULTILINE
+    )
+    return (
+        f":is(pre, .table-wrapper, .math > div):not(:focus-visible) {{\n"
+        "  animation: edges linear both; animation-timeline: scroll(self inline);\n}\n"
+        f"{edges}\n"
+        "/* The formula in it scrolls, beside its number. */\n"
+        ".math-wrapper { overflow: visible; }\n"
+        "@media print { pre, .table-wrapper, .math > div { animation: none; } }\n"
+    )
 
 
 def api() -> dict[str, str]:

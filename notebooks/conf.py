@@ -39,6 +39,8 @@ html_theme = "furo"
 html_title = f"ikns {release}"
 html_theme_options = {"navigation_with_keys": True}
 html_math_renderer = "mathml"
+html_static_path = ["generated/pages.css"]
+html_css_files = ["pages.css"]
 html_show_copyright = False
 html_show_sphinx = False
 smartquotes = False  # two hyphens are an option
@@ -58,13 +60,8 @@ def _reach_by_keyboard(
     These are the serious findings of axe-core (WCAG 2.1) in what Sphinx and Furo write.
     """
     body = context.get("body", "")
-    body = re.sub(
+    context["body"] = re.sub(
         r'<(pre|div class="table-wrapper[^"]*")(?=[ >])', r'<\1 tabindex="0"', body
-    )
-    # The formula in it scrolls, beside its number.
-    outer = '<div class="math-wrapper'
-    context["body"] = body.replace(
-        outer, outer.replace(" ", ' style="overflow: visible" ')
     )
     sidebar = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = sidebar.replace(
