@@ -41,6 +41,8 @@ html_theme_options = {"navigation_with_keys": True}
 html_math_renderer = "mathml"
 html_static_path = ["generated/pages.css"]
 html_css_files = ["pages.css"]
+# Nobody looks for what the search and the tables of names find.
+html_use_index = html_domain_indices = html_copy_source = False
 html_show_copyright = False
 html_show_sphinx = False
 smartquotes = False  # two hyphens are an option
