@@ -1,6 +1,7 @@
 """What the pages show runs as it stands, or says what it needs."""
 
 import importlib.util
+import json
 import re
 import shutil
 import tomllib
@@ -21,6 +22,7 @@ RUNNING = [block for block in blocks("console", "python") if not block.needs]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
     "optional-dependencies"
 ]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 #: Commands with commands of their own.
 GROUPS = ("markers", "study")
 #: Seconds of free movement; pages play it in real time.
@@ -139,6 +141,13 @@ def test_links_to_files_lead_to_the_pages_made_of_them() -> None:
         "![a](../figures/elbow.gif)": "![a](../figures/elbow.gif)",
     }.items():
         assert pages.lead_to_pages(given, folder, folder) == made
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_every_picture_of_a_notebook_has_an_alternative_text(path: Path) -> None:
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        if any("image/png" in out.get("data", {}) for out in cell.get("outputs", [])):
+            assert cell["metadata"]["mystnb"]["image"]["alt"]
 
 
 def test_pictures_of_the_pages_take_a_megabyte_at_most() -> None:
