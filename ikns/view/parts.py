@@ -142,12 +142,14 @@ class ReportPage:
         self.figures += 1
         share = min(100.0, 100 * picture.figure.get_figwidth() / PAGE_WIDTH)
         # Text has one size in all pictures, so a narrow figure stays narrow; on a phone
-        # a wide one is scrolled.
+        # (22 rem) a wide one is scrolled.
+        least = round(0.4 * share)
+        kind = "scroll picture wide" if least > 22 else "scroll picture"
         return (
-            f'<figure><div class="scroll picture" tabindex="0" role="group" '
+            f'<figure><div class="{kind}" tabindex="0" role="group" '
             f'aria-label="Figure {self.figures}">'
             f'<img src="{data_uri(picture.figure)}" '
-            f'style="width: {share:.0f}%; min-width: {0.4 * share:.0f}rem" '
+            f'style="width: {share:.0f}%; min-width: {least}rem" '
             f'alt="{escape(picture.alt)}"></div>\n'
             f"<figcaption><b>Figure {self.figures}.</b> {inline(picture.caption)}"
             f"{self.suffix}</figcaption></figure>"
