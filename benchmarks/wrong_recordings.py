@@ -119,6 +119,7 @@ def judge(person: Person, a: str, b: str, share: float, rng) -> dict:
         static=static if share == 1.0 else None,
         skeleton=None if share == 1.0 else person.skeleton,
         marker_set=person.marker_set,
+        min_static=0.1,  # people of UE_ADL stand still for 0.2 to 3.9 s
     )
     spent = time.process_time() - start
     told = [f for f in found.findings if f.severity != "note"]
@@ -163,7 +164,9 @@ def false_alarms(folder: Path, people: list[str], *, quick: bool) -> list[dict]:
         recordings = [read(path) for path in files]
         static = read(folder / name / f"{name}_static.csv")
         start = time.process_time()
-        found = check_recordings(recordings, static=static, marker_set="ue_adl")
+        found = check_recordings(
+            recordings, static=static, marker_set="ue_adl", min_static=0.1
+        )
         alone = check_recordings(recordings, marker_set="ue_adl")
         rows.append(
             {

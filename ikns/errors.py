@@ -56,6 +56,23 @@ class RecordingWarning(UserWarning):
         self.source, self.note = str(source), note
 
 
+def plain(error: Exception) -> str:
+    """Say why a file could not be read or written, without Python's own words.
+
+    >>> plain(FileNotFoundError(2, "No such file or directory", "a.toml"))
+    'no such file or directory'
+    >>> plain(UnicodeDecodeError("utf-8", b"?", 0, 1, "invalid start byte"))
+    'it is not text in UTF-8'
+    """
+    if isinstance(error, OSError):
+        return (error.strerror or str(error)).lower()
+    if isinstance(error, UnicodeDecodeError):
+        return "it is not text in UTF-8"
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
+    return str(error).rstrip(".")
+
+
 @contextmanager
 def naming(source: str) -> Iterator[None]:
     """Put the name of a file before the sentence of an error that lacks it.

@@ -271,7 +271,10 @@ def test_real_people_pass_and_their_wrong_recordings_do_not(data):
         static = statics[name] = read(folder / name / f"{name}_static.csv")
         files = [folder / name / f"{name}{trial}.csv" for trial in ("CL1", "FR1")]
         found = check_recordings(
-            [read(path) for path in files], static=static, marker_set="ue_adl"
+            [read(path) for path in files],
+            static=static,
+            marker_set="ue_adl",
+            min_static=0.5,
         )
         assert [f for f in found.findings if f.severity != "note"] == []
     reach = read(folder / "ADL008" / "ADL008FR1.csv")

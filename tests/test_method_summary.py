@@ -72,6 +72,9 @@ def test_a_method_is_recommended_for_live_use(moved):
     cost = {m: rows[m]["natural"] + rows[m]["turned_hand"] for m in ("paper", "intent")}
     assert best == min(cost, key=cost.get)
     assert f"{rows[best]['turned_hand']:.2f} with a turned hand" in found["why"]
+    # What decides is printed, also where one of the two says the opposite.
+    for sum_of_two in cost.values():
+        assert f"({sum_of_two / 2:.2f} on average)" in found["why"]
 
 
 def test_a_range_smaller_than_a_reach_s_change_is_no_range(moved):

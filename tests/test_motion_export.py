@@ -1,14 +1,18 @@
 """A motion for other programs: OpenSim, pandas, xarray, marker files."""
 
 import sys
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, RecordingWarning
 from ikns.motion.export import fitted_markers, motion_coordinates, write_motion
+from ikns.motion.gimbal import gimbal_sentence, xyz_angles
 from ikns.motion.motion import Motion
 from ikns.motion.unseen import warn_unseen
 from ikns.recording.files import read
@@ -17,6 +21,7 @@ from ikns.recording.recording import Recording
 
 SKELETON = Skeleton.load()
 T, J = 6, len(SKELETON.joint_names)
+angles = st.floats(-180, 180)
 
 
 def motion(*, unseen=None):
@@ -80,6 +85,99 @@ def test_turning_on_and_on_makes_no_jump():
     turned = Motion(**{**vars(moved), "q": q})
     found = motion_coordinates(turned).values[:, 3]
     np.testing.assert_allclose(found, np.degrees(angle), atol=1e-9)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    start=st.tuples(angles, st.sampled_from([-90, -80, 0, 90]), angles),
+    step=st.tuples(*3 * [st.floats(-0.2, 0.2)]),
+)
+def test_any_turning_has_angles_that_give_it_back(start, step):
+    first = Rotation.from_euler("XYZ", start, degrees=True)
+    turns = Rotation.from_rotvec(np.outer(np.arange(40), step))
+    expected = (first * turns).as_matrix()
+    found = xyz_angles(expected)
+    # In gimbal lock the angles of a matrix are exact to the root of its rounding.
+    back = Rotation.from_euler("XYZ", found).as_matrix()
+    np.testing.assert_allclose(back, expected, atol=1e-7)
+    # Of two triples the nearer one is taken: the other is pi away in every angle.
+    away = np.diff(found, axis=0)
+    assert np.abs(away).max(initial=0) <= np.pi + 1e-9
+
+
+def test_a_turn_through_gimbal_lock_goes_on_and_is_told():
+    moved = motion()
+    turn = np.radians([0, 45, 88, 90, 135, 200])
+    q = moved.q.copy()
+    q[:, 3:7] = Rotation.from_rotvec(np.outer(turn, [0, 1, 0])).as_quat()
+    turned = Motion(**{**vars(moved), "q": q})
+    found = motion_coordinates(turned).values[:, 3:6]
+    np.testing.assert_allclose(found[:, 1], np.degrees(turn), atol=1e-6)
+    np.testing.assert_allclose(found[:, [0, 2]], 0, atol=1e-6)
+    assert "thorax_rx and thorax_rz in 2 of 6 frames" in gimbal_sentence(
+        turned, thorax=True
+    )
+    assert gimbal_sentence(turned, thorax=False) == ""
+    # An arm straight ahead at shoulder height, in one frame.
+    ahead = turned.q.copy()
+    ahead[4, 7 + SKELETON.joint_names.index("left_shoulder_flexion")] = np.pi / 2
+    told = gimbal_sentence(Motion(**{**vars(turned), "q": ahead}), thorax=False)
+    assert "left_shoulder_abduction and left_shoulder_rotation in 1 of 6" in told
+
+
+def places_by_the_book(path, values):
+    """Markers of an .osim file, its frames multiplied out as OpenSim documents them."""
+    model = ElementTree.parse(path).getroot().find("Model")
+
+    def frame(part):
+        place, turn = (
+            np.array(part.findtext(tag).split(), float)
+            for tag in ("translation", "orientation")
+        )
+        whole = np.eye(4)
+        whole[:3, 3], whole[:3, :3] = (
+            place,
+            Rotation.from_euler("XYZ", turn).as_matrix(),
+        )
+        return part.findtext("socket_parent"), whole
+
+    bodies = {}
+    for joint in model.find("JointSet/objects"):
+        value = {c.get("name"): values[c.get("name")] for c in joint.iter("Coordinate")}
+        moved = np.eye(4)
+        if joint.tag == "FreeJoint":
+            moved[:3, :3] = Rotation.from_euler(
+                "XYZ", [*value.values()][:3]
+            ).as_matrix()
+            moved[:3, 3] = [*value.values()][3:]
+            bodies[joint.findtext("socket_child_frame")] = moved
+            continue
+        parent, child = map(frame, joint.find("frames"))
+        if joint.tag == "PinJoint":
+            moved[:3, :3] = Rotation.from_euler("Z", [*value.values()]).as_matrix()
+        bodies[child[0]] = (
+            bodies[parent[0]] @ parent[1] @ moved @ np.linalg.inv(child[1])
+        )
+    return {
+        m.get("name"): bodies[m.findtext("socket_parent_frame")]
+        @ [*map(float, m.findtext("location").split()), 1.0]
+        for m in model.iter("Marker")
+    }
+
+
+def test_a_model_of_opensim_moves_its_markers_as_the_body_does(tmp_path):
+    # OpenSim 4.6 itself put them there too, to 3e-12 m, at five postures.
+    moved, path = motion(), tmp_path / "body.osim"
+    assert write_motion(path, moved, SKELETON) == ""
+    table = motion_coordinates(moved)
+    for q, row in zip(moved.q, table.values, strict=True):
+        values = np.radians(row)
+        values[:3] = row[:3]
+        found = places_by_the_book(path, dict(zip(table.names, values, strict=True)))
+        expected = SKELETON.markers_in_world(q)
+        for label, place in zip(SKELETON.marker_set.labels, expected, strict=True):
+            # Twelve digits are printed of places and angles.
+            np.testing.assert_allclose(found[label][:3], place, atol=1e-9)
 
 
 @pytest.mark.parametrize("ending", [".mot", ".sto"])
@@ -155,7 +253,7 @@ def test_markers_that_a_recording_lacks_are_told(chain, lost):
 
 
 def test_an_unknown_ending_is_refused(tmp_path):
-    with pytest.raises(InvalidInput, match=r"\.csv, \.mot, \.sto, \.trc, \.c3d, found"):
+    with pytest.raises(InvalidInput, match=r"\.c3d, \.osim, found"):
         write_motion(tmp_path / "motion.xlsx", motion(), SKELETON)
 
 

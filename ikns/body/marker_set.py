@@ -17,7 +17,7 @@ import numpy as np
 
 from ikns.arrays import Array, Indices
 from ikns.body.model_file import urdf_folder
-from ikns.errors import FileError, MarkerMismatch
+from ikns.errors import FileError, MarkerMismatch, plain
 
 #: Added to a label by a reader when a file gives it to several markers.
 _NUMBER = re.compile(r" #\d+$")
@@ -96,7 +96,7 @@ class MarkerSet:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise FileError(
-                f"{path}: cannot be read as a marker set: {error}"
+                f"{path}: cannot be read as a marker set: {plain(error)}."
             ) from None
         if table.get("format") != _FORMAT:
             raise FileError(
@@ -157,8 +157,7 @@ class MarkerSet:
         """
         places: dict[str, list[int]] = {}
         for column, label in enumerate(labels):
-            key = label.rsplit(":", 1)[-1].strip().casefold()
-            for name in {key, _NUMBER.sub("", key)}:
+            for name in label_keys([label]):
                 places.setdefault(name, []).append(column)
         found = np.full(len(self.markers), -1, dtype=np.int64)
         for i, marker in enumerate(self.markers):
@@ -213,6 +212,16 @@ class MarkerSet:
             for marker, p in zip(self.markers, positions, strict=True)
         )
         return replace(self, markers=moved)
+
+
+def label_keys(labels: Iterable[str]) -> set[str]:
+    """Names that labels stand for: without a subject, case and a reader's number.
+
+    >>> sorted(label_keys(["Ann:RSHO", "C7 #2"]))
+    ['c7', 'c7 #2', 'rsho']
+    """
+    keys = {label.rsplit(":", 1)[-1].strip().casefold() for label in labels}
+    return keys | {_NUMBER.sub("", key) for key in keys}
 
 
 def _several(marker: str, labels: Sequence[str]) -> str:

@@ -196,30 +196,31 @@ def _mean(values: Array) -> float | None:
 def _recommended(
     rows: dict[str, dict[str, float | None]], counts: dict[str, int]
 ) -> dict[str, str]:
-    """Choose the method whose c moves least, of those that run live."""
+    """Choose the method whose c moves least, of those that run live.
+
+    By the mean of what a reach and a turned hand do to c, where both are known.
+    """
     kind = next(
         (k for k in ("natural", "between_places") if counts[k] >= _FEWEST), None
     )
     words = {"natural": "a natural reach", "between_places": "a reach between places"}
-    cost = {}
-    for method in _LIVE:
-        if method not in rows:
-            continue
-        values = [rows[method]["turned_hand"]]
-        values += [] if kind is None else [rows[method][kind]]
-        told = [value for value in values if value is not None]
-        cost[method] = float(np.mean(told)) if told else np.inf
+    known = [m for m in _LIVE if m in rows]
+    causes = {} if kind is None else {kind: words[kind]}
+    causes |= {"turned_hand": "a turned hand"}
+    moved = {
+        m: [v for v in (rows[m][cause] for cause in causes) if v is not None]
+        for m in known
+    }
+    cost = {m: float(np.mean(moved[m])) if moved[m] else np.inf for m in known}
     best = min(cost, key=lambda method: cost[method])
     if len(cost) == 1:
         return {"recommended": best, "why": f"{best} is the only method available"}
 
     def told_of(method: str) -> str:
-        row = rows[method]
-        parts = [] if kind is None else [(row[kind], words[kind])]
-        parts.append((row["turned_hand"], "a turned hand"))
-        return " and ".join(
-            f"{v:.2f} with {name}" for v, name in parts if v is not None
-        )
+        values = [(rows[method][cause], name) for cause, name in causes.items()]
+        parts = [f"{v:.2f} with {name}" for v, name in values if v is not None]
+        mean = f" ({cost[method]:.2f} on average)" if len(parts) > 1 else ""
+        return " and ".join(parts) + mean
 
     (other,) = (method for method in cost if method != best)
     why = f"its c moves by {told_of(best)}, that of {other} by {told_of(other)}"

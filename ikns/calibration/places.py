@@ -63,5 +63,5 @@ def check_places(hand_in_thorax: Array, *, n_points: int) -> None:
         raise NotEnoughData(
             f"expected {n_points} held places, found one: the still hand stays within "
             f"{1e3 * far:.0f} mm; hold it at places at least {1e3 * ONE_PLACE:.0f} mm "
-            "apart, or ask for 1 with --points (n_points)."
+            "apart, or ask for 1 with --points."
         )

@@ -99,7 +99,7 @@ def rewear(
     if marker_set is None and worn not in MarkerSet.names():
         raise InvalidInput(
             f"the calibration was with the markers of '{worn}', a custom set; "
-            "give its .toml file with --marker-set (marker_set)."
+            "give its .toml file with --marker-set."
         )
     chain = subject.chain
     names = ", ".join(recording.source for recording in natural)

@@ -74,7 +74,9 @@ def scaled_body(
         markers = worn.pick(recording.labels, recording.markers)
         seen |= np.isfinite(markers).all(axis=2).any(axis=0)
     source = ", ".join(recording.source for recording in recordings)
-    worn = replace(worn, held=worn.held + absent_joints(source, worn, seen))
+    labels = [label for recording in recordings for label in recording.labels]
+    absent = absent_joints(source, worn, seen, labels)
+    worn = replace(worn, held=worn.held + absent)
     kept = _known_places(worn)
     skeleton = generic.with_nominal_markers(worn.only(kept))
     lengths = skeleton.segment_lengths

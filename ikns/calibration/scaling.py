@@ -14,6 +14,7 @@ from ikns.arrays import Array
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding, refused, worst_first
+from ikns.calibration.judge.labels import judge_labels
 from ikns.calibration.judge.static import body_size, judge_posture, movement
 from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.size_fit import (
@@ -164,6 +165,9 @@ def judge_static(
     worn = (
         marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
     )
+    others = judge_labels(where, static.labels, worn, calibrated=known)
+    if refused(others):
+        return StaticJudgment(others, None, None)
     markers = worn.pick(static.labels, static.markers)
     size = body_size(where, markers, generic.with_nominal_markers(worn))
     if size:
@@ -178,7 +182,7 @@ def judge_static(
     reference, target, duration = static_posture(
         generic, kept, marker_set=worn, min_duration=min_duration
     )
-    findings = traces + movement(where, worn.labels, measured[~spoiled])
+    findings = others + traces + movement(where, worn.labels, measured[~spoiled])
     if refused(findings):
         return StaticJudgment(worst_first(findings), None, None)
     # The judge knows people, not this one: a known body must not look exchanged only

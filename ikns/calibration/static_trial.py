@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import numpy as np
 from ikns.arrays import Array, Mask
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.marker_set import MarkerSet
+from ikns.body.set_choice import better_set, set_advice
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.finding import Finding
 from ikns.errors import MarkerMismatch, NotEnoughData
 from ikns.numerics.rigid import rigid_transform
 from ikns.recording.recording import Recording
@@ -36,18 +39,37 @@ def static_posture(
     worn = (
         marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
     )
-    duration = float(static.time[-1] - static.time[0]) if len(static.time) else 0.0
-    duration += 1 / static.rate if len(static.time) > 1 else 0.0
-    if duration < min_duration * (1 - 1e-6):
-        raise NotEnoughData(
-            f"{static.source}: expected a static trial of at least "
-            f"{min_duration:g} s, found {duration:.2f} s; --min-static (min_duration, "
-            "min_static) accepts a shorter one."
-        )
+    if short := too_short(static, min_duration):
+        raise NotEnoughData(short[0].sentence)
     target = _mean_posture(static, worn)
-    absent = absent_joints(static.source, worn, seen_markers(target))
+    absent = absent_joints(static.source, worn, seen_markers(target), static.labels)
     worn = replace(worn, held=worn.held + absent)
-    return generic.with_nominal_markers(worn), target, duration
+    return generic.with_nominal_markers(worn), target, trial_seconds(static)
+
+
+def trial_seconds(static: Recording) -> float:
+    """Return how long a trial is, s: from its first frame to the end of its last."""
+    if len(static.time) < 2:
+        return 0.0
+    return float(static.time[-1] - static.time[0]) + 1 / static.rate
+
+
+def too_short(static: Recording, min_duration: float) -> list[Finding]:
+    """Say that a static trial is shorter than so many seconds."""
+    seconds = trial_seconds(static)
+    if seconds >= min_duration * (1 - 1e-6):
+        return []
+    return [
+        Finding(
+            "short",
+            "refuse",
+            static.source,
+            f"the static trial lasts {seconds:.2f} s, expected at least "
+            f"{min_duration:g} s",
+            f"record a longer one, or accept it with --min-static "
+            f"{np.floor(10 * seconds) / 10:g}",
+        )
+    ]
 
 
 def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
@@ -58,7 +80,8 @@ def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
         raise MarkerMismatch(
             f"{static.source}: expected markers of {worn.name} "
             f"({', '.join(worn.labels[:4])}, ...), found "
-            f"{', '.join(static.labels[:4]) or 'none'}; choose the right marker set."
+            f"{', '.join(static.labels[:4]) or 'none'}; "
+            f"{set_advice(worn, static.labels)}."
         )
     # No one stands quite still, so markers averaged over different frames do not match:
     # where enough frames show everything, only those count.
@@ -81,10 +104,13 @@ def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
     return mean
 
 
-def absent_joints(source: str, worn: MarkerSet, seen: Mask) -> tuple[str, ...]:
+def absent_joints(
+    source: str, worn: MarkerSet, seen: Mask, labels: Sequence[str]
+) -> tuple[str, ...]:
     """Joints of an arm without any marker; one segment without markers is an error.
 
-    `seen` (M,) says which markers of the set the recordings of this `source` show.
+    `seen` (M,) says which markers of the set the recordings of this `source` show,
+    which have these `labels`.
     """
     links = {m.link for m in worn.markers}
     shown = {m.link for m, s in zip(worn.markers, seen, strict=True) if s}
@@ -97,9 +123,10 @@ def absent_joints(source: str, worn: MarkerSet, seen: Mask) -> tuple[str, ...]:
     bare = sorted(links - shown)
     if bare:
         wanted = [m.label for m in worn.markers if m.link == bare[0]]
+        advice = f"; {set_advice(worn, labels)}" if better_set(worn, labels) else ""
         raise MarkerMismatch(
             f"{source}: the segment {bare[0]} has no marker; expected at least "
-            f"one of {', '.join(wanted)} of {worn.name}."
+            f"one of {', '.join(wanted)} of {worn.name}{advice}."
         )
     return tuple(joint for joint in absent if joint not in worn.held)
 

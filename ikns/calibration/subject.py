@@ -26,7 +26,7 @@ from ikns.calibration.subject_files import (
     SAMPLES,
     check_subject_folder,
 )
-from ikns.errors import FileError, IknsError, InvalidInput, naming
+from ikns.errors import FileError, IknsError, InvalidInput, naming, plain
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.readout import METHODS, Method, Readout
@@ -300,7 +300,7 @@ def _read_samples(path: Path, *, n_points: int) -> Array | None:
         if np.any((point % 1 != 0) | (point < 0) | (point > n_points)):
             raise InvalidInput(f"points 0 to {n_points} were expected.")
     except (OSError, ValueError) as error:
-        fault = f"{error}" if isinstance(error, IknsError) else f"({error})."
+        fault = f"{error}" if isinstance(error, IknsError) else f"({plain(error)})."
         raise FileError(
             f"{path}: cannot be read as still samples: {fault} Only pictures need "
             "them: the file can be deleted."
@@ -330,7 +330,7 @@ def _read_json(path: Path) -> dict[str, Any]:
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise FileError(f"{path}: cannot be read as JSON: {error}.") from None
+        raise FileError(f"{path}: cannot be read as JSON: {plain(error)}.") from None
     version = table.get("format") if isinstance(table, dict) else None
     if version != FORMAT:
         raise FileError(

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any
 
 import typer
 
@@ -18,6 +18,7 @@ import ikns
 from ikns.cli.checks import checked
 from ikns.cli.output import erase_loading
 from ikns.cli.repairs import repairs, tell
+from ikns.cli.usage import kind_of, usage_sentence
 from ikns.endings import BROKEN_PIPE, signal_exit_code
 from ikns.errors import DataLoss, InvalidInput
 
@@ -104,12 +105,9 @@ def _run(given: list[str]) -> int:
             standalone_mode=False,
         )
     except typer.TyperException as error:  # such as an unknown option
-        message = error.format_message()
+        message = usage_sentence(error, given)
         if not message:  # no arguments at all: the help was printed
             return 2
-        message = _range_sentence(error, given) or (
-            f"{message.rstrip('.')}; see ikns --help."
-        )
     except DataLoss as error:
         sys.stderr.write(f"ikns: {' '.join(str(error).split())}\n")
         return 1
@@ -140,19 +138,28 @@ def command_parser(*names: str) -> Any:
 
 
 def _name_values(command: Any) -> None:
-    """Name what options take as people do: NUMBER and PATH, not <float range>."""
+    """Name what a command takes as people do: NUMBER, RECORDING, not <float range>."""
     for part in getattr(command, "commands", {}).values():
         _name_values(part)
     # Lines of a docstring are not those of a terminal.
     paragraphs = (command.help or "").split("\n\n")
     command.help = "\n\n".join(" ".join(text.split()) for text in paragraphs)
-    for option in command.get_params(typer.Context(command)):  # --help too
-        kind = option.type_descriptor.annotation
-        kind = get_args(kind)[0] if get_origin(kind) is list else kind
-        if option.param_type_name == "option" and option.metavar is None:
-            option.metavar = _VALUES.get(kind)
+    for part in command.get_params(typer.Context(command)):  # --help too
+        if part.metavar is None:
+            part.metavar = _value_name(part)
+        if part.param_type_name == "argument":
+            part.display_type_rich = lambda **_: ""  # its help says what it is
         # Ranges leave no room for words; who is beyond one is told it.
-        option._get_number_range_help_str = lambda: None
+        part._get_number_range_help_str = lambda: None
+
+
+def _value_name(part: Any) -> str:
+    """Name what an argument or option takes."""
+    if part.param_type_name == "argument":
+        return str(part.name).upper()
+    if choices := part.type_descriptor.choices:
+        return "|".join(map(str, choices))
+    return _VALUES[kind_of(part)]
 
 
 def _refuse_empty(argv: Sequence[str]) -> None:
@@ -163,25 +170,6 @@ def _refuse_empty(argv: Sequence[str]) -> None:
         if not (value if named == option else argument):
             where = f"for {named}" if named.startswith("--") else "as an argument"
             raise InvalidInput(f"expected a value {where}, found an empty one.")
-
-
-def _range_sentence(error: typer.TyperException, argv: Sequence[str]) -> str:
-    """Say which numbers an option takes and which it got; empty if it takes others."""
-    parameter = getattr(error, "param", None)
-    least, most = (getattr(parameter, name, None) for name in ("min", "max"))
-    if parameter is None or (least is None and most is None):
-        return ""
-    found = ""
-    for option, value in pairwise([*argv, ""]):
-        name, equals, rest = option.partition("=")
-        if name in parameter.opts:
-            found = rest if equals else value
-    bounds = " ".join(
-        f"{word} {bound:.12g}"
-        for word, bound in (("from", least), ("up to" if least is None else "to", most))
-        if bound is not None
-    )
-    return f"expected a number {bounds} for {parameter.opts[-1]}, found {found}."
 
 
 def _repeat(option: str, argv: Sequence[str]) -> list[str]:

@@ -16,7 +16,7 @@ import ikns
 from ikns.cli.calibration_options import check_options
 from ikns.cli.calibration_tables import calibration_parts, methods_parts, shift_sentence
 from ikns.cli.live_calibration import LiveOptions, record_live
-from ikns.cli.options import AsJson, Force, From, MarkerSetName, To
+from ikns.cli.options import AsJson, Force, From, MarkerSetName, MinStatic, To
 from ikns.cli.output import notes, progress, show
 from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput
@@ -159,10 +159,7 @@ def calibrate(
         Literal["nearest", "project", "nan"],
         typer.Option(help="Which map to use outside the volume of the points."),
     ] = "nearest",
-    min_static: Annotated[
-        float,
-        typer.Option(help="Shortest static trial accepted, s.", min=0.0, max=3600.0),
-    ] = 1.0,
+    min_static: MinStatic = 1.0,
     min_still: Annotated[
         float,
         typer.Option(

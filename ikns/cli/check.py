@@ -8,7 +8,14 @@ from typing import Annotated
 import typer
 
 import ikns
-from ikns.cli.options import MARKER_FILES, AsJson, From, OptionalMarkerSet, To
+from ikns.cli.options import (
+    MARKER_FILES,
+    AsJson,
+    From,
+    MinStatic,
+    OptionalMarkerSet,
+    To,
+)
 from ikns.cli.output import show, table
 from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput, MarkerMismatch
@@ -30,6 +37,7 @@ def check(
         typer.Option(help="Subject folder to compare with."),
     ] = None,
     marker_set: OptionalMarkerSet = None,
+    min_static: MinStatic = 1.0,
     from_: From = None,
     to: To = None,
     as_json: AsJson = False,
@@ -55,6 +63,7 @@ def check(
         static=None if static is None else read(static),
         skeleton=None if subject is None else ikns.Subject.load(subject).skeleton,
         marker_set=marker_set or "oxford24",
+        min_static=min_static,
     )
     shown = {
         "refuse": "do not use",

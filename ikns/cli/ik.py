@@ -10,7 +10,15 @@ from typing import Annotated
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force, From, OptionalMarkerSet, RecordingFile, To
+from ikns.cli.options import (
+    AsJson,
+    Force,
+    From,
+    MinStatic,
+    OptionalMarkerSet,
+    RecordingFile,
+    To,
+)
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput, naming
@@ -32,14 +40,12 @@ def ik(
     out: Annotated[
         list[Path] | None,
         typer.Option(
-            help="File to write, may be repeated: .csv, .mot or .sto with joint "
-            "angles, .trc or .c3d with the fitted markers. Default: motion.csv."
+            help="File to write; repeat for more: .csv, .mot or .sto with joint "
+            "angles, .trc or .c3d with the fitted markers, .osim with the body for "
+            "OpenSim. Default: motion.csv."
         ),
     ] = None,
-    min_static: Annotated[
-        float,
-        typer.Option(help="Shortest static trial accepted, s.", min=0.0, max=3600.0),
-    ] = 1.0,
+    min_static: MinStatic = 1.0,
     from_: From = None,
     to: To = None,
     force: Force = False,
@@ -52,6 +58,9 @@ def ik(
     the thorax in frames that do not show it, and those of an arm in frames whose
     markers cannot be right; .mot and .sto, which have no empty cells, are without such
     frames. A recording that must not be used is refused, as by `ikns check`.
+
+    No model that comes with OpenSim has the joints of this body: write --out body.osim
+    too, open it in OpenSim, and load the .mot there as a motion.
     """
     from ikns.motion.file_names import check_motion_file
 
@@ -74,6 +83,8 @@ def ik(
 
     from ikns.calibration.judged_motion import judged_motion
     from ikns.motion.export import write_motion
+    from ikns.motion.file_names import MODEL, STORAGE
+    from ikns.motion.gimbal import gimbal_sentence
     from ikns.motion.table import motion_table
 
     left_out: list[str] = []
@@ -102,6 +113,14 @@ def ik(
             progress=partial(report, "joint angles"),
         )
     told = [write_motion(path, motion, skeleton, force=force) for path in outputs]
+    endings = {path.suffix.lower() for path in outputs}
+    angles = bool(endings & {*STORAGE})
+    told.append(gimbal_sentence(motion, thorax=angles))
+    if angles and MODEL not in endings:
+        told.append(
+            "the coordinates are those of this body, which no model that comes with "
+            f"OpenSim has; --out body{MODEL} writes it as a model."
+        )
     said = [*left_out, *(sentence for sentence in told if sentence), *warned]
     csv = next((path for path in outputs if path.suffix.lower() == ".csv"), None)
     found = motion_table(motion)

@@ -11,7 +11,7 @@ import typer
 import ikns
 from ikns.cli.checks import checked
 from ikns.cli.marker_questions import ask_sites
-from ikns.cli.options import AsJson, Force
+from ikns.cli.options import AsJson, Force, MinStatic
 from ikns.cli.output import held_sentences, notes, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput, naming
@@ -32,9 +32,6 @@ SetArgument = Annotated[
     typer.Argument(
         metavar="SET", help="A name that `ikns markers list` shows, or a .toml file."
     ),
-]
-MinStatic = Annotated[
-    float, typer.Option(help="Shortest static trial accepted, s.", min=0.0, max=3600.0)
 ]
 
 

@@ -96,6 +96,10 @@ OptionalMarkerSet = Annotated[
         "of a .toml file."
     ),
 ]
+MinStatic = Annotated[
+    float,
+    typer.Option(help="Shortest static trial accepted, s.", min=0.0, max=3600.0),
+]
 #: What reads c off recordings.
 AnyMethod = Annotated[
     Literal["paper", "proximal", "intent"],

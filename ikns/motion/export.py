@@ -9,10 +9,12 @@ import numpy as np
 from ikns.arrays import Array
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.motion.file_names import FITTED, check_motion_file
+from ikns.motion.file_names import FITTED, MODEL, check_motion_file
+from ikns.motion.gimbal import xyz_angles
 from ikns.motion.motion import Motion
+from ikns.motion.opensim_model import opensim_model
 from ikns.motion.table import motion_table
-from ikns.output.file import write_csv
+from ikns.output.file import write_csv, write_text
 from ikns.recording.files import write
 from ikns.recording.files.storage import (
     CoordinateTable,
@@ -31,8 +33,9 @@ def write_motion(
     ----------
     path : Path
         ``.csv``: the table of :func:`ikns.motion.table.motion_table`. ``.mot`` and
-        ``.sto``: coordinates for OpenSim, in degrees and meters. ``.trc`` and
-        ``.c3d``: the markers where the fitted body carries them.
+        ``.sto``: coordinates for OpenSim, in degrees and meters. ``.osim``: the body
+        whose coordinates these are, as a model of OpenSim. ``.trc`` and ``.c3d``: the
+        markers where the fitted body carries them.
     motion : Motion
     skeleton : Skeleton
         The body that moves.
@@ -52,6 +55,9 @@ def write_motion(
         return ""
     if ending in FITTED:
         write(path, fitted_markers(skeleton, motion), force=force)
+        return ""
+    if ending == MODEL:
+        write_text(path, opensim_model(skeleton), force=force)
         return ""
     coordinates = motion_coordinates(motion)
     if not len(coordinates.time):
@@ -119,6 +125,6 @@ def _rotations(quaternions: Array) -> Array:
     angles = np.full((len(quaternions), 3), np.nan)
     known = np.isfinite(quaternions).all(axis=1)
     if known.any():
-        turned = Rotation.from_quat(quaternions[known]).as_euler("XYZ")
-        angles[known] = np.degrees(np.unwrap(turned, axis=0))
+        turned = Rotation.from_quat(quaternions[known]).as_matrix()
+        angles[known] = np.degrees(xyz_angles(turned))
     return angles

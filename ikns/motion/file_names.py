@@ -10,8 +10,11 @@ from ikns.recording.files.storage import STORAGE
 #: Endings of files with the markers of the fitted body.
 FITTED = (".trc", ".c3d")
 
+#: Ending of a model of OpenSim: the body alone.
+MODEL = ".osim"
+
 #: Endings that :func:`ikns.motion.export.write_motion` knows.
-MOTION_FILES = (".csv", *STORAGE, *FITTED)
+MOTION_FILES = (".csv", *STORAGE, *FITTED, MODEL)
 
 
 def check_motion_file(path: Path) -> None:

@@ -45,6 +45,19 @@ def turn_matrix(axis: Array, angle: float) -> Array:
     return quaternion_matrix(np.append(np.sin(half) * axis, np.cos(half)))
 
 
+def turn_to(axis: Array) -> Array:
+    """Return a rotation (3, 3) whose z axis points along a vector (3,).
+
+    >>> turn_to(np.array([0.0, -2.0, 0.0]))[:, 2].tolist()
+    [0.0, -1.0, 0.0]
+    """
+    z = axis / np.linalg.norm(axis)
+    x = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x -= z * (x @ z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
 def pose_steps(poses: Array) -> Array:
     """Return the step from each pose to the next, as seen from the first of the two.
 

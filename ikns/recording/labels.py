@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.recording.recording import Recording
 
 
@@ -95,7 +95,7 @@ def read_name_pairs(path: Path) -> dict[str, str]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{path}: cannot be read as text: {error}.") from None
+        raise FileError(f"{path}: cannot be read as text: {plain(error)}.") from None
     lines = [line.partition("#")[0] for line in lines]
     if not any(line.strip() for line in lines):
         raise FileError(f"{path}: expected a line OLD=NEW for each marker, found none.")

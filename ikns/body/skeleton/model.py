@@ -14,6 +14,7 @@ from ikns.body.chains import SIDES, chain_joints
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton.urdf import parse_urdf
 from ikns.errors import FileError
+from ikns.numerics.rigid import turn_to
 
 #: Columns of a configuration and of its tangent that hold the free flyer.
 NQ_ROOT, NV_ROOT = 7, 6
@@ -74,7 +75,7 @@ def joint_tree(model: pin.Model) -> tuple[Tree, Array]:
     for i, joint in enumerate(joints):
         kind, axis = _kind_and_axis(joint)
         kinds.append(kind)
-        turned[i] = _turn_to(axis)
+        turned[i] = turn_to(axis)
     parent = np.array([model.parents[i + 1] - 1 for i in range(len(joints))])
     rotation, translation = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
     for i, above in enumerate(parent):
@@ -110,12 +111,3 @@ def _kind_and_axis(joint: pin.JointModel) -> tuple[int, Array]:
     joint.calc(data, np.zeros(1))
     linear, angular = np.split(np.array(data.S).ravel(), 2)
     return (REVOLUTE, angular) if angular.any() else (PRISMATIC, linear)
-
-
-def _turn_to(axis: Array) -> Array:
-    """Rotation whose z axis is `axis`."""
-    z = axis / np.linalg.norm(axis)
-    x = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x -= z * (x @ z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])

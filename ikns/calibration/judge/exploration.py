@@ -21,10 +21,12 @@ from ikns.calibration.judge.distances import (
 )
 from ikns.calibration.judge.finding import (
     Finding,
+    refused,
     say_frames,
     say_markers,
     worst_first,
 )
+from ikns.calibration.judge.labels import judge_labels
 from ikns.calibration.judge.sides import other_side, sides_exchanged
 from ikns.calibration.judge.static import body_size
 from ikns.calibration.judge.steps import judge_steps
@@ -87,6 +89,11 @@ def _judge(
     recording: Recording, worn: MarkerSet, generic: Skeleton, skeleton: Skeleton | None
 ) -> list[Finding]:
     where = recording.source
+    others = judge_labels(
+        where, recording.labels, worn, calibrated=skeleton is not None
+    )
+    if refused(others):
+        return others
     if skeleton is None:
         worn = worn.without_static()
         pairs, apart = _pairs(worn), None
@@ -103,7 +110,7 @@ def _judge(
     findings, spoiled, measured = judge_traces(
         where, worn.labels, recording.time, markers
     )
-    findings += _repeated(where, markers)
+    findings = others + findings + _repeated(where, markers)
     if spoiled.all():
         return findings
     good = measured[~spoiled]

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 
 from ikns.body.marker_set import MarkerSet
+from ikns.body.set_choice import set_advice
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
 from ikns.calibration.judge.static import STILL_MARKERS, marker_displacement
 from ikns.calibration.judge.subjects import other_subject
 from ikns.calibration.scaling import judge_static
+from ikns.calibration.static_trial import too_short
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.recording.recording import Recording
 
 #: A recording in which so many markers stand still is a static trial. The others may be
 #: astray; in a walk on a treadmill only half of the upper body's move by so little.
 _STILL_SHARE = 0.8
-#: A static trial shorter than this is used on request only, s.
-_SHORT = 1.0
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,7 @@ def check_recordings(
     skeleton: Skeleton | None = None,
     generic: Skeleton | None = None,
     marker_set: str | Path | MarkerSet = "oxford24",
+    min_static: float = 1.0,
 ) -> Check:
     """Judge recordings of one person before they are used.
 
@@ -79,6 +80,8 @@ def check_recordings(
         Body to scale; the generic adult by default.
     marker_set : str, path or MarkerSet
         The markers on the person; the skeleton's own where there is one.
+    min_static : float
+        Shortest static trial to accept, s.
 
     Returns
     -------
@@ -121,7 +124,7 @@ def check_recordings(
     if static is not None:
         _require_markers(static, worn)
         found = judge_static(body, static, marker_set=worn, min_duration=0.0)
-        findings += [*found.findings, *_too_short(static)]
+        findings += [*found.findings, *too_short(static, min_static)]
         judged.append((static.source, "static trial"))
         skeleton = None if refused(found.findings) else found.skeleton
     for recording in recordings:
@@ -130,7 +133,7 @@ def check_recordings(
             findings += other_subject(static, recording, worn)
         elif skeleton is None and _still(recording, worn):
             found = judge_static(body, recording, marker_set=worn, min_duration=0.0)
-            findings += [*found.findings, *_too_short(recording)]
+            findings += [*found.findings, *too_short(recording, min_static)]
             judged.append((recording.source, "static trial"))
             continue
         findings += judge_exploration(recording, worn, body, skeleton=skeleton)
@@ -145,7 +148,8 @@ def _require_markers(recording: Recording, worn: MarkerSet) -> None:
         raise MarkerMismatch(
             f"{recording.source}: expected markers of {worn.name} "
             f"({', '.join(worn.labels[:4])}, ...), found "
-            f"{', '.join(recording.labels[:4])}, ...; choose the right marker set."
+            f"{', '.join(recording.labels[:4])}, ...; "
+            f"{set_advice(worn, recording.labels)}."
         )
 
 
@@ -157,19 +161,3 @@ def _still(recording: Recording, worn: MarkerSet) -> bool:
     if not seen.any():
         return False
     return float(np.quantile(spread[seen], _STILL_SHARE)) <= STILL_MARKERS
-
-
-def _too_short(static: Recording) -> list[Finding]:
-    seconds = len(static.time) / static.rate if len(static.time) > 1 else 0.0
-    if seconds >= _SHORT * (1 - 1e-6):
-        return []
-    return [
-        Finding(
-            "short",
-            "note",
-            static.source,
-            f"the static trial lasts {seconds:.2f} s",
-            f"calibrate with --min-static {np.floor(10 * seconds) / 10:g}, or record "
-            f"{_SHORT:g} s",
-        )
-    ]

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, InvalidInput, naming
+from ikns.errors import FileError, InvalidInput, naming, plain
 from ikns.experiments.picking.objects import OBJECT_IDS
 from ikns.experiments.study.design import Parameters, PickingDesign, TrackingDesign
 from ikns.experiments.study.tables import check_keys, choice, fill
@@ -112,10 +112,8 @@ def read_study(study: str | Path) -> Study:
             f"{path}: expected the file of a study, found none; ikns study init "
             "writes one."
         ) from None
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}.") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FileError(f"{path}: cannot be read as TOML: {error}.") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FileError(f"{path}: cannot be read as TOML: {plain(error)}.") from None
     with naming(str(path)):
         return study_from_table(table)
 

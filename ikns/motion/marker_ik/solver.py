@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from ikns.arrays import Array, Indices
 from ikns.body.chains import SIDES
+from ikns.body.set_choice import set_advice
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
 from ikns.motion.marker_ik.kernel import KernelSolver
@@ -175,7 +176,8 @@ class MarkerIK:
             raise MarkerMismatch(
                 f"{recording.source}: expected markers of {marker_set.name} "
                 f"({', '.join(marker_set.labels[:4])}, ...), found "
-                f"{', '.join(recording.labels[:4])}, ...; name the right marker set."
+                f"{', '.join(recording.labels[:4])}, ...; "
+                f"{set_advice(marker_set, recording.labels)}."
             )
         markers = np.ascontiguousarray(
             marker_set.pick(recording.labels, recording.markers), dtype=np.float64

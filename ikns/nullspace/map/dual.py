@@ -157,7 +157,7 @@ def _check_shown(centers: Array, faults: Sequence[str], n_dof: int) -> None:
             f"expected {n_dof} degrees of freedom at {least} of the {count} places or "
             "more, "
             f"found them at {good}: {listed}: explore each by itself there (lift the "
-            "elbow, turn the hand), or ask for fewer with --n-dof (n_dof)."
+            "elbow, turn the hand), or ask for fewer with --n-dof."
         )
     warnings.warn(
         f"{len(wrong)} of {count} places do not show {n_dof} degrees of freedom: "

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.output.file import sync
 from ikns.recording.files.c3d_encode import encode_c3d
 from ikns.recording.recording import Recording
@@ -84,7 +84,7 @@ def write_c3d(path: str | Path, recording: Recording, *, force: bool = False) ->
             sync(draft)
             draft.replace(path)
     except OSError as error:
-        raise FileError(f"{path}: the file cannot be written ({error}).") from None
+        raise FileError(f"{path}: cannot be written: {plain(error)}.") from None
 
 
 def _check_labels(recording: Recording) -> None:

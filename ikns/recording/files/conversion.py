@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ikns.arrays import Array, Mask
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.recording.recording import Recording
 
 #: Meters in one unit, by the spellings that cameras' software writes.
@@ -61,7 +61,7 @@ def existing_file(path: Path) -> int:
         with path.open("rb") as file:
             size = file.seek(0, os.SEEK_END)
     except OSError as error:
-        raise FileError(f"{path}: the file cannot be read ({error}).") from None
+        raise FileError(f"{path}: cannot be read: {plain(error)}.") from None
     if size == 0:
         raise FileError(f"{path}: expected a marker file, found an empty file.")
     return size

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.errors import FileError
+from ikns.errors import FileError, plain
 from ikns.recording.files.storage import STORAGE, read_storage
 
 _RAD = 0.017453292519943295
@@ -118,7 +118,7 @@ def _number_table(path: Path) -> tuple[list[str], Array]:
         table = np.array([[float(cell or "nan") for cell in row] for row in rows])
     except (OSError, ValueError) as error:
         raise FileError(
-            f"{path}: cannot be read as a table of numbers: {error}."
+            f"{path}: cannot be read as a table of numbers: {plain(error)}."
         ) from None
     if len(rows) < 2:
         raise FileError(
