@@ -58,8 +58,19 @@ READS: dict[str, tuple[list[str], dict[str, str]]] = {
     "markers list": ([], {}),
     "markers show": (["oxford24"], {}),
     "markers sites": ([], {}),
-    "markers check": (["oxford24"], {"static": "static.c3d", **NAMES}),
-    "markers new": ([], {"static": "static.c3d", "sites": "sites.txt", **NAMES}),
+    "markers check": (
+        ["oxford24"],
+        {"static": "static.c3d", "movement": "free.c3d", **NAMES},
+    ),
+    "markers new": (
+        [],
+        {
+            "static": "static.c3d",
+            "movement": "free.c3d",
+            "sites": "sites.txt",
+            **NAMES,
+        },
+    ),
     "control": ([], {"recording": "free.c3d", **PERSON, **NAMES}),
     "compare": (
         [],

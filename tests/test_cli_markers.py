@@ -88,6 +88,28 @@ def test_answers_in_a_file_and_labels_renamed(
     assert main([*words, "--force"]) == 0
 
 
+def test_a_movement_says_what_is_static_only_and_how_well_it_is_followed(
+    files: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    static, moved = (str(files / f"{name}.c3d") for name in ("static", "points"))
+    out = str(tmp_path / "mine.toml")
+    words = ["markers", "new", static, "--guess", "--movement", moved, "--out", out]
+    assert main([*words, "--json"]) == 0
+    made = json.loads(capfd.readouterr().out)
+    static_only = {k for k, v in made["sites"].items() if v.endswith(" static")}
+    assert static_only == {"RMEP", "LMEP"}
+    words = ["markers", "check", out, static, "--movement", moved]
+    assert main([*words, "--json"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    # Simulated skin moves by some 3 mm per axis.
+    assert 0 < found["residual_in_movement_m"] < 0.01
+    assert found["residual_in_movement_m"] == pytest.approx(
+        made["residual_in_movement_m"]
+    )
+    assert main(words) == 0
+    assert "mm apart in the median frame" in capfd.readouterr().out
+
+
 def test_nothing_to_answer_with_is_one_sentence(
     files: Path,
     tmp_path: Path,

@@ -8,11 +8,11 @@ import pytest
 import small_person
 
 from ikns.body.marker_set import MarkerSet
-from ikns.body.sites import site, sites, usual_site
+from ikns.body.sites import guess_sites, site, sites, usual_site
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.observed import unshown_joints
 from ikns.calibration.own_markers import OwnMarkerSet, own_marker_set, read_answers
-from ikns.calibration.set_check import check_marker_set
+from ikns.calibration.set_check import check_marker_set, follow_movement
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.recording.files import read
 from ikns.recording.labels import renamed
@@ -221,6 +221,50 @@ def test_a_sternum_marker_alone_may_be_anywhere_on_the_bone(first: str) -> None:
     assert middle - 2 * spread < low
     assert high < middle + 2 * spread
     assert usual_site("XIPH").name == "xiphoid"
+
+
+def test_a_guessed_set_follows_a_real_person_as_the_shipped_one(data: Path) -> None:
+    # With the cluster fixed to the bone the residual was 25 mm, with `ue_adl` 16 mm,
+    # as skin follows only a part of pronation.
+    folder = data / "ue_adl" / "ADL003"
+    static, reach = read(folder / "ADL003_static.csv"), read(folder / "ADL003FR1.csv")
+    made = own_marker_set(
+        Skeleton.load(),
+        static,
+        guess_sites(static.labels),
+        name="mine",
+        min_duration=0.3,
+    )
+    assert {label[1:4] for label in made.turning} == {"LAR"}
+    fixed = [replace(m, free_turn=False) for m in made.marker_set.markers]
+    sets = {
+        "made": made.marker_set,
+        "fixed": replace(made.marker_set, markers=tuple(fixed)),
+        # Its weights prefer hand and acromion; without them distances compare.
+        "shipped": [replace(m, weight=1.0) for m in MarkerSet.load("ue_adl").markers],
+    }
+    sets["shipped"] = replace(MarkerSet.load("ue_adl"), markers=tuple(sets["shipped"]))
+    found = {
+        name: follow_movement(
+            Skeleton.load(), static, reach, marker_set=worn, min_duration=0.3
+        )
+        for name, worn in sets.items()
+    }
+    # Landmarks elsewhere than in the shipped set cost some; fixed costs 1.5 times.
+    assert found["made"].residual < 1.25 * found["shipped"].residual
+    assert found["made"].findings == []
+    (told,) = found["fixed"].findings
+    assert told.kind == "turning skin"
+    assert set(told.markers) == set(made.turning)
+
+
+def test_what_a_movement_lacks_is_guessed_to_be_static_only() -> None:
+    labels = ["RLAR1", "RLAR2", "RLAR3", "RSPR", "RELB", "RMEP", "XYZ"]
+    alone = guess_sites(labels)
+    assert [k for k, v in alone.items() if v.endswith(" static")] == ["RSPR"]
+    beside = guess_sites(labels, moving=["Ann:rlar1", "RLAR2", "RLAR3", "RSPR", "RELB"])
+    assert [k for k, v in beside.items() if v.endswith(" static")] == ["RMEP"]
+    assert "XYZ" not in beside
 
 
 @pytest.mark.parametrize("name", ["ADL001", "ADL005"])

@@ -141,6 +141,7 @@ WRONG = {
     "mode": CHOICE,
     "model": [*TEXT, "xyz"],
     "most": [*COUNT, "1"],
+    "movement": READ_FILE,
     "most_different": FROM_ZERO,
     "n_dof": COUNT,
     "name": TEXT,

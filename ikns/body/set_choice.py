@@ -23,7 +23,10 @@ class SetMatch(NamedTuple):
 
     def __str__(self) -> str:
         """Say it."""
-        return f"{self.found} of the {self.of} markers of {self.name}"
+        count = (
+            f"all {self.of}" if self.found == self.of else f"{self.found} of {self.of}"
+        )
+        return f"{count} markers of {self.name}"
 
 
 def match_set(worn: MarkerSet, labels: Sequence[str]) -> SetMatch:

@@ -8,17 +8,20 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from ikns.body.marker_set import Marker
+from ikns.body.marker_set import Marker, label_keys
 from ikns.body.model_file import urdf_folder
 from ikns.errors import InvalidInput
 
 #: Link of a side by the table's short name.
 _SIDED = ("clavicle", "upper_arm", "forearm", "hand")
+#: So many markers of a segment show how it lies.
+_CLUSTER = 3
 #: Letter that stands for a side before or behind a label: ``RELB``, ``r_lelbow``,
 #: ``ELB_R``.
 _LETTERS = {"r": "right", "l": "left"}
@@ -145,6 +148,47 @@ def usual_site(
         if found := _named(rest, own):
             return found
     return None
+
+
+def guess_sites(labels: Sequence[str], moving: Sequence[str] = ()) -> dict[str, str]:
+    """Take each label for what it usually means; labels of no known place are left out.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Of a static trial.
+    moving : sequence of str
+        Of a movement, if there is one: markers that it lacks are static only. Without
+        one, landmarks of a forearm that carries three markers elsewhere are: they are
+        put on to calibrate such a cluster.
+
+    Returns
+    -------
+    dict
+        Place by label, ``static`` behind it where it is static only.
+
+    Examples
+    --------
+    >>> guess_sites(["RSPR", "RELB", "XYZ"], moving=["RELB"])
+    {'RSPR': 'right_radial_styloid static', 'RELB': 'right_lateral_epicondyle'}
+    """
+    answers: dict[str, str] = {}
+    for label in labels:
+        if found := usual_site(label, answers, labels):
+            answers[label] = found.name
+    worn = label_keys(moving)
+    places = {label: site(name) for label, name in answers.items()}
+    loose = Counter(p.link for p in places.values() if p.position is None)
+    for label, place in places.items():
+        if (
+            not label_keys([label]) & worn
+            if worn
+            else place.position
+            and place.link.endswith("_forearm")
+            and loose[place.link] >= _CLUSTER
+        ):
+            answers[label] += " static"
+    return answers
 
 
 def _is_worn(place: Site, answered: Mapping[str, str], others: Iterable[str]) -> bool:

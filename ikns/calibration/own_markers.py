@@ -14,6 +14,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.observed import with_unshown_held
 from ikns.calibration.size_fit import SizeFit, fit_sizes, size_factors
 from ikns.calibration.static_trial import static_posture
+from ikns.calibration.turning_skin import turning_labels, with_free_turn
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.recording.recording import Recording
 
@@ -43,6 +44,7 @@ class OwnMarkerSet:
     placed: tuple[PlacedLabel, ...]
     skipped: tuple[str, ...]  # labels of the trial that the set leaves out
     assumed: tuple[str, ...]  # segments whose markers are all measured: see below
+    turning: tuple[str, ...]  # labels that turn with the skin of a forearm
 
 
 def read_answers(answers: Mapping[str, str]) -> tuple[PlacedLabel, ...]:
@@ -78,7 +80,8 @@ def own_marker_set(
     Markers on landmarks keep the place that the landmark has on the generic body, and
     so fit other people too. With them the body is scaled and its posture found; where
     the other markers then are on their segments is measured. Joints that the set does
-    not show are held.
+    not show are held. A cluster on a forearm turns freely about its axis where the hand
+    shows how far that is turned: skin follows pronation in part only.
 
     Parameters
     ----------
@@ -128,11 +131,13 @@ def own_marker_set(
         tuple(replace(by_label[p.label], static_only=p.static_only) for p in placed),
         source=f"made by ikns markers new from {static.source}",
     )
+    turning = turning_labels(worn)
     return OwnMarkerSet(
-        with_unshown_held(generic, worn),
+        with_free_turn(with_unshown_held(generic, worn), turning),
         placed,
         tuple(label for label in static.labels if _bare(label) not in by_label),
         _assumed(placed),
+        turning,
     )
 
 

@@ -9,6 +9,10 @@ import numpy as np
 
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.exploration import judge_exploration
+from ikns.calibration.judge.finding import Finding
+from ikns.calibration.judge.tracking import followed
+from ikns.calibration.scaling import scale
 from ikns.calibration.size_fit import fit_sizes, size_factors
 from ikns.calibration.static_trial import seen_markers, static_posture
 from ikns.recording.recording import Recording
@@ -42,6 +46,41 @@ class SetCheck(NamedTuple):
     joints: tuple[CheckedJoint, ...]
     lengths: dict[str, float]  # m
     converged: bool
+
+
+class FollowedSet(NamedTuple):
+    """How well a body with a marker set follows a movement."""
+
+    residual: float  # weighted root mean square distance in the median frame, m
+    markers: dict[str, float]  # median distance by label, less where weighed less, m
+    findings: list[Finding]  # what the judge says of the movement
+
+
+def follow_movement(
+    generic: Skeleton,
+    static: Recording,
+    movement: Recording,
+    *,
+    marker_set: str | Path | MarkerSet,
+    min_duration: float = 1.0,
+) -> FollowedSet:
+    """Fit the body to a static trial, and follow a movement of the same person.
+
+    A static trial shows where markers sit, and so is always followed well; a movement
+    shows whether they go with the bones.
+
+    Other arguments and errors are those of :func:`ikns.scale`.
+    """
+    skeleton, _ = scale(
+        generic, static, marker_set=marker_set, min_duration=min_duration
+    )
+    worn = skeleton.marker_set
+    markers = worn.pick(movement.labels, movement.markers)
+    residual, off = followed(skeleton, markers)
+    findings = judge_exploration(movement, worn, skeleton, skeleton=skeleton)
+    return FollowedSet(
+        residual, dict(zip(worn.labels, off.tolist(), strict=True)), findings
+    )
 
 
 def check_marker_set(

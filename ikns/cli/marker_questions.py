@@ -8,19 +8,21 @@ from collections.abc import Sequence
 from ikns.errors import InvalidInput
 
 
-def ask_sites(labels: Sequence[str], *, guess: bool) -> dict[str, str]:
+def ask_sites(
+    labels: Sequence[str], *, guess: bool, moving: Sequence[str] = ()
+) -> dict[str, str]:
     """Ask on the terminal where each label sits; answers as a file would have them.
 
     With `guess` nothing is asked, and labels that usually mean no place are left out.
+    `moving` are the labels of a movement, if there is one: the others are static only.
     """
-    from ikns.body.sites import site, sites, usual_site
+    from ikns.body.marker_set import label_keys
+    from ikns.body.sites import guess_sites, site, sites, usual_site
 
-    answers: dict[str, str] = {}
     if guess:
-        for label in labels:
-            if found := usual_site(label, answers, labels):
-                answers[label] = found.name
-        return answers
+        return guess_sites(labels, moving)
+    answers: dict[str, str] = {}
+    worn = label_keys(moving)
     _say(
         "Where does each marker sit? Enter accepts the place in brackets, 'skip' "
         "leaves "
@@ -30,6 +32,8 @@ def ask_sites(labels: Sequence[str], *, guess: bool) -> dict[str, str]:
     for label in labels:
         usual = usual_site(label, answers, labels)
         default = usual.name if usual else "skip"
+        if usual and worn and not label_keys([label]) & worn:
+            default += " static"
         while True:
             said = _answer(f"{label} [{default}]: ") or default
             words = said.split()
@@ -41,7 +45,8 @@ def ask_sites(labels: Sequence[str], *, guess: bool) -> dict[str, str]:
                 )
                 continue
             if said == "static":
-                said, words = f"{default} static", [default]
+                said = f"{default.removesuffix(' static')} static"
+                words = said.split()
             if words == ["skip"]:
                 break
             try:

@@ -14,6 +14,7 @@ from ikns.body.set_choice import set_advice
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
+from ikns.calibration.judge.labels import judge_labels
 from ikns.calibration.judge.static import STILL_MARKERS, marker_displacement
 from ikns.calibration.judge.subjects import other_subject
 from ikns.calibration.scaling import judge_static
@@ -129,6 +130,13 @@ def check_recordings(
         skeleton = None if refused(found.findings) else found.skeleton
     for recording in recordings:
         _require_markers(recording, worn)
+        others = judge_labels(
+            recording.source, recording.labels, worn, calibrated=skeleton is not None
+        )
+        if refused(others):
+            findings += others
+            judged.append((recording.source, f"recording without {worn.name}"))
+            continue
         if static is not None:
             findings += other_subject(static, recording, worn)
         elif skeleton is None and _still(recording, worn):
