@@ -80,6 +80,44 @@ def test_nothing_of_a_help_text_is_taken_for_markup(name: str) -> None:
         assert render(text or "").plain == (text or "")
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_no_help_text_shows_a_type_of_python(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*name.split()[1:], "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "Usage: " in shown
+    for word in ("<", ">", "list[", " range", "float", "bool", "None"):
+        assert word not in shown
+    context = COMMANDS[name].make_context(name, [], resilient_parsing=True)
+    rows = [part.get_help_record(context) or "" for part in COMMANDS[name].params]
+    assert not any("<" in cell for row in rows for cell in row)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("scale --mass x", "expected a number for --mass, found x."),
+        ("servo --id 1 --id 999", "expected a whole number from 0 to 252 for --id, "),
+        ("calibrate --side=up", "expected right, left or both for --side, found up."),
+        ("ik", "expected RECORDING, found none; see `ikns ik --help`."),
+        ("ik a b", "expected RECORDING only, found also b; see `ikns ik --help`."),
+        ("demo --sede 1", "no option --sede (did you mean --seed?); see `ikns demo "),
+        ("demo --out", "a value after --out, found none; see `ikns demo --help`."),
+        (
+            "demo --quick=1",
+            "expected no value after --quick, found one; see `ikns demo",
+        ),
+        ("study dance", "(init, run, plan), found dance; see `ikns study --help`."),
+    ],
+)
+def test_a_wrong_line_is_told_what_was_expected_and_which_help_to_read(
+    line: str, says: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main(line.split()) == 2
+    assert says in one_sentence(capfd.readouterr())
+
+
 def test_every_public_name_exists() -> None:
     for name in ikns.__all__:
         assert getattr(ikns, name) is not None

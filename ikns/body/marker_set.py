@@ -227,7 +227,7 @@ def label_keys(labels: Iterable[str]) -> set[str]:
 def _several(marker: str, labels: Sequence[str]) -> str:
     """Say that a marker matches several labels, and what would settle it."""
     subjects = [label.rpartition(":")[0] for label in labels]
-    cure = "give one of them another name"
+    cure = f"rename the others, as with --rename '{labels[-1]}=OTHER'"
     if len({subject.casefold() for subject in subjects}) == len(labels):
         known = ", ".join(subject for subject in subjects if subject)
         cure = f"choose one subject with --subject-prefix ({known})"

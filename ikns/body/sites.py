@@ -108,7 +108,8 @@ def site(name: str) -> Site:
         alike = difflib.get_close_matches(key, known, n=3, cutoff=0.4)
         raise InvalidInput(
             f"there is no place '{name.strip()}' on the body, but "
-            f"{', '.join(alike or list(known)[:3])} and others; see ikns markers sites."
+            f"{', '.join(alike or list(known)[:3])} and others; see "
+            "`ikns markers sites`."
         )
     return known[key]
 

@@ -9,6 +9,8 @@ from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
+from typer.models import ArgumentInfo
+
 from ikns.errors import InvalidInput
 
 
@@ -29,20 +31,27 @@ def checked(command: Callable[..., None]) -> Callable[..., None]:
     Traceback (most recent call last):
     ikns.errors.InvalidInput: expected a finite number for --height, found nan.
     """
-    parameters = signature(command).parameters
+    parameters = signature(command, eval_str=True).parameters
 
     @wraps(command)
     def run(**values: Any) -> None:
         for name, value in values.items():
             parameter = parameters[name]
-            # An argument without a default is written without dashes.
             option = f"--{name.rstrip('_').replace('_', '-')}"
+            if _is_argument(parameter):
+                option = name.upper()
             for each in value if isinstance(value, (list, tuple)) else [value]:
                 if parameter.default is Parameter.empty or each != parameter.default:
                     _check(option, each)
         command(**values)
 
     return run
+
+
+def _is_argument(parameter: Parameter) -> bool:
+    """Whether typer takes a parameter by its place."""
+    about = getattr(parameter.annotation, "__metadata__", ())
+    return any(isinstance(each, ArgumentInfo) for each in about)
 
 
 def _check(option: str, value: Any) -> None:

@@ -175,22 +175,22 @@ def check(
     from ikns.calibration.set_check import check_marker_set, follow_movement
 
     frames = read(static)
+    worn = ikns.MarkerSet.load(marker_set)
     moved = None
     if movement is not None:
-        with naming(str(static)):
-            moved = follow_movement(
-                ikns.Skeleton.load(),
-                frames,
-                read(movement),
-                marker_set=marker_set,
-                min_duration=min_static,
-            )
+        moved = follow_movement(
+            ikns.Skeleton.load(),
+            frames,
+            read(movement),
+            marker_set=worn,
+            min_duration=min_static,
+        )
     in_motion = {} if moved is None else moved.markers
     with naming(str(static)):
         found = check_marker_set(
             ikns.Skeleton.load(),
             frames,
-            marker_set=marker_set,
+            marker_set=worn,
             min_duration=min_static,
         )
     remarks = [

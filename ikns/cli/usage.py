@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 from itertools import pairwise
 from typing import Any, get_args, get_origin
 
@@ -31,7 +32,8 @@ def _wrong_words(error: typer.TyperException, message: str, argv: Sequence[str])
     command = command if context is None else str(context.command_path)
     option = getattr(error, "option_name", "")
     if kind == "NoSuchOption":
-        meant = " or ".join(sorted(getattr(error, "possibilities", None) or ()))
+        known = [name for p in context.command.params for name in p.opts]
+        meant = " or ".join(get_close_matches(option, known, n=2, cutoff=0.7))
         message = f"`{command}` has no option {option}"
         message += f" (did you mean {meant}?)" if meant else ""
     elif kind == "MissingParameter":

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.output.file import sync
 from ikns.output.inputs import refuse_input_folder
 
@@ -96,8 +96,6 @@ def output_folder(folder: str | Path) -> Iterator[Path]:
             raise
         shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
-        raise FileError(
-            f"{folder}: cannot be written: {error.strerror or error}."
-        ) from None
+        raise FileError(f"{folder}: cannot be written: {plain(error)}.") from None
     finally:
         shutil.rmtree(part, ignore_errors=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 
 
 def _print(sentence: str) -> None:
@@ -47,7 +47,7 @@ def hold_lock(
     try:
         descriptor, sure = _open_locked(path, what)
     except OSError as error:
-        raise FileError(f"{path}: cannot be written: {_reason(error)}.") from None
+        raise FileError(f"{path}: cannot be written: {plain(error)}.") from None
     try:
         before = _holder(descriptor)
         if before is not None:
@@ -62,7 +62,7 @@ def hold_lock(
         try:
             _write_holder(descriptor)
         except OSError as error:
-            raise FileError(f"{path}: cannot be written: {_reason(error)}.") from None
+            raise FileError(f"{path}: cannot be written: {plain(error)}.") from None
         try:
             yield
         finally:
@@ -127,7 +127,3 @@ def _refused(path: Path, what: str, holder: tuple[int, str] | None) -> InvalidIn
         f"{path.parent}: expected {what} in one program at a time, found another run"
         f"{who}; {advice}."
     )
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()

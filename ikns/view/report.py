@@ -9,7 +9,7 @@ from html import escape
 from importlib.resources import files
 from pathlib import Path
 
-from ikns.errors import FileError
+from ikns.errors import FileError, plain
 from ikns.output.file import write_bytes
 from ikns.view.cells import Cell, inline
 from ikns.view.parts import (
@@ -42,7 +42,7 @@ def write_report(path: str | Path, page: str) -> None:
         # File names may hold bytes that are not text; they become question marks.
         write_bytes(target, page.encode("utf-8", errors="replace"))
     except OSError as error:
-        raise FileError(f"{target}: cannot be written: {error.strerror}.") from None
+        raise FileError(f"{target}: cannot be written: {plain(error)}.") from None
 
 
 def report_html(

@@ -13,7 +13,7 @@ from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton.urdf import parse_urdf
-from ikns.errors import FileError
+from ikns.errors import FileError, plain
 from ikns.numerics.rigid import turn_to
 
 #: Columns of a configuration and of its tangent that hold the free flyer.
@@ -25,7 +25,7 @@ def read_urdf(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
+        reason = plain(error)
         raise FileError(f"{path}: cannot be read as a URDF: {reason}.") from None
     except UnicodeDecodeError as error:
         raise FileError(

@@ -19,7 +19,7 @@ from ikns.calibration.judge.static import STILL_MARKERS, marker_displacement
 from ikns.calibration.judge.subjects import other_subject
 from ikns.calibration.scaling import judge_static
 from ikns.calibration.static_trial import too_short
-from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.errors import InvalidInput, MarkerMismatch, naming
 from ikns.recording.recording import Recording
 
 #: A recording in which so many markers stand still is a static trial. The others may be
@@ -151,7 +151,8 @@ def check_recordings(
 
 
 def _require_markers(recording: Recording, worn: MarkerSet) -> None:
-    known = int((worn.columns(recording.labels) >= 0).sum())
+    with naming(recording.source):
+        known = int((worn.columns(recording.labels) >= 0).sum())
     if known < 3:
         raise MarkerMismatch(
             f"{recording.source}: expected markers of {worn.name} "

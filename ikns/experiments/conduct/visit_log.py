@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import DataLoss, IknsError, InvalidInput
+from ikns.errors import DataLoss, IknsError, InvalidInput, plain
 from ikns.experiments.visits import append_attempt, create_visit, read_visit
 from ikns.experiments.visits.parquet import table_bytes
 
@@ -102,7 +102,7 @@ class VisitLog:
             with (self.folder / _LOG).open("a", encoding="utf-8") as file:
                 file.write(line + "\n")
         except OSError as error:
-            self.fault = f"{self.folder / _LOG}: cannot be written: {error.strerror}."
+            self.fault = f"{self.folder / _LOG}: cannot be written: {plain(error)}."
 
     def discard_unused(self) -> None:
         """Remove a visit that this run began and in which no attempt was made.

@@ -102,8 +102,8 @@ def pick_schedule(
     """
     for name, words in (("conditions", conditions), ("objects", objects)):
         if isinstance(words, str) or not words or len(set(words)) != len(words):
-            found = repr(words) if isinstance(words, str) else list(words)
-            raise InvalidInput(f"expected distinct {name}, found {found}.")
+            found = repr(words) if isinstance(words, str) else ", ".join(words)
+            raise InvalidInput(f"expected distinct {name}, found {found or 'none'}.")
     unknown = [code for code in objects if code not in OBJECT_IDS]
     if unknown:
         raise InvalidInput(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 
-from ikns.errors import FileError
+from ikns.errors import FileError, plain
 from ikns.experiments.study.cells import visit_name
 from ikns.experiments.study.declaration import Study
 from ikns.experiments.study.results import visit_names
@@ -115,5 +115,5 @@ def _set_aside(visit: Path) -> None:
         sync(visit.parent)
     except OSError as error:
         raise FileError(
-            f"{visit}: is damaged and cannot be renamed: {error.strerror}."
+            f"{visit}: is damaged and cannot be renamed: {plain(error)}."
         ) from None

@@ -109,7 +109,7 @@ def read_study(study: str | Path) -> Study:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise FileError(
-            f"{path}: expected the file of a study, found none; ikns study init "
+            f"{path}: expected the file of a study, found none; `ikns study init` "
             "writes one."
         ) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -240,7 +240,7 @@ def _check_blocks(
 def _check_different(where: str, key: str, words: Sequence[str]) -> None:
     if not words or "" in words or len(set(words)) != len(words):
         raise InvalidInput(
-            f"expected distinct {key} in [{where}], found {list(words)}."
+            f"expected distinct {key} in [{where}], found {', '.join(words) or 'none'}."
         )
 
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.experiments.study.cells import Task, visit_name
 from ikns.experiments.study.declaration import FILE, Study
 from ikns.experiments.visits import EXPERIMENTS, list_visits
@@ -84,7 +84,7 @@ def run_lock(folder: Path) -> Iterator[None]:
     try:
         visits.mkdir(exist_ok=True)
     except OSError as error:
-        raise FileError(f"{visits}: cannot be created: {error.strerror}.") from None
+        raise FileError(f"{visits}: cannot be created: {plain(error)}.") from None
     with hold_lock(visits / _LOCK, "to run a study"):
         for left in visits.glob(f".{_DECLARED}.*.part"):  # by a run that was killed
             left.unlink(missing_ok=True)
@@ -139,7 +139,7 @@ def _saved_declaration(folder: Path) -> dict[str, Any] | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise FileError(f"{place}: cannot be read: {error.strerror}.") from None
+        raise FileError(f"{place}: cannot be read: {plain(error)}.") from None
     except (ValueError, LookupError, TypeError):
         raise FileError(
             f"{place}: cannot be read as the declaration from before the first result; "

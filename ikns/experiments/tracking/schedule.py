@@ -117,7 +117,9 @@ def schedule(
     """
     for name, words in (("conditions", conditions), ("profiles", profiles)):
         if not words or len(set(words)) != len(words):
-            raise InvalidInput(f"expected distinct {name}, found {list(words)}.")
+            raise InvalidInput(
+                f"expected distinct {name}, found {', '.join(words) or 'none'}."
+            )
     if repeats < 1 or training < 0 or subject < 0:
         raise InvalidInput(
             "expected a subject and training from 0 and repeats from 1, found "

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError
+from ikns.errors import FileError, plain
 from ikns.experiments.visits.rows import EXPERIMENTS
 
 #: Version of a visit's files.
@@ -48,7 +48,7 @@ def read_header(visit: Path) -> dict[str, Any]:
             f"{visit}: expected a visit with {HEADER}, found none."
         ) from None
     except OSError as error:
-        raise FileError(f"{file}: cannot be read: {error.strerror}.") from None
+        raise FileError(f"{file}: cannot be read: {plain(error)}.") from None
     except ValueError:
         raise FileError(f"{file}: cannot be read as JSON.") from None
     fault = "expected a table" if not isinstance(table, dict) else header_fault(table)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.output.lock import hold_lock
 
 #: Name of the lock file in the visit's folder.
@@ -38,7 +38,7 @@ def visit_lock(folder: str | Path) -> Iterator[None]:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(f"{path}: cannot be created: {error.strerror}.") from None
+        raise FileError(f"{path}: cannot be created: {plain(error)}.") from None
     try:
         with hold_lock(path / LOCK, "to conduct a visit"):
             yield

@@ -55,7 +55,7 @@ def read_visit(folder: str | Path, *, experiment: str | None = None) -> VisitRec
         check_sums(path)
     except FileError as error:
         reason = str(error).rstrip(".")
-        raise FileError(f"{reason}; ikns study run simulates it again.") from None
+        raise FileError(f"{reason}; `ikns study run` simulates it again.") from None
     attempts = [row for file in _attempt_files(path) for row in read_rows(file, found)]
     attempts.sort(key=lambda row: row["number"])
     for expected, row in enumerate(attempts, start=1):

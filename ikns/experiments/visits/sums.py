@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from ikns.errors import FileError
+from ikns.errors import FileError, plain
 
 #: Name of the file.
 SUMS = "sums.sha256"
@@ -45,7 +45,7 @@ def check_sums(visit: Path) -> bool:
     except FileNotFoundError:
         return False
     except OSError as error:
-        raise FileError(f"{file}: cannot be read: {error.strerror}.") from None
+        raise FileError(f"{file}: cannot be read: {plain(error)}.") from None
     except UnicodeDecodeError:
         lines = [""]
     names = {line.partition("  ")[2] for line in lines}
@@ -64,7 +64,7 @@ def check_sums(visit: Path) -> bool:
                 f"{visit}: expected a visit with {name}, found none."
             ) from None
         except OSError as error:
-            raise FileError(f"{path}: cannot be read: {error.strerror}.") from None
+            raise FileError(f"{path}: cannot be read: {plain(error)}.") from None
         if found != digest:
             size = path.stat().st_size
             raise FileError(

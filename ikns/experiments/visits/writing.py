@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.experiments.visits.header import FORMAT, HEADER, header_fault, read_header
 from ikns.experiments.visits.lock import LOCK
 from ikns.experiments.visits.parquet import table_bytes
@@ -52,7 +52,7 @@ def create_visit(folder: str | Path, about: Mapping[str, Any]) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(f"{path}: cannot be created: {error.strerror}.") from None
+        raise FileError(f"{path}: cannot be created: {plain(error)}.") from None
     _write(path / HEADER, header)
     return path
 
@@ -138,7 +138,7 @@ def write_visit(
         part.rename(path)
         sync(path.parent)
     except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
+        raise FileError(f"{path}: cannot be written: {plain(error)}.") from None
     return path
 
 
@@ -160,7 +160,7 @@ def _write(path: Path, content: bytes) -> Path:
     try:
         new = create_bytes(path, content)
     except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}.") from None
+        raise FileError(f"{path}: cannot be written: {plain(error)}.") from None
     if not new:
         kind = "visit" if path.name == HEADER else "attempt"
         raise InvalidInput(f"{path}: already exists, and no {kind} is overwritten.")

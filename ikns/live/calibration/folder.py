@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.live.calibration.protocol import ProtocolStep
 from ikns.live.calibration.verdict import Verdict
 from ikns.output.lock import hold_lock
@@ -66,7 +66,7 @@ class RecordingsFolder:
         try:
             path.mkdir()
         except OSError as error:
-            raise FileError(f"{path}: cannot be created: {error.strerror}.") from None
+            raise FileError(f"{path}: cannot be created: {plain(error)}.") from None
         self._write()
 
     def locked(self) -> AbstractContextManager[None]:
@@ -180,7 +180,7 @@ class RecordingsFolder:
             part.replace(place)
             _sync(self.path)
         except OSError as error:
-            raise FileError(f"{place}: cannot be written: {error.strerror}.") from None
+            raise FileError(f"{place}: cannot be written: {plain(error)}.") from None
 
 
 def _sync(path: Path) -> None:

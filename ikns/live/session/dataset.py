@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, plain
 from ikns.live.session.channels import Channel, marker_channels, model_channels
 from ikns.live.session.sidecars import (
     EVENTS_ABOUT,
@@ -293,5 +293,5 @@ def open_run(
 
 
 def _fault(place: Path, error: OSError) -> FileError:
-    reason = (error.strerror or str(error)).lower()
+    reason = plain(error)
     return FileError(f"{error.filename or place}: cannot be written: {reason}.")

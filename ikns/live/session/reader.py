@@ -192,7 +192,7 @@ def _whole_lines(path: Path) -> tuple[list[str], int]:
     try:
         data = path.read_bytes()
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
+        reason = plain(error)
         raise FileError(f"{path}: cannot be read: {reason}.") from None
     end = data.rfind(b"\n") + 1
     try:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from ikns.errors import plain
 from ikns.live.session.channels import Channel
 
 Row = tuple[float | str, ...]
@@ -88,7 +89,7 @@ class RowFile:
             if sync:
                 self._sync()
         except OSError as error:
-            self.fault = f"cannot be written: {(error.strerror or str(error)).lower()}"
+            self.fault = f"cannot be written: {plain(error)}"
         else:
             self.fault = self._place_fault() or self._change
 
@@ -100,7 +101,7 @@ class RowFile:
         try:
             os.close(descriptor)
         except OSError as error:  # where a quota is checked only now
-            self.fault = f"cannot be written: {(error.strerror or str(error)).lower()}"
+            self.fault = f"cannot be written: {plain(error)}"
 
     def lost(self) -> int:
         """Count the rows handed over that are not in the file: it is read."""

@@ -169,7 +169,7 @@ class BoundingBoxKMeans(EstimatorBase):
                 f"n_clusters={self.n_clusters} and max_iter={self.max_iter}."
             )
         if self.radius is not None and not self.radius > 0:
-            raise InvalidInput(f"expected a radius above 0 m, found {self.radius}.")
+            raise InvalidInput(f"expected a radius above 0 m, found {self.radius:g}.")
         if self.up is not None:
             up = np.asarray(self.up, dtype=np.float64)
             if up.shape != x.shape[1:] or not (np.isfinite(up).all() and up.any()):

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ikns.errors import FileError
+from ikns.errors import FileError, plain
 from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
 
 #: Arrays up to this size are written as numbers.
@@ -120,7 +120,7 @@ def _viewer() -> str:
         text = file.read_text(encoding="utf-8")
     except OSError as error:
         raise FileError(
-            f"{file}: MeshCat's viewer cannot be read ({error.strerror}); "
+            f"{file}: MeshCat's viewer cannot be read ({plain(error)}); "
             "install meshcat again."
         ) from None
     return text.replace("</script", "<\\/script")
