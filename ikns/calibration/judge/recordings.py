@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ikns.body.marker_set import MarkerSet
-from ikns.body.set_choice import set_advice
+from ikns.body.set_choice import better_set, set_advice
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
@@ -153,7 +153,8 @@ def check_recordings(
 def _require_markers(recording: Recording, worn: MarkerSet) -> None:
     with naming(recording.source):
         known = int((worn.columns(recording.labels) >= 0).sum())
-    if known < 3:
+    # Where another set fits, the judge says so.
+    if known < 3 and better_set(worn, recording.labels) is None:
         raise MarkerMismatch(
             f"{recording.source}: expected markers of {worn.name} "
             f"({', '.join(worn.labels[:4])}, ...), found "

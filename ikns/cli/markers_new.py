@@ -1,0 +1,155 @@
+"""``ikns markers new``: a marker set of one's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import ikns
+from ikns.cli.marker_options import (
+    Movement,
+    StaticFile,
+    followed_sentence,
+    millimeters,
+)
+from ikns.cli.marker_questions import ask_sites
+from ikns.cli.options import AsJson, Force, MinStatic
+from ikns.cli.output import held_sentences, notes, show, table
+from ikns.cli.reading import Read, reads_markers
+from ikns.errors import InvalidInput, naming
+from ikns.output.file import refuse_overwriting, write_text
+
+
+@reads_markers
+def new(
+    read: Read,
+    static: StaticFile,
+    out: Annotated[Path, typer.Option(help="TOML file to write.")] = Path(
+        "markers.toml"
+    ),
+    sites: Annotated[
+        Path | None,
+        typer.Option(
+            help="Text file with a line LABEL=PLACE for each marker, instead of "
+            "questions; `static` behind a place that is worn in static trials only."
+        ),
+    ] = None,
+    guess: Annotated[
+        bool,
+        typer.Option("--guess", help="Do not ask: take what the labels usually mean."),
+    ] = False,
+    movement: Movement = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the set. Default: that of the file.")
+    ] = None,
+    min_static: MinStatic = 1.0,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Make a marker set from a static trial and where each marker sits.
+
+    Asks for every label where it sits, with what the label usually means as the
+    default. Places of landmarks are known; where the other markers sit is measured.
+    Markers that --movement lacks are taken to be worn in static trials only, and how
+    well the body follows that movement is said.
+    """
+    refuse_overwriting(out, force=force, inputs=[static, sites, movement])
+    if out.suffix.lower() != ".toml":
+        raise InvalidInput(
+            f"{out}: expected a file that ends in .toml, found '{out.suffix}'."
+        )
+    if guess and sites is not None:
+        raise InvalidInput("expected --sites or --guess, found both.")
+    from ikns.calibration.own_markers import own_marker_set
+    from ikns.calibration.set_check import follow_movement
+    from ikns.recording.labels import read_name_pairs
+
+    frames = read(static)
+    moved = None if movement is None else read(movement)
+    seen = () if moved is None else moved.labels
+    answers = (
+        ask_sites(frames.labels, guess=guess, moving=seen)
+        if sites is None
+        else read_name_pairs(sites)
+    )
+    with naming(str(static if sites is None else sites)):
+        made = own_marker_set(
+            ikns.Skeleton.load(),
+            frames,
+            answers,
+            name=name or out.stem,
+            min_duration=min_static,
+        )
+    write_text(out, made.marker_set.toml(), force=force)
+    where = {one.label: one.site for one in made.placed}
+    rows: list[list[Any]] = [
+        [
+            m.label,
+            where[m.label].name,
+            millimeters(m.position),
+            "measured" if where[m.label].position is None else "known",
+            "static only" if m.static_only else "",
+        ]
+        for m in made.marker_set.markers
+    ]
+    remarks = [
+        *(
+            f"no landmark on {link}: its angles are measured from the static trial."
+            for link in made.assumed
+        ),
+        *([f"left out: {', '.join(made.skipped)}."] if made.skipped else []),
+        *(
+            [
+                f"{', '.join(made.turning)} turn about the forearm with its skin: the "
+                "hand shows how far the forearm is turned."
+            ]
+            if made.turning
+            else []
+        ),
+    ]
+    followed = None
+    if moved is not None:
+        followed = follow_movement(
+            ikns.Skeleton.load(),
+            frames,
+            moved,
+            marker_set=made.marker_set,
+            min_duration=min_static,
+        )
+        remarks += [finding.sentence for finding in followed.findings]
+    show(
+        {
+            "marker_set": out,
+            "name": made.marker_set.name,
+            "static": static,
+            "sites": {
+                one.label: one.site.name + " static" * one.static_only
+                for one in made.placed
+            },
+            "measured": [one.label for one in made.placed if not one.site.position],
+            "held": made.marker_set.held,
+            "turning": made.turning,
+            "residual_in_movement_m": None if followed is None else followed.residual,
+            "skipped": made.skipped,
+            "assumed": made.assumed,
+        },
+        table(
+            f"{made.marker_set.name}, from {static}",
+            {
+                "marker": "s",
+                "place": "s",
+                "forward, up, right mm": "s",
+                "how": "s",
+                "note": "s",
+            },
+            rows,
+        ),
+        *held_sentences(made.marker_set.held),
+        *([] if followed is None else [followed_sentence(movement, followed.residual)]),
+        *notes(remarks),
+        f"Wrote {out}; see how it fits: ikns markers check {out} {static}"
+        + " --movement RECORDING" * (movement is None),
+        as_json=as_json,
+    )
