@@ -151,6 +151,12 @@ def _name_values(command: Any) -> None:
             part.display_type_rich = lambda **_: ""  # its help says what it is
         # Ranges leave no room for words; who is beyond one is told it.
         part._get_number_range_help_str = lambda: None
+        if isinstance(part.show_default, str):  # typer puts it in parentheses
+            part._get_default_string = functools.partial(_told_default, part)
+
+
+def _told_default(part: Any, **_: Any) -> str:
+    return str(part.show_default)
 
 
 def _value_name(part: Any) -> str:

@@ -67,8 +67,9 @@ def calibrate(
     source: Annotated[
         str | None,
         typer.Option(
+            metavar="ADDRESS",
             help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, "
-            "natnet:HOST (OptiTrack), or ros2:TOPIC."
+            "natnet:HOST (OptiTrack), or ros2:TOPIC.",
         ),
     ] = None,
     recordings: Annotated[

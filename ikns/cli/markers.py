@@ -16,7 +16,7 @@ from ikns.cli.options import AsJson
 from ikns.cli.output import held_sentences, show, table
 
 markers_app = typer.Typer(
-    help="Marker sets: list, show, make one's own, check one.",
+    help="List, show, make and check marker sets.",
     no_args_is_help=True,
     add_completion=False,
 )
@@ -110,7 +110,7 @@ def show_(marker_set: SetArgument, as_json: AsJson = False) -> None:
 
 
 def sites_(as_json: AsJson = False) -> None:
-    """List the places on the body that ikns markers new knows."""
+    """List the places on the body that `ikns markers new` knows."""
     from ikns.body.sites import sites
 
     known = sites().values()

@@ -64,17 +64,19 @@ Fingers = Annotated[
     typer.Option(
         "--finger",
         metavar="ADDRESS",
-        help="sim:, dynamixel:/dev/ttyUSB0, ros2:TOPIC or lerobot:TYPE; again with "
-        "dof=2 for the second freedom of the map.",
+        help="Finger to drive: sim:, dynamixel:/dev/ttyUSB0, ros2:TOPIC or "
+        "lerobot:TYPE. Repeat for more; one with dof=2 follows the second freedom of "
+        "the map.",
     ),
 ]
 Publish = Annotated[
     list[str] | None,
     typer.Option(
-        help="lsl:NAME: c, flexion, state and residual as an LSL stream, and events as "
-        "another; on this machine only without lsl:NAME?scope=network. "
-        "ros2:NAMESPACE: topics of ROS 2, by the router of this machine without "
-        "ros2:NAMESPACE?router=HOST:PORT. Again for more.",
+        metavar="ADDRESS",
+        help="Where to publish c, flexion, state, residual and events: lsl:NAME (two "
+        "LSL streams) or ros2:NAMESPACE (ROS 2 topics). Only this machine gets them, "
+        "except with lsl:NAME?scope=network and ros2:NAMESPACE?router=HOST:PORT. "
+        "Repeat for more.",
     ),
 ]
 Rerun = Annotated[

@@ -61,7 +61,7 @@ def pick(
     participant: Participant = None,
     number: Number = None,
     conditions: Annotated[
-        str | None, typer.Option(help="ikns, ring.", show_default="ikns,ring")
+        str | None, typer.Option(help="ikns, ring or both.", show_default="ikns,ring")
     ] = None,
     objects: Annotated[
         str | None,

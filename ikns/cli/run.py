@@ -54,8 +54,9 @@ def run(
     source: Annotated[
         str,
         typer.Option(
+            metavar="ADDRESS",
             help="replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, "
-            "natnet:HOST (OptiTrack), or ros2:TOPIC."
+            "natnet:HOST (OptiTrack), or ros2:TOPIC.",
         ),
     ],
     rename: Rename = None,
@@ -127,7 +128,8 @@ def run(
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
 
     Exits with 3 when it ran but the finger never moved, or ended in its safe state.
-    Without --finger it is a simulated one; of several, what stops one stops all.
+    Without --finger a simulated finger moves. Whatever stops one of several fingers
+    stops all.
 
     Research software, not a medical device.
     """

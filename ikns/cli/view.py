@@ -40,7 +40,9 @@ _COLUMNS = {"quantity": "s", "value": "s"}
 @reads_markers
 def view(
     read: Read,
-    subject: Annotated[Path, typer.Argument(help="Folder that ikns calibrate wrote.")],
+    subject: Annotated[
+        Path, typer.Argument(help="Folder that `ikns calibrate` wrote.")
+    ],
     recording: Annotated[
         Path | None,
         typer.Argument(help=f"Recording to play: {MARKER_FILES}."),

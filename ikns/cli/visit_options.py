@@ -41,8 +41,9 @@ ForIkns = Annotated[
 SourceAddress = Annotated[
     str | None,
     typer.Option(
+        metavar="ADDRESS",
         help="For ikns: replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, "
-        "natnet:HOST (OptiTrack), or ros2:TOPIC."
+        "natnet:HOST (OptiTrack), or ros2:TOPIC.",
     ),
 ]
 SessionFolder = Annotated[
