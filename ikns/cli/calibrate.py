@@ -184,9 +184,9 @@ def calibrate(
     """Scale the body, learn the null-space map and write a subject folder.
 
     From recordings (--static, --exploration) or live: 5 s standing still, a minute of
-    free exploration, then the hand held at ten points while the elbow moves. --short
-    takes less, and --rewear a new wearing of the markers. --from and --to take a part
-    of every exploration.
+    free exploration, then the hand held at ten points while the elbow moves. --short is
+    a shorter protocol, and --rewear adapts a subject to reapplied markers. --from and
+    --to take a part of every exploration.
     """
     from ikns.calibration.subject_files import FILES
 
