@@ -103,6 +103,33 @@ def test_natural_movement_reaches_and_recordings_beside_a_static_trial_are_judge
         check_refused(argv, tmp_path, capfd, names=bad)
 
 
+def test_a_static_trial_too_short_is_refused_by_all_in_one_sentence(
+    files: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    whole = small_person.protocol().static.recording
+    short = str(small_person.write(tmp_path, "short", small_person.cut(whole, 0, 15)))
+    points, free = (str(files / f"{name}.c3d") for name in ("points", "free"))
+    out = ["--out", str(tmp_path / "new")]
+    lines = {
+        "check": [free, "--static", short],
+        "check alone": [short],
+        "ik": [free, "--static", short, "--out", str(tmp_path / "new.csv")],
+        "markers check": ["oxford24", short],
+        "markers new": [short, "--guess", "--out", str(tmp_path / "new.toml")],
+        "calibrate": ["--static", short, "--exploration", points, *out],
+    }
+    told = set()
+    for name, rest in lines.items():
+        assert main([*name.removesuffix(" alone").split(), *rest]) == 2
+        told.add(capfd.readouterr().err)
+    (sentence,) = told
+    assert "lasts 0.30 s, expected at least 1 s" in sentence
+    words = sentence.rstrip(".\n").split()
+    option = words[words.index("--min-static") :]
+    assert main(["check", free, "--static", short, *option]) == 0
+    assert list(tmp_path.glob("new*")) == []
+
+
 def test_a_wrong_recording_can_be_looked_at(
     files: Path,
     wrong: dict[str, Path],

@@ -9,6 +9,7 @@ import pytest
 
 import ikns
 from ikns.body.marker_set import MarkerSet
+from ikns.body.set_choice import better_set
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.recordings import check_recordings
 from ikns.calibration.scaling import judge_static, scale
@@ -371,3 +372,26 @@ def test_a_marker_that_no_posture_reaches_is_refused():
     found = check(changed(reaching(), markers))
     assert not found.usable
     assert found.findings[0].markers == ("RFIN",)
+
+
+def test_labels_of_another_set_name_it(data):
+    walk = read(next((data / "plugin_gait").glob("*.c3d")))
+    lift = read(data / "ue_adl" / "ADL003" / "ADL003_static.csv")
+    (told,) = check_recordings([walk]).findings
+    assert (told.kind, told.severity) == ("marker set", "warn")
+    assert "use --marker-set plug_in_gait" in told.sentence
+    (told,) = check_recordings([lift]).findings
+    assert (told.kind, told.severity) == ("marker set", "refuse")
+    with pytest.raises(MarkerMismatch, match="use --marker-set ue_adl"):
+        ikns.scale(generic(), lift)
+    # A body keeps its markers.
+    (told,) = check_recordings([lift], skeleton=person()).findings
+    assert "calibrate with --marker-set ue_adl, or use recordings" in told.sentence
+    # A set of one's own may leave markers out.
+    own = MarkerSet.load("ue_adl")
+    right = [m.label for m in own.markers if not m.label.startswith("L")]
+    mine = replace(own.only(right), name="mine")
+    assert better_set(mine, lift.labels) is None
+    assert better_set(replace(mine, name="ue_adl"), lift.labels) is None
+    alien = replace(MarkerSet.load("oxford24"), name="mine")
+    assert better_set(alien, lift.labels).name == "ue_adl"
