@@ -78,7 +78,7 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
         "Outside the chain, while the hand was still: thorax "
         f"{1000 * extrinsic['thorax_translation_m']:.0f} mm and "
         f"{extrinsic['thorax_rotation_deg']:.0f} deg"
-        + "; most of all joints " * bool(moved)
+        + "; the joints that moved most: " * bool(moved)
         + " and ".join(f"{name} {angle:.0f} deg" for name, angle in moved)
         + ".",
         *held_sentences(static["held"]),

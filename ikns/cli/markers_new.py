@@ -96,7 +96,7 @@ def new(
     ]
     remarks = [
         *(
-            f"no landmark on {link}: its angles are measured from the static trial."
+            f"no landmark on {link}: its angles count from the posture of the static trial."
             for link in made.assumed
         ),
         *([f"left out: {', '.join(made.skipped)}."] if made.skipped else []),
@@ -150,6 +150,7 @@ def new(
         *([] if followed is None else [followed_sentence(movement, followed.residual)]),
         *notes(remarks),
         f"Wrote {out}; see how it fits: ikns markers check {out} {static}"
-        + " --movement RECORDING" * (movement is None),
+        + f" --min-static {min_static:g}" * (min_static != 1.0)
+        + f" --movement {movement or 'RECORDING'}",
         as_json=as_json,
     )

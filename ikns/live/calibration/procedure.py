@@ -14,6 +14,8 @@ from pathlib import Path
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import sight_needs
+from ikns.calibration.judge.finding import refused
+from ikns.calibration.judge.labels import judge_labels
 from ikns.errors import MarkerMismatch, NotEnoughData, StreamError
 from ikns.live.calibration.clock import DeviceClock
 from ikns.live.calibration.folder import RecordingsFolder
@@ -54,6 +56,9 @@ def check_labels(
     columns = moving.columns(source.labels)
     missing = [moving.labels[i] for i in needed if columns[i] < 0]
     if missing:
+        others = judge_labels(source.name, source.labels, moving, calibrated=False)
+        if faults := refused(others):
+            raise MarkerMismatch(faults[0].sentence)
         raise MarkerMismatch(
             f"{source.name}: expected markers {', '.join(missing)} of {moving.name}, "
             f"found only {', '.join(source.labels)}."

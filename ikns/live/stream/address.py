@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from urllib.parse import parse_qsl
 
 from ikns.body.marker_set import MarkerSet
+from ikns.calibration.judge.finding import refused
+from ikns.calibration.judge.labels import judge_labels
 from ikns.calibration.subject import Subject
 from ikns.errors import IknsError, InvalidInput, MarkerMismatch
 from ikns.finger.ros2.address import OPTIONS as ROS_OPTIONS
@@ -145,6 +147,9 @@ def _check_labels(source: Feed, needs: MarkerSet) -> None:
     columns = needs.columns(source.labels)
     missing = [label for label, c in zip(needs.labels, columns, strict=True) if c < 0]
     if missing:
+        others = judge_labels(source.name, source.labels, needs, calibrated=True)
+        if faults := refused(others):
+            raise MarkerMismatch(faults[0].sentence)
         hint = "".join(
             f"; those of {name} are read with the option subject, as in ?subject={name}"
             for name in subjects_of(source.labels, needs)
