@@ -82,7 +82,6 @@ def new(
             name=name or out.stem,
             min_duration=min_static,
         )
-    write_text(out, made.marker_set.toml(), force=force)
     where = {one.label: one.site for one in made.placed}
     rows: list[list[Any]] = [
         [
@@ -96,7 +95,7 @@ def new(
     ]
     remarks = [
         *(
-            f"no landmark on {link}: its angles count from the posture of the static trial."
+            f"no landmark on {link}: its angles count from the static trial's posture."
             for link in made.assumed
         ),
         *([f"left out: {', '.join(made.skipped)}."] if made.skipped else []),
@@ -119,6 +118,7 @@ def new(
             min_duration=min_static,
         )
         remarks += [finding.sentence for finding in followed.findings]
+    write_text(out, made.marker_set.toml(), force=force)
     show(
         {
             "marker_set": out,
