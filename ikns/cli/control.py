@@ -108,11 +108,24 @@ def control(
                 ],
             ],
         ),
-        f"c as {method} reads it; this subject has {', '.join(calibrated.methods)}.",
+        _methods(method, calibrated),
         *notes(warned),
         f"Wrote {out}",
         as_json=as_json,
     )
+
+
+def _methods(method: str, calibrated: ikns.Subject) -> str:
+    """Say which method read c, and which one the calibration recommends."""
+    from ikns.calibration.method_summary import no_range_learned
+
+    summary = calibrated.report.get("methods", {}).get("summary") or {}
+    best = summary.get("recommended", method)
+    if summary and no_range_learned(summary):
+        best = method
+    advice = "" if best == method else f"; its calibration recommends {best}"
+    have = ", ".join(calibrated.methods)
+    return f"c as {method} reads it; this subject has {have}{advice}."
 
 
 def _percent(share: float) -> float:
