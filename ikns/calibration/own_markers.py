@@ -14,7 +14,11 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.observed import with_unshown_held
 from ikns.calibration.size_fit import SizeFit, fit_sizes, size_factors
 from ikns.calibration.static_trial import static_posture
-from ikns.calibration.turning_skin import turning_labels, with_free_turn
+from ikns.calibration.turning_skin import (
+    turning_labels,
+    with_firm_hands,
+    with_free_turn,
+)
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.recording.recording import Recording
 
@@ -80,8 +84,8 @@ def own_marker_set(
     Markers on landmarks keep the place that the landmark has on the generic body, and
     so fit other people too. With them the body is scaled and its posture found; where
     the other markers then are on their segments is measured. Joints that the set does
-    not show are held. A cluster on a forearm turns freely about its axis where the hand
-    shows how far that is turned: skin follows pronation in part only.
+    not show are held. A cluster on a forearm turns freely about its axis where another
+    on the hand shows how far that is turned: skin follows pronation in part only.
 
     Parameters
     ----------
@@ -131,9 +135,10 @@ def own_marker_set(
         tuple(replace(by_label[p.label], static_only=p.static_only) for p in placed),
         source=f"made by ikns markers new from {static.source}",
     )
+    worn = with_unshown_held(generic, worn)
     turning = turning_labels(worn)
     return OwnMarkerSet(
-        with_free_turn(with_unshown_held(generic, worn), turning),
+        with_firm_hands(with_free_turn(worn, turning), turning),
         placed,
         tuple(label for label in static.labels if _bare(label) not in by_label),
         _assumed(placed),

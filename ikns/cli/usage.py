@@ -31,9 +31,10 @@ def _wrong_words(error: typer.TyperException, message: str, argv: Sequence[str])
     command = " ".join(["ikns", *argv[:1]])  # where typer does not say it
     command = command if context is None else str(context.command_path)
     option = getattr(error, "option_name", "")
+    parts = context.command.params if context else []
     if kind == "NoSuchOption":
-        known = [name for p in context.command.params for name in p.opts]
-        meant = " or ".join(get_close_matches(option, known, n=2, cutoff=0.7))
+        options = [name for part in parts for name in part.opts]
+        meant = " or ".join(get_close_matches(option, options, n=2, cutoff=0.7))
         message = f"`{command}` has no option {option}"
         message += f" (did you mean {meant}?)" if meant else ""
     elif kind == "MissingParameter":
@@ -48,7 +49,6 @@ def _wrong_words(error: typer.TyperException, message: str, argv: Sequence[str])
         message = f"expected a command ({known}), found {word}"
     elif message.startswith("Got unexpected extra argument"):
         words = message.partition("(s) (")[2].removesuffix(")")
-        parts = context.command.params if context else []
         known = " and ".join(map(name_of, filter(_is_argument, parts)))
         message = f"expected {known or 'options'} only, found also {words}"
     return f"{message}; see `{command} --help`"

@@ -133,8 +133,8 @@ def _turning_skin(
             where,
             f"markers and body are {1000 * residual:.0f} mm apart, and "
             f"{1000 * left:.0f} mm if {say_markers(labels)} turn with the skin",
-            f"set free_turn = true for them in the marker set {worn.name}, as `ikns "
-            "markers new` does",
+            f"set free_turn = true for them in the marker set {worn.name}, and weight "
+            "= 10 for the cluster on the hand, as `ikns markers new` does",
             labels,
         )
     ]
