@@ -211,9 +211,7 @@ def test_an_arm_without_markers_is_held_and_a_bare_segment_refused(generic):
 
 def test_a_short_trial_is_refused_unless_asked_for(generic):
     recording = standing(person(generic, 2), 2, seconds=0.4)
-    with pytest.raises(
-        NotEnoughData, match=r"static trial of at least 1 s, found 0.40 s"
-    ):
+    with pytest.raises(NotEnoughData, match=r"lasts 0.40 s, expected at least 1 s"):
         scale(generic, recording)
     scale(generic, recording, min_duration=0.4)
 

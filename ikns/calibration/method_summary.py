@@ -216,7 +216,7 @@ def _recommended(
     if len(cost) == 1:
         return {"recommended": best, "why": f"{best} is the only method available"}
 
-    def told_of(method: str) -> str:
+    def told_of(method: Method) -> str:
         values = [(rows[method][cause], name) for cause, name in causes.items()]
         parts = [f"{v:.2f} with {name}" for v, name in values if v is not None]
         mean = f" ({cost[method]:.2f} on average)" if len(parts) > 1 else ""
