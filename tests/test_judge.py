@@ -275,7 +275,7 @@ def test_real_people_pass_and_their_wrong_recordings_do_not(data):
             [read(path) for path in files],
             static=static,
             marker_set="ue_adl",
-            min_static=0.5,
+            min_static=0.3,
         )
         assert [f for f in found.findings if f.severity != "note"] == []
     reach = read(folder / "ADL008" / "ADL008FR1.csv")
