@@ -176,7 +176,8 @@ def _check(placed: tuple[PlacedLabel, ...], static: Recording) -> None:
     if len({p.site.link for p in known}) < 2:
         raise MarkerMismatch(
             f"{static.source}: expected landmarks on two segments or more, to find the "
-            f"body from, found {', '.join(p.label for p in known) or 'none'}."
+            f"body from, found {', '.join(p.label for p in known) or 'none'}; say "
+            "where more of its markers sit, as in --sites FILE."
         )
 
 
