@@ -1,4 +1,4 @@
-"""What does publishing cost the finger; what do NatNet and ROS 2 take? Three tables.
+"""What does publishing cost the finger; what do streams take? Three tables.
 
 1. A simulated body swings its arm at 100 Hz through the live loop to a simulated
    finger: without a publisher; with `--publish lsl:NAME` and `ros2:NAMESPACE`, without
@@ -8,9 +8,12 @@
    second), and to the end of the iteration, when the sample is handed over (all
    frames).
 2. 39 simulated markers from another process on this machine, from sending to receipt:
-   the server of the tests, which speaks NatNet 4.1; and a ROS 2 node of the tests with
-   `mocap4r2_msgs/msg/Markers`, through a zenoh router in a third process.
+   LSL, as `ikns stream` sends them; the server of the tests, which speaks NatNet 4.1;
+   and a ROS 2 node of the tests with `mocap4r2_msgs/msg/Markers`, through a zenoh
+   router in a third process.
 3. A finger under ROS 2, its robot simulated: from a fault to the safe state.
+
+`--only publish`, `streams` or `finger` makes one of the tables.
 """
 
 import argparse
@@ -34,7 +37,7 @@ from ikns.finger import open_finger
 from ikns.live.publish import Publisher, Publishers, joint_places, open_publisher
 from ikns.live.runtime import run
 from ikns.live.runtime.listener import LoopListener
-from ikns.live.stream import Source, open_source
+from ikns.live.stream import LslOutlet, Source, open_source
 from ikns.live.stream.lsl_library import lsl
 from ikns.live.stream.replay import Replay, wait_until
 from ikns.recording.recording import Recording
@@ -212,43 +215,52 @@ def one(
     command.append([total.percentile(50), total.percentile(99)])
 
 
-def serve(frames: int, result: Connection) -> None:
-    """Send simulated markers by NatNet; their time is that of sending."""
+def serve_natnet(frames: int, result: Connection) -> None:
+    """Send simulated markers by NatNet, then report when each frame was sent."""
     from natnet_server import NatNetServer
 
     points = np.random.default_rng(0).normal(size=(MARKERS, 3))
     labels = [f"M{k}" for k in range(MARKERS)]
+    sent = np.empty(frames)
     with NatNetServer({"simulated": labels}) as server:
         result.send(server.port)
         server.streaming.wait(60)
         start = time.monotonic()
-        for k in range(frames + 1):
+        for k in range(frames):
             wait_until(start + k / RATE)
-            server.send(k, time.monotonic(), points)
+            sent[k] = time.monotonic()
+            server.send(k, sent[k], points)
         result.recv()
+        result.send(sent)
 
 
 def over_natnet(seconds: float) -> dict[str, float]:
     """Latency of NatNet frames in ms, and what was lost."""
     frames = round(seconds * RATE)
     ours, theirs = CONTEXT.Pipe()
-    sender = CONTEXT.Process(target=serve, args=(frames, theirs))
+    sender = CONTEXT.Process(target=serve_natnet, args=(frames, theirs))
     sender.start()
-    late = []
     with open_source(f"natnet:127.0.0.1:{ours.recv()}?timeout=60") as source:
-        number = -1
-        while number < frames:
-            frame = next(source)
-            number = frame.number
-            late.append(frame.receive_time - frame.device_time)
-        lost = source.continuity.counts.dropped
-        ours.send(None)
-    sender.join()
-    return lateness(late, lost)
+        return read_all(source, frames, ours)
 
 
-def lateness(late: list[float], lost: int) -> dict[str, float]:
-    """Percentiles, in ms, of how late frames were, s, and how many were lost."""
+def read_all(source: Source, frames: int, ours: Connection) -> dict[str, float]:
+    """Read to the last frame; return percentiles of their latency in ms.
+
+    Frames are known by their numbers, and when each was sent by what the sender says in
+    the end, so that no clock but this machine's counts. Frames before the first that is
+    read were sent before anyone listened.
+    """
+    received: dict[int, float] = {}
+    number = -1
+    while number < frames - 1:
+        frame = next(source)
+        number = frame.number
+        received.setdefault(number, frame.receive_time)
+    lost = source.continuity.counts.dropped
+    ours.send(None)
+    sent = ours.recv()
+    late = np.array(list(received.values())) - sent[list(received)]
     p50, p99, most = 1e3 * np.percentile(late, [50, 99, 100])
     return {
         "frames": len(late), "p50": p50, "p99": p99, "max": most, "dropped": lost,
@@ -256,7 +268,7 @@ def lateness(late: list[float], lost: int) -> dict[str, float]:
 
 
 def serve_ros(port: int, frames: int, result: Connection) -> None:
-    """Publish simulated markers to ROS 2; their stamp is the time of sending."""
+    """Publish simulated markers to ROS 2, then report when each frame was sent."""
     peer = ros_graph.Peer(port)
     put = peer.publisher("/markers", "mocap4r2_msgs/msg/Markers")
     points = np.random.default_rng(0).normal(size=(MARKERS, 3)).tolist()
@@ -271,10 +283,12 @@ def serve_ros(port: int, frames: int, result: Connection) -> None:
         }
         for k, (x, y, z) in enumerate(points)
     ]
+    sent = np.empty(frames)
     start = time.monotonic() + 0.5
     for k in range(frames):
         wait_until(start + k / RATE)
         now = time.monotonic_ns()
+        sent[k] = now / 1e9
         put(
             {
                 "stamp.sec": now // 10**9,
@@ -285,6 +299,7 @@ def serve_ros(port: int, frames: int, result: Connection) -> None:
             }
         )
     result.recv()
+    result.send(sent)
     peer.close()
 
 
@@ -292,23 +307,38 @@ def over_ros(seconds: float) -> dict[str, float]:
     """Latency of ROS 2 frames in ms, and what was lost."""
     frames = round(seconds * RATE) + 40
     ours, theirs = CONTEXT.Pipe()
-    late, number = [], -1
     with ros_graph.Graph() as graph:
         sender = CONTEXT.Process(target=serve_ros, args=(graph.port, frames, theirs))
         sender.start()
         router = f"router=127.0.0.1:{graph.port}&domain=0&timeout=60&rate={RATE}"
         with open_source(f"ros2:/markers?{router}") as source:
-            first = None
-            while number < frames - 1:
-                frame = next(source)
-                number = frame.number
-                # Stamps count from the whole second of the first one.
-                late.append((frame.receive_time - frame.device_time) % 1)
-                first = number if first is None else first
-            lost = number - first + 1 - len(late)
-            ours.send(None)
+            row = read_all(source, frames, ours)
         sender.join()
-    return lateness(late, lost)
+    return row
+
+
+def serve_lsl(name: str, frames: int, result: Connection) -> None:
+    """Send simulated markers over LSL, then report when each frame was sent."""
+    points = np.random.default_rng(0).normal(size=(MARKERS, 3))
+    sent = np.empty(frames)
+    with LslOutlet([f"M{k}" for k in range(MARKERS)], RATE, name=name) as outlet:
+        if not outlet.wait_for_listener(60):
+            sys.exit("nobody listened")
+        start = time.monotonic() + 0.2
+        for k in range(frames):
+            sent[k] = wait_until(start + k / RATE)
+            outlet.push(points, start + k / RATE)
+        result.recv()
+        result.send(sent)
+
+
+def over_lsl(seconds: float) -> dict[str, float]:
+    """Latency of LSL frames in ms, and what was lost."""
+    frames, name = round(seconds * RATE), f"ikns-benchmark-{os.getpid()}-markers"
+    ours, theirs = CONTEXT.Pipe()
+    CONTEXT.Process(target=serve_lsl, args=(name, frames, theirs)).start()
+    with open_source(f"lsl:{name}?scope=machine&timeout=60") as source:
+        return read_all(source, frames, ours)
 
 
 def faults_of_a_ros_finger(repeats: int) -> dict[str, dict[str, float]]:
@@ -345,11 +375,23 @@ def faults_of_a_ros_finger(repeats: int) -> dict[str, dict[str, float]]:
     return result
 
 
+PARTS = {
+    "publish": lambda seconds, quick: published(seconds),
+    "streams": lambda seconds, quick: {
+        "LSL, ms": over_lsl(seconds),
+        "NatNet, ms": over_natnet(seconds),
+        "ROS 2, ms": over_ros(seconds),
+    },
+    "finger": lambda seconds, quick: faults_of_a_ros_finger(1 if quick else 10),
+}
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="0.3 seconds each")
     parser.add_argument("--seconds", type=float, help="of each row")
+    parser.add_argument("--only", choices=PARTS, help="one of the tables")
     parser.add_argument("--json", action="store_true", help="one JSON object instead")
     options = parser.parse_args()
     seconds = options.seconds or (0.3 if options.quick else 60.0)
@@ -358,23 +400,21 @@ def main() -> None:
         "cores": os.cpu_count(),
         "load": round(os.getloadavg()[0], 1),
         "seconds": seconds,
-        "publish": published(seconds),
-        "natnet": over_natnet(seconds),
-        "ros": over_ros(seconds),
-        "ros finger": faults_of_a_ros_finger(1 if options.quick else 10),
+    }
+    tables = {
+        name: part(seconds, options.quick)
+        for name, part in PARTS.items()
+        if options.only in (None, name)
     }
     if options.json:
-        print(json.dumps(told, indent=2))
+        print(json.dumps(told | tables, indent=2))
         return
     print(f"cores {told['cores']}, load {told['load']}, {seconds:g} s each; simulated")
-    for kind, row in told["publish"].items():
-        cells = "  ".join(f"{name} {value:.3f}" for name, value in row.items())
-        print(f"{kind:<18} {cells}")
-    rest = {"NatNet, ms": told["natnet"], "ROS 2, ms": told["ros"]}
-    rest |= {f"finger, {fault}, ms": row for fault, row in told["ros finger"].items()}
-    for name, row in rest.items():
-        cells = "  ".join(f"{key} {value:.3f}" for key, value in row.items())
-        print(f"{name:<18} {cells}")
+    for name, rows in tables.items():
+        for row, values in rows.items():
+            words = f"finger, {row}, ms" if name == "finger" else row
+            cells = "  ".join(f"{key} {value:.3f}" for key, value in values.items())
+            print(f"{words:<28} {cells}")
 
 
 if __name__ == "__main__":

@@ -170,7 +170,7 @@ def test_a_run_that_is_over_too_soon_says_why_at_its_end(files, tmp_path, capfd)
     assert "frames: the right hand is not visible" in out
     last = err.splitlines()[-1].removeprefix("ikns: ")
     assert last.startswith("the finger never moved: ")
-    assert f"Note: {last}\n" in out
+    assert "the finger never moved" not in out  # once
 
 
 def test_a_run_that_ends_in_its_safe_state_says_so_at_once(files, tmp_path, capfd):
@@ -302,7 +302,7 @@ def test_a_stopped_finger_is_armed_again_with_a_key(files, tmp_path):
         time.sleep(1.0)
         os.kill(process.pid, signal.SIGCONT)
         said = until(ours, "press Shift+R to arm again")
-        assert "FINGER STOPPED: no " in said
+        assert said.count("FINGER STOPPED: no ") == 1
         os.write(ours, b"r\n")
         time.sleep(0.5)
         said = until(ours, "\x1b[K")
@@ -315,7 +315,7 @@ def test_a_stopped_finger_is_armed_again_with_a_key(files, tmp_path):
         until(ours, "press Shift+R to arm again")
         os.write(ours, b"\x03")  # Ctrl-C
         result = json.loads(process.stdout.read())
-        until(ours, "FINGER STOPPED")
+        assert "FINGER STOPPED" not in until(ours, "the finger was in its safe state")
     os.close(ours)
     assert process.returncode == 3
     reached = [change["after"] for change in result["transitions"]]

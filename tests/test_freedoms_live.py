@@ -342,7 +342,7 @@ def test_the_command_drives_two_fingers_and_its_session_replays(two, tmp_path, c
     fingers = ["--finger", "sim:", "--finger", "sim:dof=2&effort=0.3"]
     argv = words(two, *fingers, "--session", str(session), "--json")
     assert main(argv) == 0
-    assert "drive" not in capsys.readouterr().err
+    assert "no finger follows" not in capsys.readouterr().err
     about = read_run(session).configuration
     assert about["finger"] == ["sim:", "sim:dof=2&effort=0.3"]
     assert about["settings"]["dofs"] == [1, 2]
@@ -353,11 +353,11 @@ def test_the_command_drives_two_fingers_and_its_session_replays(two, tmp_path, c
 @pytest.mark.parametrize(
     ("fingers", "said"),
     [
-        ([], "c_2 drives nothing"),
-        (["--finger", "sim:dof=2"], "c_1 drives nothing"),
+        ([], "no finger follows c_2;"),
+        (["--finger", "sim:dof=2"], "no finger follows c_1;"),
     ],
 )
-def test_the_command_says_what_drives_nothing(two, capsys, fingers, said):
+def test_the_command_says_which_signal_no_finger_follows(two, capsys, fingers, said):
     assert main(words(two, "--dry-run", *fingers)) == 0
     assert said in capsys.readouterr().err
 

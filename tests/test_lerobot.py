@@ -43,12 +43,28 @@ class Bus:
 
     def __init__(self, robot):
         self.motors, self.robot, self.obeys = {"gripper": None}, robot, True
+        self.alone = False  # connected without its robot
+
+    @property
+    def is_connected(self):
+        return self.alone or self.robot.is_connected
+
+    def connect(self):
+        self.robot._wire()
+        self.alone = True
+
+    def disconnect(self):
+        self.alone = False
 
     def disable_torque(self, motor):
+        assert self.is_connected
+        self.robot._wire()
         self.robot.torque = self.robot.torque and not self.obeys
 
     def read(self, name, motor, *, normalize):
         assert (name, motor, normalize) == ("Torque_Enable", "gripper", False)
+        assert self.is_connected
+        self.robot._wire()
         return int(self.robot.torque)
 
 
@@ -88,7 +104,8 @@ class Device:
 
     def disconnect(self):
         self._wire()
-        self.is_connected = self.torque = False
+        self.is_connected = False
+        self.torque = self.torque and hasattr(self, "bus") and not self.bus.obeys
 
 
 def wait_for(what, seconds=5.0):
@@ -162,6 +179,38 @@ def test_a_bus_that_does_not_confirm_is_told(monkeypatch):
     with pytest.raises(FingerError, match="cut its power"):
         finger.relax()
     forget(finger)  # its torque stays on, so the end of the program would ask again
+
+
+@pytest.mark.parametrize("fault", ["silent", "silent, no bus", "disobedient"])
+def test_relaxing_that_failed_is_tried_again(fault, monkeypatch):
+    monkeypatch.setattr("ikns.finger.lerobot._RELEASE_TIMEOUT", 0.1)
+    device = Device(bus=fault != "silent, no bus")
+    finger = LeRobotFinger(device, **JOINT)
+    finger.connect()
+    connections = len(device.sent)
+
+    def silent():
+        raise ConnectionError("There is no status packet!")
+
+    if fault == "disobedient":
+        device.bus.obeys = False
+    else:
+        device.fault = silent
+    for _ in range(2):
+        with pytest.raises(FingerError, match="did not confirm that its torque is off"):
+            finger.relax()
+        assert device.torque  # and so it is
+    device.fault = None
+    if hasattr(device, "bus"):
+        device.bus.obeys = True
+    finger.relax()
+    assert not device.torque
+    assert not (hasattr(device, "bus") and device.bus.is_connected)
+    assert finger.state().mode == "relaxed"
+    finger.relax()  # harmless
+    assert len(device.sent) == connections  # it never followed again
+    with finger:
+        assert device.torque
 
 
 def test_a_packet_that_is_lost_at_the_end_is_sent_again():

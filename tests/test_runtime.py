@@ -147,6 +147,20 @@ def test_frames_that_came_before_the_start_do_not_move_the_finger(subject, explo
     assert report.stages["total"].percentile(100) < 5
 
 
+class Unread(Replay):
+    """Holds frames that nobody has read, without a time of receipt, as LSL does."""
+
+    def skip(self):
+        self._number += 10
+
+
+def test_a_run_begins_with_the_newest_frame(subject, exploring):
+    with Source(Unread(exploring, speed=0)) as source:
+        report = run(source, subject, SimulatedFinger())
+    assert report.frames == report.source["received"] == len(exploring.time) - 10
+    assert report.source["dropped"] == 0
+
+
 def states(report):
     return [change.after for change in report.transitions]
 

@@ -67,7 +67,7 @@ def test_a_posture_reaches_the_page(live: LiveView) -> None:
     with frames(live) as stream:
         live.show(q, time=1.5, c=0.25)
         frame = next_frame(stream)
-    assert (frame["time"], frame["c"]) == (1.5, 0.25)
+    assert (frame["time"], frame["c"]) == (1.5, [0.25])
     moved = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in frame["commands"]}
     for link in drawn_links(body):
         position, rotation = body.link_in_thorax(q, link)
@@ -89,7 +89,7 @@ def test_an_unknown_posture_moves_nothing(live: LiveView) -> None:
     with frames(live) as stream:
         live.show(np.full(25, np.nan), c=np.nan)
         frame = next_frame(stream)
-    assert frame == {"commands": [], "time": None, "c": None}
+    assert frame == {"commands": [], "time": None, "c": [None]}
 
 
 def test_the_page_listens_to_its_own_server_only(live: LiveView) -> None:
@@ -197,5 +197,11 @@ def test_bad_arguments_are_refused(live: LiveView) -> None:
         live.show(np.zeros((2, 25)))
     with pytest.raises(InvalidInput, match="joint angles"):
         live.show(np.zeros(7))
+    with pytest.raises(
+        InvalidInput, match="control signals as the scene has, 1, found 2"
+    ):
+        live.show(np.zeros(25), c=[0.5, 0.5])
+    with pytest.raises(InvalidInput, match="flexions as the scene has, 0, found 1"):
+        live.show(np.zeros(25), flexion=0.5)
     with pytest.raises(FileError, match=f"port {port(live)}"):
         LiveView(scene(), small_person.subject().skeleton, port=port(live))

@@ -95,6 +95,26 @@ def test_a_recording_arrives_as_it_was_sent(name: str) -> None:
     assert min(f.receive_time - f.device_time - offset for f in frames) > -0.064
 
 
+def test_frames_that_nobody_read_are_skipped_and_not_counted(name: str) -> None:
+    there = recording(30)
+    with LslOutlet(there.labels, there.rate, name=name) as outlet:
+        with opened(name) as source:
+            outlet.push(there.markers[0])
+            assert next(source).number == 0
+            start = time.monotonic()
+            for k in range(1, 25):
+                outlet.push(there.markers[k], start + k / there.rate)
+            inlet, give_up = source._feed._open.inlet, time.monotonic() + 20
+            while inlet.samples_available() < 24:
+                assert time.monotonic() < give_up
+                time.sleep(0.01)
+            source.skip()
+            outlet.push(there.markers[25], start + 25 / there.rate)
+            np.testing.assert_array_equal(next(source).markers, there.markers[25])
+            counts = source.continuity.counts
+    assert (counts.received, counts.dropped, counts.repeated) == (2, 0, 0)
+
+
 def test_what_is_struck_is_counted(name: str) -> None:
     there = recording(300, rate=500)
     faults = "drop=0.05,repeat=0.05,swap=0.05,freeze=0.01:0.02,late=0.005:0.1"

@@ -5,7 +5,7 @@ between frames in double precision what a page stores as float32: 1e-6 m.
 """
 
 import io
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -187,6 +187,43 @@ def test_a_live_view_follows_the_postures(tab: Tab) -> None:
                 tab.place("body", "right_hand"), place, atol=1e-6
             )
         assert tab.page.inner_text("#c") == "c = 0.50"
+        assert tab.complaints == []
+        tab.page.goto("about:blank")
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_live_view_of_several_signals_has_a_bar_for_each(
+    tab: Tab, width: int
+) -> None:
+    body, names = small_person.subject().skeleton, ("c_1", "c_2")
+    tab.page.set_viewport_size({"width": width, "height": 600})
+    with LiveView(replace(mapped(), signals=names, c=np.zeros((2, 2)),
+                          times=np.arange(2.0)), body) as live:  # fmt: skip
+        tab.show(live.url)
+        live.show(body.neutral(), time=1.0, c=[0.25, np.nan])
+        tab.page.wait_for_function(
+            "() => document.getElementById('clock').textContent === '1.00 s'"
+        )
+        said = [tab.page.inner_text(f"#{name}") for name in names]
+        assert said == ["c_1 = 0.25", "c_2 unknown"]
+        full = [tab.page.locator(f"#{name}_gauge").bounding_box() for name in names]
+        bars = [tab.page.locator(f"#{name}_gauge i").bounding_box() for name in names]
+        # A browser lays out in 64ths of a pixel.
+        assert bars[0]["width"] == pytest.approx(full[0]["width"] / 4, abs=1 / 32)
+        assert bars[1] is None or bars[1]["width"] == 0
+        # Nothing is beyond the edge, and nothing covers anything else.
+        boxes = full + [
+            tab.page.locator(f"#{name}").bounding_box() for name in (*names, "clock")
+        ]
+        assert all(0 <= b["x"] and b["x"] + b["width"] <= width for b in boxes)
+        for k, one in enumerate(boxes):
+            for other in boxes[k + 1 :]:
+                assert (
+                    one["x"] + one["width"] <= other["x"]
+                    or other["x"] + other["width"] <= one["x"]
+                    or one["y"] + one["height"] <= other["y"]
+                    or other["y"] + other["height"] <= one["y"]
+                )
         assert tab.complaints == []
         tab.page.goto("about:blank")
 

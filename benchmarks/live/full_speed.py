@@ -63,6 +63,9 @@ class _Counted:
             self.resident[self._marks[self._count]] = resident()
         return self._replay.poll(timeout)
 
+    def skip(self) -> None:
+        """Nothing comes before it is read."""
+
     def close(self) -> None:
         """Nothing is held open."""
 

@@ -94,6 +94,9 @@ class _Playing:
             self.torque_after = self._wire.servos[0].torque
         return frame
 
+    def skip(self) -> None:
+        """Nothing comes before it is read."""
+
     def close(self) -> None:
         """Nothing is held open."""
 

@@ -110,6 +110,9 @@ class Struck:
         self.ended = frame.number >= self._stop + _AFTER
         self._waiting.append(frame)
 
+    def skip(self) -> None:
+        """Nothing comes before it is read."""
+
     def close(self) -> None:
         """Nothing is held open."""
 

@@ -169,16 +169,15 @@ def _timeline(where: Timeline, subject: ikns.Subject | None, title: str) -> Publ
 
 
 def say_undriven(n_dof: int, dofs: Sequence[int]) -> None:
-    """Say which freedoms of a map drive no finger, if there are any."""
+    """Say which freedoms of a map no finger follows, if there are any."""
     from ikns.nullspace.signal_names import signal_names
 
     names = signal_names(n_dof)
     idle = [k for k in range(1, n_dof + 1) if k not in dofs]
     if idle:
         which = ", ".join(names[k - 1] for k in idle)
-        verb = "drives" if len(idle) == 1 else "drive"
         sys.stderr.write(
-            f"ikns: {which} {verb} nothing; a finger follows with --finger "
+            f"ikns: no finger follows {which}; one does with --finger "
             f"'sim:dof={idle[0]}' or 'dynamixel:PORT?dof={idle[0]}'.\n"
         )
 

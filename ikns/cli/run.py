@@ -36,7 +36,7 @@ from ikns.cli.options import (
 )
 from ikns.cli.output import show, table
 from ikns.cli.reading import label_names
-from ikns.cli.stop_notice import STOPPED, stop_line, watch_stops
+from ikns.cli.stop_notice import STOPPED, arm_hint, watch_stops
 from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
 
@@ -154,10 +154,10 @@ def run(
         max_uncertainty=max_uncertainty,
         dofs=group.dofs,
     )
-    say_undriven(n_dof, group.dofs)
     with ExitStack() as stack:
         opened = open_source(source, subject=calibrated, names=names)
         stream = stack.enter_context(opened)
+        say_undriven(n_dof, group.dofs)
         simulated = is_simulated(calibrated, subject, played_files(source))
         shared = publishing(
             publish or [],
@@ -193,7 +193,10 @@ def run(
         arm = threading.Event()
         shown = [stack.enter_context(_status_line(arm))]
         if view:
-            shown.append(_body(stack, calibrated, subject, simulated=simulated))
+            body = _body(
+                stack, calibrated, subject, simulated=simulated, dofs=group.dofs
+            )
+            shown.append(body)
         report = drive(
             stream,
             calibrated,
@@ -263,13 +266,18 @@ def _kept(
 
 
 def _body(
-    stack: ExitStack, calibrated: ikns.Subject, subject: Path, *, simulated: bool
+    stack: ExitStack,
+    calibrated: ikns.Subject,
+    subject: Path,
+    *,
+    simulated: bool,
+    dofs: tuple[int, ...],
 ) -> Callable[[LoopStatus], None]:
     """Open the window with the body, and return what draws it."""
     from ikns.view.scene import body_view
 
     name = subject.resolve().name
-    shown = body_view(calibrated, simulated=simulated, name=name)
+    shown = body_view(calibrated, simulated=simulated, name=name, dofs=dofs)
     window, take = stack.enter_context(shown)
     sys.stderr.write(f"ikns: the view is at {window.url} on this machine.\n")
     window.open()
@@ -286,6 +294,8 @@ def _show_report(
     as_json: bool,
 ) -> None:
     """Print how a run went."""
+    from ikns.live.runtime.report import frames
+
     published = None if publisher is None else publisher.counts
     result = _result(report) | {
         "session": session,
@@ -299,12 +309,11 @@ def _show_report(
             {"quantity": "s", "value": "s"},
             _rows(report, published),
         ),
-        *([f"Note: {report.problem}"] if report.problem else []),
         *(
             f"{c.time:9.3f} s  {c.before} to {c.after}: {c.reason}"
             for c in report.transitions[-12:]
         ),
-        *(f"{n} frames: {reason}" for reason, n in _most(report.rejections)),
+        *(f"{frames(n)}: {why}" for why, n in _most(report.rejections)),
         *([f"Wrote {session}"] if session else []),
         as_json=as_json,
     )
@@ -315,7 +324,7 @@ def _exit(report: Report, losses: list[str]) -> None:
     if losses:
         raise DataLoss("; ".join(losses))
     if report.stopped or report.problem:
-        say(stop_line(report.stopped) if report.stopped else report.problem)
+        say(report.problem)
         raise typer.Exit(STOPPED)
     if code := signal_exit_code():
         raise typer.Exit(code)
@@ -328,7 +337,7 @@ def _most(rejections: dict[str, int]) -> list[tuple[str, int]]:
 
 @contextmanager
 def _status_line(arm: threading.Event) -> Iterator[Callable[[LoopStatus], None]]:
-    """Rewrite one line on stderr if it is a terminal; say there when it is stopped."""
+    """Rewrite one line on stderr if it is a terminal; a key arms what is stopped."""
     with watch_stops(arm.set, announce=False) as watch:
         if not sys.stderr.isatty():
             yield watch
@@ -342,12 +351,7 @@ def _status_line(arm: threading.Event) -> Iterator[Callable[[LoopStatus], None]]
                 last = status.time
                 # A wrapped line could not be rewritten.
                 room = shutil.get_terminal_size().columns - 1
-                line = (
-                    stop_line(status.stopped, width=room)
-                    if status.stopped
-                    else _line(status)
-                )
-                sys.stderr.write(f"\r\x1b[K{line[:room]}")
+                sys.stderr.write(f"\r\x1b[K{_line(status)[:room]}")
                 sys.stderr.flush()
 
         yield write
@@ -364,7 +368,9 @@ def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], N
 
 def _line(s: LoopStatus) -> str:
     """Return the status, most important first: a narrow terminal cuts the rest."""
-    drive = f"{s.state:<7} {' '.join(_axis(axis, s.axes) for axis in s.axes)}"
+    # The reason stands above, where it does not vanish.
+    state = f"STOPPED{arm_hint()}:" if s.stopped else f"{s.state:<7}"
+    drive = f"{state} {' '.join(_axis(axis, s.axes) for axis in s.axes)}"
     late = 1e3 * s.latency
     # Never wider, so that 80 columns hold the residual too.
     pace = f"{s.rate:4.0f}/s p99 {late:4.{2 if late < 9.995 else 0}f} ms"

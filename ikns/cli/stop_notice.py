@@ -16,18 +16,11 @@ if TYPE_CHECKING:
 STOPPED = 3
 #: With Shift: not typed by accident. Keys that come before the stop do not count.
 _KEY = "R"
-_WORDS = "FINGER STOPPED: "
 
 
-def stop_line(reason: str, *, width: int = 10_000) -> str:
-    """Return what stands while the finger is stopped; a narrow line cuts the reason.
-
-    >>> stop_line("no command for 0.5 s", width=30)
-    'FINGER STOPPED: no command for'
-    """
-    how = ", press Shift+R to arm again" if keyboard() else ""
-    room = width - len(_WORDS) - len(how)
-    return (_WORDS + reason[: max(room, 0)] + how)[:width]
+def arm_hint() -> str:
+    """Return which key arms a stopped finger again; empty without a keyboard."""
+    return ", press Shift+R to arm again" if keyboard() else ""
 
 
 @contextmanager
@@ -52,7 +45,8 @@ def watch_stops(
             nonlocal said
             pressed = keys(0.0)
             if status.stopped and not said and announce:
-                sys.stderr.write(f"\nikns: {stop_line(status.stopped)}{how}.\n")
+                words = f"FINGER STOPPED: {status.stopped}{arm_hint()}{how}"
+                sys.stderr.write(f"\nikns: {words}.\n")
                 sys.stderr.flush()
             elif status.stopped and said and _KEY in pressed:
                 arm()

@@ -25,6 +25,7 @@ from ikns.cli.visit_drivers import (
     arm_is_simulated,
     arm_subject,
     describe_input,
+    driven_dofs,
     fingers_opener,
     open_arm_source,
     ring_finger,
@@ -95,6 +96,7 @@ def conduct(
             with open_arm_source(arm, subject) as source:
                 ikns.warm_up()
                 rate = source.rate * source.speed
+            say_undriven(subject.null_space_map.n_dof, driven_dofs(arm, subject))
         shared = publishing(
             arm.publish or [],
             subject,
@@ -133,7 +135,14 @@ def conduct(
             if arm.view:
                 assert arm.subject is not None
                 name = arm.subject.resolve().name
-                address = _open_view(stack, subject, name, shown, simulated=simulated)
+                address = _open_view(
+                    stack,
+                    subject,
+                    name,
+                    shown,
+                    simulated=simulated,
+                    dofs=driven_dofs(arm, subject),
+                )
             drivers["ikns"] = lambda: arm_driver(
                 arm, subject, session, identity.participant, shown, losses, publisher
             )
@@ -228,9 +237,7 @@ def _checked(
         )
     subject = arm_subject(arm) if "ikns" in conditions else None
     n_dof = None if subject is None else subject.null_space_map.n_dof
-    opener = fingers_opener(arm, n_dof)
-    if n_dof is not None and opener is not None:
-        say_undriven(n_dof, opener().dofs)
+    fingers_opener(arm, n_dof)
     if arm.publish:
         from ikns.live.publish import check_publish
 
@@ -298,11 +305,12 @@ def _open_view(
     shown: list[Callable[[LoopStatus], None]],
     *,
     simulated: bool,
+    dofs: Sequence[int],
 ) -> str:
     """Serve the 3-D view; `shown` gets what draws a status. Returns its address."""
     from ikns.view.scene import body_view
 
-    view = body_view(subject, simulated=simulated, name=name)
+    view = body_view(subject, simulated=simulated, name=name, dofs=dofs)
     window, draw = stack.enter_context(view)
     shown.append(draw)
     return window.url
@@ -326,8 +334,6 @@ def _relative(path: Path, folder: Path) -> str:
 def _show_attempts(
     identity: VisitIdentity, conductor: Conductor, losses: list[str], *, as_json: bool
 ) -> None:
-    from ikns.statistics.wording import counted
-
     results, left = conductor.results, conductor.shown["trials_left"]
     figures = "time" if identity.experiment == "picking" else "rmse"
     result = {
@@ -350,12 +356,9 @@ def _show_attempts(
                 "outcome": "s",
                 {"time": "time\ns", "rmse": "RMSE\nof 100"}[figures]: ".2f",
             },
-            [
-                [a["number"], a["key"].replace("/", " "), a["outcome"], a.get(figures)]
-                for a in results
-            ],
+            [[a["number"], a["step"], a["outcome"], a.get(figures)] for a in results],
         ),
-        f"{counted(left, 'trial')} left; the same command continues."
+        f"{left} trial{'s' * (left != 1)} left; the same command continues."
         if left
         else "All trials are done.",
         f"Wrote {identity.folder}",

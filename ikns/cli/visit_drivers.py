@@ -155,13 +155,11 @@ def arm_driver(
     from ikns.experiments.conduct.live import live_driver
     from ikns.live.control.settings import ControlSettings
 
-    n_dof = subject.null_space_map.n_dof
-    fingers = fingers_opener(arm, n_dof)
     settings = ControlSettings(
         hold_speed=arm.hold_speed,
         method=arm.method,
         max_uncertainty=arm.max_uncertainty,
-        dofs=fingers().dofs if fingers else (1,),
+        dofs=driven_dofs(arm, subject),
     )
 
     def open_session(source: Source) -> AbstractContextManager[RunWriter]:
@@ -193,7 +191,7 @@ def arm_driver(
     return live_driver(
         lambda: open_arm_source(arm, subject),
         subject,
-        finger=fingers,
+        finger=fingers_opener(arm, subject.null_space_map.n_dof),
         open_session=open_session,
         settings=settings,
         smooth=arm.smooth,
@@ -218,6 +216,12 @@ def fingers_opener(
     safety = Safety(safe_state=arm.safe_state)
     open_fingers(arm.fingers, n_dof=n_dof, safety=safety)
     return lambda: open_fingers(arm.fingers, n_dof=n_dof, safety=safety)
+
+
+def driven_dofs(arm: ArmOptions, subject: ikns.Subject) -> tuple[int, ...]:
+    """Return which freedoms of the map are followed; the first where no finger is."""
+    opener = fingers_opener(arm, subject.null_space_map.n_dof)
+    return opener().dofs if opener else (1,)
 
 
 def ring_finger(arm: ArmOptions) -> Callable[[], Finger] | None:

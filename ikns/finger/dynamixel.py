@@ -122,7 +122,6 @@ class DynamixelFinger:
         self._attempt: Attempt | None = None
         self._stop = threading.Event()
         self._torque_owed = False  # torque may be on since an earlier connection
-        self._confirmed = True
 
     def connect(self) -> None:
         """Connect and follow commands from the present position; leave the safe state.
@@ -178,7 +177,8 @@ class DynamixelFinger:
     def relax(self) -> None:
         """Switch the torque off, read back that it is off, and close the port.
 
-        The finger's own thread does so, whatever interrupts this call.
+        The finger's own thread does so, whatever interrupts this call. Repeated, it
+        tries again what was not confirmed.
 
         Raises
         ------
@@ -188,14 +188,14 @@ class DynamixelFinger:
         """
         self._stop.set()
         with self._access:
-            thread = self._thread
-            if thread is None:
-                return
             self._stop.set()
-            thread.join()
-            self._thread = None
-            confirmed, self._confirmed = self._confirmed, True
-        if not confirmed:
+            if self._thread is not None:
+                self._thread.join()
+                self._thread = None
+            elif self._torque_owed:
+                self._close()
+            owed = self._torque_owed
+        if owed:
             watchdog = "bus_watchdog" in self._model
             raise FingerError(
                 f"{self._bus.port}: servo {self._bus.id} did not confirm that its "
@@ -286,7 +286,7 @@ class DynamixelFinger:
     def _close(self) -> None:
         """Switch torque off, where it was ever on, and close the port."""
         if self._torque_owed:
-            self._confirmed = self._drive.release(_RELAX_TIMEOUT)
-        self._torque_owed = False
+            self._torque_owed = not self._drive.release(_RELAX_TIMEOUT)
         self._bus.close()
-        forget(self)
+        if not self._torque_owed:
+            forget(self)

@@ -101,10 +101,7 @@ class LeRobotFinger:
             request = self._connecting = Attempt()
             if thread is None or not thread.is_alive():
                 self._stop.clear()
-                thread = self._thread = threading.Thread(
-                    target=self._run, daemon=True, name=f"finger on {self._joint.name}"
-                )
-                thread.start()
+                thread = self._start()
             try:
                 request.done.wait()
             except BaseException:  # such as Ctrl-C: the thread relaxes and ends
@@ -144,7 +141,7 @@ class LeRobotFinger:
             self._guard.fail(reason)
 
     def relax(self) -> None:
-        """Switch the torque off and disconnect; harmless when repeated.
+        """Switch the torque off and disconnect; tries again when repeated.
 
         Raises
         ------
@@ -157,12 +154,14 @@ class LeRobotFinger:
             thread = self._thread
             with self._lock:
                 self._guard.relax()
-            if thread is None:
-                return
-            thread.join(_RELAX_TIMEOUT)
-            if not thread.is_alive():
-                self._thread = None
-            if thread.is_alive() or not self._joint.off:
+            if thread is None and not self._joint.off:  # it failed before
+                with contextlib.suppress(RuntimeError):  # Python starts none at exit
+                    thread = self._start()
+            if thread is not None:
+                thread.join(_RELAX_TIMEOUT)
+                if not thread.is_alive():
+                    self._thread = thread = None
+            if thread is not None or not self._joint.off:
                 raise FingerError(
                     f"{self._name} did not confirm that its torque is off, cut its "
                     "power."
@@ -191,6 +190,14 @@ class LeRobotFinger:
         wrong = not (self._guard.torque or self._joint.off)
         self._unwanted_since = min(self._unwanted_since, now) if wrong else math.inf
         return now
+
+    def _start(self) -> threading.Thread:
+        """Start the thread; once it is to stop, that only switches the torque off."""
+        name = f"finger on {self._joint.name}"
+        thread = threading.Thread(target=self._run, daemon=True, name=name)
+        thread.start()
+        self._thread = thread
+        return thread
 
     def _run(self) -> None:
         """Own the robot from connecting until the torque is off, whatever happens."""

@@ -80,6 +80,7 @@ class RobotJoint:
         self._open, self._span = open, closed - open
         self._others: dict[str, Any] = {}
         self.off = True
+        self._unconfirmed = False  # disconnected, and torque was not known to be off
 
     def connect(self) -> float:
         """Connect, or connect again; return the flexion measured.
@@ -118,23 +119,37 @@ class RobotJoint:
         return self.flexion(self._robot.get_observation())
 
     def switch_off(self) -> None:
-        """Switch torque off, and read it back where that is possible."""
-        bus = getattr(self._robot, "bus", None)
+        """Switch torque off, and read it back where that is possible.
+
+        Where disconnecting did not confirm it, only the motor bus is opened again: the
+        robot would switch its torque on.
+        """
+        bus: Any = getattr(self._robot, "bus", None)
         motor = self.name.partition(".")[0]
-        if not self._robot.is_connected:
+        if not (self._robot.is_connected or self._unconfirmed):
             self.off = True
         elif motor in getattr(bus, "motors", ()):
-            bus.disable_torque(motor)  # type: ignore[union-attr]
-            read: Any = bus.read("Torque_Enable", motor, normalize=False)  # type: ignore[union-attr]
-            self.off = read == 0
-        else:
+            if not (self._robot.is_connected or bus.is_connected):
+                bus.connect()
+            bus.disable_torque(motor)
+            self.off = bus.read("Torque_Enable", motor, normalize=False) == 0
+        elif self._robot.is_connected:
             self.disconnect()
             self.off = True
 
     def disconnect(self) -> None:
-        """Disconnect the robot, if it is connected."""
+        """Disconnect the robot, if it is connected, and its motor bus."""
         if self._robot.is_connected:
+            self._unconfirmed = not self.off
             self._robot.disconnect()
+            # Without a bus, having disconnected is all the confirmation there is.
+            if getattr(self._robot, "bus", None) is None:
+                self._unconfirmed = False
+        elif self._unconfirmed:
+            bus: Any = getattr(self._robot, "bus", None)
+            self._unconfirmed = not self.off
+            if getattr(bus, "is_connected", False):
+                bus.disconnect()
 
     def flexion(self, values: Mapping[str, Any]) -> float:
         """Return the flexion of a position among others, not clipped."""

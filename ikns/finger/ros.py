@@ -165,9 +165,9 @@ class RosFinger:
             if self._thread is not None:
                 self._thread.join()
                 self._thread = None
-                self._leave()
             with self._lock:
                 self._guard.relax()
+            self._leave()
 
     def __enter__(self) -> Self:
         """Connect."""

@@ -103,9 +103,9 @@ def animation_bytes(
 
 
 def _at(scene: Scene, times: Array) -> Array:
-    """Control signal at the played frame that is the nearest to each time."""
+    """First control signal at the played frame that is the nearest to each time."""
     nearest = np.abs(scene.times[:, None] - times).argmin(axis=0)
-    return np.asarray(scene.c[nearest])
+    return np.asarray(scene.columns[0][nearest])
 
 
 def _held(c: Array) -> Array:
@@ -132,7 +132,7 @@ def _frame(scene: Scene, times: Array, c: Array, k: int) -> Image.Image:
         curve.plot(times[k], c[k], "o", color=BLUE, ms=6)
         low, high = np.nanmin(np.append(c, 0.0)), np.nanmax(np.append(c, 1.0))
         curve.set(xlim=(times[0], times[-1]), ylim=(low - 0.1, high + 0.1))
-        curve.set(yticks=[0, 1], xticks=[], ylabel="c")
+        curve.set(yticks=[0, 1], xticks=[], ylabel=scene.signals[0])
         word = " (simulated subject)" if scene.simulated else ""
         figure.text(0.015, 0.945, scene.title + word, fontweight="bold", size=10.5)
         figure.text(0.015, 0.905, scene.caption, color=GREY)

@@ -70,7 +70,8 @@ function showPlace() {
 const number = (value, digits, unit = "") => (known(value) ? `${value.toFixed(digits)}${unit}` : "\u2013");
 
 function facts() {
-  const source = shown.source, rows = [["c", number(shown.c, 3), known(shown.c) ? "" : "bad"]];
+  const source = shown.source, of = known(source.dof) ? `, finger ${source.dof}` : "";
+  const rows = [[`c${of}`, number(shown.c, 3), known(shown.c) ? "" : "bad"]];
   if (source.kind === "page") {
     rows.push(["Participant's page", shown.page_connected ? "connected" : "not open", shown.page_connected ? "good" : "bad"]);
     if (source.device) rows.push(["Gamepad", source.device, known(shown.c) ? "" : "bad"]);
@@ -84,9 +85,9 @@ function facts() {
     rows.push(old ? [name, "unknown", "bad"] : [name, text(source[key]), kind(source[key])]);
   };
   add("state", "Control", String, (state) => ({ active: "good", stopped: "bad" })[state] ?? "");
-  if (source.finger !== "") add("finger", "Finger", String, (finger) => (finger.startsWith("stopped") ? "bad" : ""));
-  add("flexion", "Flexion commanded", (value) => number(value, 2));
-  add("measured", "Flexion measured", (value) => number(value, 2));
+  if (source.finger !== "") add("finger", of ? "Fingers" : "Finger", String, (finger) => (finger.startsWith("stopped") ? "bad" : ""));
+  add("flexion", `Flexion commanded${of}`, (value) => number(value, 2));
+  add("measured", `Flexion measured${of}`, (value) => number(value, 2));
   for (const key of Object.keys(source).filter((name) => /^(c|flexion|measured)_\d+$/.test(name))) {
     const [what, dof] = key.split("_");
     const words = { c: "c", flexion: "Flexion commanded", measured: "Flexion measured" };
@@ -136,7 +137,7 @@ function showAttempts() {
   find("heads").replaceChildren(cells("th", "", "Step", "Outcome", picking ? "Time" : "RMSE", ...(picking ? [] : ["Lag"])));
   table.replaceChildren(...[...shown.attempts].reverse().map((a) => {
     const figures = picking ? [number(a.time, 2, " s")] : [number(a.rmse, 2), number(a.lag, 2, " s")];
-    const row = cells("td", a.number, a.key.replaceAll("/", " "), a.outcome, ...figures);
+    const row = cells("td", a.number, a.step, a.outcome, ...figures);
     row.title = a.reason;
     return row;
   }));

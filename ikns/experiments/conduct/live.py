@@ -166,6 +166,8 @@ class LiveDriver:
         }
         measured_at = self._status_at if self._finger is None else self._finger_at
         known = {"kind": "ikns", "stopped": self._stopped} | session
+        if len(status.axes) > 1:
+            known["dof"] = status.axes[0].dof  # that of c, flexion and measured
         return known | recent_values(
             (loop, now - self._status_at),
             (finger, now - measured_at),

@@ -24,7 +24,18 @@ _PROMPTS = {
 
 def attempt_facts(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the panel lists of an attempt."""
-    return {key: row[key] for key in ("number", "key", "outcome", "reason")}
+    facts = {key: row[key] for key in ("number", "key", "outcome", "reason")}
+    return facts | {"step": step_words(row["key"])}
+
+
+def step_words(key: str) -> str:
+    """Return a step's key in words, its repeats counted from 1.
+
+    >>> step_words("ikns/trial/T2/0")
+    'ikns trial T2 1'
+    """
+    *names, repeat = key.split("/")
+    return " ".join([*names, str(int(repeat) + 1)])
 
 
 def plan_steps(experiment: Experiment) -> list[dict[str, Any]]:

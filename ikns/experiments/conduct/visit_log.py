@@ -125,9 +125,10 @@ class VisitLog:
         """
         self.flush()
         if self._unwritten:
+            lost = len(self._unwritten)
             raise DataLoss(
-                f"{self.folder}: {len(self._unwritten)} attempts could not be written: "
-                f"{self.fault}"
+                f"{self.folder}: {lost} attempt{'s' * (lost != 1)} could not be "
+                f"written: {self.fault}"
             )
 
 

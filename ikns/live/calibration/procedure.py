@@ -182,6 +182,7 @@ class _Run:
         read_timeout: float,
     ) -> None:
         protocol, source = self._protocol, self._source
+        source.skip()
         self._handle(protocol.begin(0.0))
         shown = -math.inf
         while not protocol.over:

@@ -89,6 +89,7 @@ class FrameLoop:
         """Start the clock and arm the safety machine."""
         # What a source received before, while others were being opened, is outdated.
         self._start = self._armed_at = time.monotonic()
+        self._source.skip()
         if self._listener:
             self._listener.event(self._start, "start", "time 0 of the run")
         self._apply(self._controller.machine.arm(0.0))
@@ -106,8 +107,10 @@ class FrameLoop:
                 self._fingers.connect()
             except (IknsError, OSError) as error:
                 self._refusal = f"; re-arming failed: {str(error).rstrip('.')}"
+                self._notice(self.elapsed(), self._refusal[2:] + ".")
                 return
         self._armed_at = time.monotonic()
+        self._source.skip()
         self._apply(self._controller.machine.arm_again(self.elapsed()))
 
     def is_current(self, frame: Frame) -> bool:
@@ -133,7 +136,9 @@ class FrameLoop:
         decided = time.monotonic()
         self._apply(decision.changes)
         if decision.valid and decision.state == "armed":
-            self._apply(self._controller.machine.activate(receive_time, "poses come"))
+            self._apply(
+                self._controller.machine.activate(receive_time, "first valid pose")
+            )
         sent = self._command()
         done = time.monotonic()
         self._check_fingers(receive_time)

@@ -177,7 +177,7 @@ def run(
                 if on_status and loop.status_due(status_every):
                     on_status(loop.status())
         finally:
-            loop.disarm("stop requested" if stopped.is_set() else "the end")
+            loop.disarm("stop requested" if stopped.is_set() else "run ended")
     return loop.report
 
 

@@ -13,6 +13,15 @@ from ikns.live.control.safety import Transition
 from ikns.live.stream.delays import Delays
 
 
+def frames(count: int) -> str:
+    """Count frames in words.
+
+    >>> frames(1), frames(2)
+    ('1 frame', '2 frames')
+    """
+    return f"{count} frame" + "s" * (count != 1)
+
+
 class AxisStatus(NamedTuple):
     """Status of one freedom that drives a finger.
 
@@ -156,5 +165,5 @@ class Report:
                 )
         if self.was_active:
             return ""
-        reasons = [f"{n} frames: {reason}" for reason, n in self.rejections.items()]
+        reasons = [f"{frames(n)}: {why}" for why, n in self.rejections.items()]
         return f"the finger never moved: {'; '.join(reasons) or self.why}."

@@ -70,6 +70,10 @@ class ClientFeed:
         """Return the next frame, None after `timeout` seconds."""
         return self._client.inbox.get(timeout)
 
+    def skip(self) -> None:
+        """Forget the frames that came but were not read."""
+        self._client.inbox.clear()
+
     def close(self) -> None:
         """Disconnect."""
         self._client.close()

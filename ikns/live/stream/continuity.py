@@ -93,6 +93,10 @@ class Continuity:
         self._smallest = self._smallest_before = math.inf
         self._window_ends = -math.inf
 
+    def skip(self) -> None:
+        """Do not count the frames before the next one as dropped."""
+        self._last = None
+
     def add(self, frame: Frame) -> None:
         """Count the next frame."""
         if self._last is None or frame.number < self._highest - self._horizon:

@@ -75,6 +75,10 @@ class Feed(Protocol):
         """Return the next frame, or None when none comes within `timeout` seconds."""
         ...
 
+    def skip(self) -> None:
+        """Forget the frames that came but were not read."""
+        ...
+
     def close(self) -> None:
         """Close the connection; harmless when repeated."""
         ...

@@ -48,6 +48,11 @@ class Inbox:
                 self._changed.wait(left)
             return self._frames.popleft() if self._frames else None
 
+    def clear(self) -> None:
+        """Forget the frames that are waiting."""
+        with self._changed:
+            self._frames.clear()
+
     def close(self) -> None:
         """Wake a waiting reader; frames in the queue can still be read."""
         with self._changed:

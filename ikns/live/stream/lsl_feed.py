@@ -151,6 +151,16 @@ class LslFeed:
             self._tell("time stamps are uneven, so lost frames cannot be counted.")
         return Frame(number, device_time, received, opened.layout.markers(sample))
 
+    def skip(self) -> None:
+        """Forget the frames that came but were not read.
+
+        LSL keeps no time of receipt, so that frames that waited would seem to come now.
+        """
+        opened = self._open
+        if opened is not None:
+            opened.inlet.flush()
+            self._numbers.bridge()
+
     def close(self) -> None:
         """Close the stream."""
         with self._changed:

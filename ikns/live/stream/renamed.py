@@ -44,6 +44,10 @@ class RenamedFeed:
         """Return the next frame, or None when none comes within `timeout` seconds."""
         return self._feed.poll(timeout)
 
+    def skip(self) -> None:
+        """Forget the frames that came but were not read."""
+        self._feed.skip()
+
     def close(self) -> None:
         """Close the connection."""
         self._feed.close()

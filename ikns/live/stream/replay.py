@@ -113,5 +113,8 @@ class Replay:
         self._number += 1
         return frame
 
+    def skip(self) -> None:
+        """Nothing comes before it is read."""
+
     def close(self) -> None:
         """Nothing is held open."""

@@ -101,6 +101,12 @@ class Source:
             self._add_event(f"no frame for {now - self._last:.1f} s.")
         return frame
 
+    def skip(self) -> None:
+        """Go on with the next frame that comes; those that waited do not count."""
+        self._feed.skip()
+        self.continuity.skip()
+        self._last = time.monotonic()
+
     def _add_event(self, text: str) -> None:
         self.events.append(Event(time.monotonic(), f"{self.name}: {text}"))
 

@@ -109,6 +109,10 @@ class SubjectFeed:
         markers = frame.markers[self._columns]
         return Frame(frame.number, frame.device_time, frame.receive_time, markers)
 
+    def skip(self) -> None:
+        """Forget the frames that came but were not read."""
+        self._feed.skip()
+
     def close(self) -> None:
         """Close the connection."""
         self._feed.close()

@@ -8,6 +8,7 @@ assumption: where people wear the finger was not measured.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -35,19 +36,56 @@ _PALM = {"right": (0.0, 0.0, -1.0), "left": (0.0, 0.0, 1.0)}
 _HALF_HAND = 0.014
 #: Thickness of the post that is drawn between wrist and base, m.
 _POST = 0.02
+#: From one finger to the next on the same forearm, m: a base is 34 mm wide.
+_BESIDE = 0.04
 
 
-def finger_path(side: str) -> str:
-    """Node of the finger's base on a forearm."""
-    return f"{ROOT}/body/{side}_forearm/finger"
+def finger_path(side: str, number: int | None = None) -> str:
+    """Node of the base of a finger on a forearm; of several, each has its number."""
+    own = "finger" if number is None else f"finger_{number}"
+    return f"{ROOT}/body/{side}_forearm/{own}"
 
 
-def with_finger(scene: Scene, skeleton: Skeleton, side: str) -> Scene:
-    """Add an open finger on the forearm of a side to a scene with a body."""
-    base = finger_path(side)
+def with_fingers(scene: Scene, skeleton: Skeleton, sides: Mapping[int, str]) -> Scene:
+    """Add open fingers to a scene with a body: on which side, by their numbers.
+
+    Those on one forearm stand side by side.
+    """
+    numbers = list(sides)
+    for number, side in sides.items():
+        there = [n for n in numbers if sides[n] == side]
+        across = _BESIDE * (there.index(number) - (len(there) - 1) / 2)
+        own = None if len(numbers) == 1 else number
+        scene = with_finger(scene, skeleton, side, number=own, across=across)
+    return scene
+
+
+def with_finger(
+    scene: Scene,
+    skeleton: Skeleton,
+    side: str,
+    *,
+    number: int | None = None,
+    across: float = 0.0,
+) -> Scene:
+    """Add an open finger on the forearm of a side to a scene with a body.
+
+    Parameters
+    ----------
+    scene : Scene
+    skeleton : Skeleton
+    side : {"right", "left"}
+    number : int, optional
+        Of several fingers.
+    across : float
+        How far it is moved across the palm, m.
+    """
+    base = finger_path(side, number)
     paths = _paths(base)
     last = max(paths.values(), key=len)
-    commands = [transform_command(base, worn_pose(skeleton, side))]
+    worn = worn_pose(skeleton, side)
+    worn[:3, 3] += across * worn[:3, 2]
+    commands = [transform_command(base, worn)]
     for i, shape in enumerate(visual_shapes(_urdf())):
         node = f"{paths[shape.link]}/shape{i}"
         color = _TIP if paths[shape.link] == last else _COLOR
@@ -63,9 +101,13 @@ def with_finger(scene: Scene, skeleton: Skeleton, side: str) -> Scene:
         transform_command(f"{base}/post", foot),
         *flexion_commands(base, 0.0),
     ]
-    layer = Layer("finger (simulated shape)", (base,), _TIP)
+    name = "finger" if number is None else f"finger {number}"
+    layer = Layer(f"{name} (simulated shape)", (base,), _TIP)
     return replace(
-        scene, commands=scene.commands + commands, layers=[*scene.layers, layer]
+        scene,
+        commands=scene.commands + commands,
+        layers=[*scene.layers, layer],
+        fingers=(*scene.fingers, base),
     )
 
 

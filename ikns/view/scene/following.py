@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ikns.body.chains import chain_sides
+import numpy as np
+
+from ikns.body.chains import chain_joints, chain_sides
 from ikns.calibration.subject import Subject
-from ikns.view.scene.finger import with_finger
+from ikns.nullspace.signal_names import signal_names
+from ikns.view.scene.finger import with_fingers
 from ikns.view.scene.live import LiveView
 from ikns.view.scene.map_scene import map_scene
 
@@ -20,9 +24,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def body_view(
-    subject: Subject, *, simulated: bool, name: str
+    subject: Subject, *, simulated: bool, name: str, dofs: Sequence[int] = (1,)
 ) -> Iterator[tuple[LiveView, Callable[[LoopStatus], None]]]:
-    """Serve the 3-D view of a subject with a finger, on this machine only.
+    """Serve the 3-D view of a subject with its fingers, on this machine only.
 
     A thread of its own draws the newest status and skips the others.
 
@@ -33,6 +37,8 @@ def body_view(
         Whether markers or map come from a virtual subject; the page says so.
     name : str
         Of the subject, for the title.
+    dofs : sequence of int
+        Which freedoms of the map drive a finger, in the order of the statuses' axes.
 
     Yields
     ------
@@ -47,7 +53,9 @@ def body_view(
         simulated=simulated,
         title=f"{name}, live",
     )
-    scene = with_finger(scene, subject.skeleton, chain_sides(subject.chain)[-1])
+    names = signal_names(subject.null_space_map.n_dof)
+    scene = replace(scene, signals=tuple(names[dof - 1] for dof in dofs))
+    scene = with_fingers(scene, subject.skeleton, _sides(subject, dofs))
     newest: list[LoopStatus] = []
     came, closing = threading.Event(), threading.Event()
 
@@ -57,12 +65,14 @@ def body_view(
                 came.clear()
                 status = newest[-1]
                 del newest[:-1]
-                moved = status.measured
                 view.show(
                     status.q,
                     time=status.time,
-                    c=status.c,
-                    flexion=status.flexion if math.isnan(moved) else moved,
+                    c=[axis.c for axis in status.axes],
+                    flexion=[
+                        axis.flexion if math.isnan(axis.measured) else axis.measured
+                        for axis in status.axes
+                    ],
                 )
 
     def take(status: LoopStatus) -> None:
@@ -77,3 +87,23 @@ def body_view(
         finally:
             closing.set()
             thread.join()
+
+
+def _sides(subject: Subject, dofs: Sequence[int]) -> dict[int, str]:
+    """Return the arm that wears each finger: the one that its freedom moves more."""
+    sides = chain_sides(subject.chain)
+    if len(dofs) == 1:
+        return {dofs[0]: sides[-1]}
+    learned, joints = subject.null_space_map, chain_joints(subject.chain)
+    moved = np.nansum(learned.directions_**2, axis=0)  # (d, n)
+    return {
+        dof: max(
+            sides,
+            key=lambda side: sum(
+                share
+                for share, joint in zip(moved[dof - 1], joints, strict=True)
+                if joint.startswith(side)
+            ),
+        )
+        for dof in dofs
+    }

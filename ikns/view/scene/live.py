@@ -7,6 +7,7 @@ page reads server-sent events. A token keeps other users of the machine out.
 
 from __future__ import annotations
 
+import math
 import threading
 import webbrowser
 from dataclasses import replace
@@ -72,11 +73,7 @@ class LiveView:
 
     def __init__(self, scene: Scene, skeleton: Skeleton, *, port: int = 0) -> None:
         self._skeleton, self._links = skeleton, drawn_links(skeleton)
-        self._fingers = [
-            command["path"]
-            for command in scene.commands
-            if command.get("path", "").endswith("_forearm/finger")
-        ]
+        self._fingers, self._signals = scene.fingers, len(scene.signals)
         self._changed = threading.Condition()
         self._frame: bytes | None = None
         self._count = 0
@@ -99,7 +96,7 @@ class LiveView:
             caption="Live, seen from the thorax.",
             commands=[c for c in scene.commands if c["type"] != "set_animation"],
             times=np.zeros(0),
-            c=np.zeros(0),
+            c=np.zeros((0, len(scene.signals))),
             speed=np.zeros(0),
             start=0.0,
         )
@@ -127,8 +124,8 @@ class LiveView:
         q: ArrayLike,
         *,
         time: float | None = None,
-        c: float | None = None,
-        flexion: float | None = None,
+        c: ArrayLike | None = None,
+        flexion: ArrayLike | None = None,
     ) -> None:
         """Move the body; call it at any rate, from one thread.
 
@@ -138,16 +135,18 @@ class LiveView:
             Posture; one that is not finite leaves the body where it was.
         time : float, optional
             s, as text on the page.
-        c : float, optional
-            Control signal, as text and as a bar; NaN says that it is unknown.
-        flexion : float, optional
-            Of the finger that :func:`ikns.view.scene.with_finger` drew; it stays as it
-            is where this is not finite.
+        c : float or (d,) array, optional
+            Control signals of the scene, as text and as bars; NaN says that one is
+            unknown.
+        flexion : float or (d,) array, optional
+            Of the fingers that :func:`ikns.view.scene.with_finger` drew; one stays as
+            it is where this is not finite.
 
         Raises
         ------
         InvalidInput
-            When the posture has another shape, or the view is closed.
+            When the posture has another shape, the scene has another number of signals
+            or fingers, or the view is closed.
         """
         posture = np.asarray(q, dtype=np.float64)
         if posture.ndim != 1:
@@ -157,14 +156,16 @@ class LiveView:
         moves = pose_commands(f"{ROOT}/body", self._skeleton, posture, self._links)
         if not np.isfinite(posture).all():
             moves = []
-        if flexion is not None and np.isfinite(flexion):
-            for path in self._fingers:
-                moves += flexion_commands(path, flexion)
+        bent = _each(flexion, len(self._fingers), "flexions")
+        for path, value in zip(self._fingers, bent, strict=True):
+            if np.isfinite(value):
+                moves += flexion_commands(path, value)
+        signals = _each(c, self._signals, "control signals")
         frame = {
             # A micrometer cannot be seen.
             "commands": [m | {"matrix": m["matrix"].round(6)} for m in moves],
             "time": time,
-            "c": c if c is not None and np.isfinite(c) else None,
+            "c": [value if np.isfinite(value) else None for value in signals],
         }
         message = f"data: {packed_json(frame)}\n\n".encode()
         with self._changed:
@@ -202,6 +203,16 @@ class LiveView:
             if self._frame is None or self._count == last:
                 return last, b":\n\n"
             return self._count, self._frame
+
+
+def _each(given: ArrayLike | None, count: int, what: str) -> list[float]:
+    """Return a value for each, NaN where none are given."""
+    values = [math.nan] * count if given is None else np.ravel(given).tolist()
+    if len(values) != count:
+        raise InvalidInput(
+            f"expected as many {what} as the scene has, {count}, found {len(values)}."
+        )
+    return values
 
 
 class _Server(ThreadingHTTPServer):

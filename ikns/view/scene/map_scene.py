@@ -13,6 +13,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.self_motion import posture_at_point, visited_posture
+from ikns.nullspace.signal_names import signal_names
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, property_command, root_commands
 from ikns.view.scene.ground import GROUND, ground_commands
@@ -92,6 +93,7 @@ def map_scene(
         times=swivel.times,
         c=swivel.playing_c,
         start=swivel.start,
+        signals=tuple(signal_names(learned.n_dof)[:1]),  # only the first freedom moves
     )
 
 

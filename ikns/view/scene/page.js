@@ -79,11 +79,14 @@ for (const layer of scene.layers) {
 }
 
 const animator = viewer.animator, slider = find("time");
-const tell = (time, c) => {
+const tell = (time, values) => {
   find("clock").textContent = time === null ? "" : `${time.toFixed(2)} s`;
-  find("c").textContent = c === null || Number.isNaN(c) ? "c unknown" : `c = ${c.toFixed(2)}`;
   for (const line of document.querySelectorAll(".curve i")) line.style.left = `${(100 * time) / slider.max}%`;
-  find("gauge").firstElementChild.style.width = `${100 * Math.min(1, Math.max(0, c || 0))}%`;
+  scene.signals.forEach((name, k) => {
+    const c = values[k];
+    find(name).textContent = c === null || Number.isNaN(c) ? `${name} unknown` : `${name} = ${c.toFixed(2)}`;
+    find(`${name}_gauge`).firstElementChild.style.width = `${100 * Math.min(1, Math.max(0, c || 0))}%`;
+  });
 };
 // Value of a signal at a time, on the line between its neighbors.
 const signalAt = (time, values) => {
@@ -125,7 +128,7 @@ const draw = (holder, values, top) => {
   holder.addEventListener("pointermove", (event) => { if (event.buttons) go(event); });
 };
 const curves = () => {
-  draw(find("c_curve"), scene.c, 1);
+  scene.signals.forEach((name, k) => draw(find(`${name}_curve`), scene.c[k], 1));
   const speeds = Array.from(scene.speed).filter(Number.isFinite), most = Math.max(0, ...speeds);
   document.body.classList.toggle("still", most === 0);
   // The next of 0.1, 0.2, 0.5, 1, 2, ... holds all.
@@ -147,7 +150,7 @@ if (scene.times.length > 1) {
   });
   const follow = () => {
     slider.value = animator.time;
-    tell(animator.time, signalAt(animator.time, scene.c));
+    tell(animator.time, scene.c.map((values) => signalAt(animator.time, values)));
     const speed = scene.speed.length ? signalAt(animator.time, scene.speed) : NaN;
     find("speed").textContent = Number.isNaN(speed) ? "" : `${speed.toFixed(2)} m/s`;
     if (!picture) requestAnimationFrame(follow);

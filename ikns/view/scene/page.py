@@ -37,7 +37,8 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
         "target": scene.target,
         "fov": FIELD_OF_VIEW,
         "times": np.asarray(scene.times, dtype=np.float32),
-        "c": np.asarray(scene.c, dtype=np.float32),
+        "signals": scene.signals,
+        "c": [np.asarray(column, dtype=np.float32) for column in scene.columns],
         "speed": np.asarray(scene.speed, dtype=np.float32),
         "start": scene.start,
         "live": live,
@@ -54,6 +55,14 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
     )
     badge = '<p class="badge">Simulated subject</p>' if scene.simulated else ""
     title = escape(scene.title)
+    rows = "".join(
+        f"""<span class="name">{name}<small>control signal</small></span>
+<div id="{name}_curve" class="curve"></div>
+<output id="{name}"></output>
+<div id="{name}_gauge" class="gauge"><i></i></div>
+"""
+        for name in scene.signals
+    )
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">
 <meta http-equiv="Content-Security-Policy" content="{policy}">
@@ -68,13 +77,9 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
 <button id="play" type="button" aria-label="Play">&#9654;</button>
 <input id="time" type="range" min="0" step="any" value="0" aria-label="Time">
 <output id="clock"></output>
-<span class="name">c<small>control signal</small></span>
-<div id="c_curve" class="curve"></div>
-<output id="c"></output>
-<span class="name speed">hand<small>speed, m/s</small></span>
+{rows}<span class="name speed">hand<small>speed, m/s</small></span>
 <div id="speed_curve" class="curve speed"></div>
-<output id="speed" class="speed"></output>
-<div id="gauge"><i></i></div></footer>
+<output id="speed" class="speed"></output></footer>
 <p id="fault" role="alert" hidden></p>
 <script id="scene" type="application/json">{packed_json(data)}</script>
 <script>

@@ -12,6 +12,7 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.self_motion import posture_at_point
+from ikns.nullspace.signal_names import signal_names
 from ikns.recording.recording import Recording
 from ikns.view.scene.body import body_commands, marker_commands
 from ikns.view.scene.commands import ROOT, Command, object_command, root_commands
@@ -72,7 +73,7 @@ def recording_scene(
     recording : Recording
         Gives the markers.
     c : (T,) or (T, d) array, optional
-        Control signal to play, the first one of several; default that of `learned`.
+        Control signals to play; default those of `learned`.
     read_by : str
         Method that read it, where it is another than that of `learned`; for the page.
 
@@ -106,7 +107,7 @@ def recording_scene(
     first = int(kept[np.argmax(known[kept])])
     if c is None:
         c = learned.control_signal(motion.chain_angles(chain), place)
-    signal = np.reshape(np.asarray(c, dtype=np.float64), (len(place), -1))[:, 0]
+    signal = np.reshape(np.asarray(c, dtype=np.float64), (len(place), -1))
     camera = camera_and_target(skeleton, learned, chain, motion.q[kept])
     commands = [
         *root_commands(),
@@ -134,9 +135,10 @@ def recording_scene(
         layers,
         *camera,
         times=times,
-        c=signal[kept],
+        c=signal[kept, 0] if signal.shape[1] == 1 else signal[kept],
         speed=motion.hand_speed(chain)[kept],
         start=float(motion.time[first] - motion.time[kept[0]]),
+        signals=tuple(signal_names(signal.shape[1])),
     )
 
 

@@ -45,9 +45,17 @@ class Scene:
     camera: Array  # (3,) m in the thorax frame
     target: Array  # (3,) m, what it looks at
     times: Array = field(default_factory=lambda: np.zeros(0))  # (F,) s; may be empty
-    c: Array = field(default_factory=lambda: np.zeros(0))  # (F,) not clipped, or NaN
+    #: (F,) or, of several signals, (F, d); not clipped, or NaN.
+    c: Array = field(default_factory=lambda: np.zeros(0))
     speed: Array = field(default_factory=lambda: np.zeros(0))  # (F,) hand, m/s; or none
     start: float = 0.0  # time that is shown at first, s
+    signals: tuple[str, ...] = ("c",)  # names of the control signals
+    fingers: tuple[str, ...] = ()  # nodes of the fingers, in their order
+
+    @property
+    def columns(self) -> Array:
+        """Control signals one by one, (d, F)."""
+        return np.reshape(self.c, (len(self.times), len(self.signals))).T
 
 
 def camera_and_target(

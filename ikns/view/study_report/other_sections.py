@@ -13,6 +13,7 @@ from ikns.experiments.study.summary import (
 )
 from ikns.experiments.study.summary.answers import people
 from ikns.experiments.study.summary.methods import methods, setting_text
+from ikns.statistics.wording import counted
 from ikns.view.cells import Cell
 from ikns.view.parts import Section, Table
 
@@ -49,8 +50,8 @@ def done_section(group: Group) -> Section:
         if each.faults:
             more = f" and {len(each.faults) - 3} more" if len(each.faults) > 3 else ""
             text.append(
-                f"In {name}, {len(each.faults)} simulated visits have no attempts "
-                f"because their person could not take part: "
+                f"In {name}, {counted(len(each.faults), 'simulated visit')} had no "
+                f"attempts because their person could not take part: "
                 f"{'; '.join(each.faults[:3])}{more}."
             )
         there = set(each.trials()["subject"].tolist())
@@ -174,8 +175,8 @@ def left_out_section(summary: StudySummary) -> Section | None:
     return Section(
         "Left out",
         [
-            f"{count} of {summary.visits + count} visits could not be used; none "
-            "of their data are in this report.",
+            f"{count} of {counted(summary.visits + count, 'visit')} could not be used; "
+            "none of their data are in this report.",
             *reasons,
         ],
     )

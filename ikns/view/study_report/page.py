@@ -12,6 +12,7 @@ from ikns.experiments.study.summary.answers import (
     picking_answer,
     tracking_answer,
 )
+from ikns.statistics.wording import counted
 from ikns.view.cells import Cell, inline
 from ikns.view.parts import (
     NextStep,
@@ -144,7 +145,7 @@ def _lead(summary: StudySummary, parts: Sequence[GroupPart]) -> str:
     )
     return (
         f"Results of {' and '.join(who)}, computed again from the recorded attempts "
-        f"of {summary.visits} visits.{so_far}{apart}"
+        f"of {counted(summary.visits, 'visit')}.{so_far}{apart}"
     )
 
 
