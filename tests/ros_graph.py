@@ -5,6 +5,7 @@ standard; hashes are those that ROS's own code generator printed into the C sour
 the packages (``*__description.c``).
 """
 
+import itertools
 import json
 import signal
 import socket
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import threading
 import time
+import uuid
 
 import zenoh
 
@@ -221,8 +223,8 @@ class Peer:
         self.announce("MS", topic, type_name)
         return heard
 
-    def publisher(self, topic, type_name):
-        self.announce("MP", topic, type_name)
+    def publisher(self, topic, type_name, **about):
+        self.announce("MP", topic, type_name, **about)
         # It waits, as the tests count what arrives on a machine that is busy.
         made = self.session.declare_publisher(
             key(topic, type_name),
@@ -230,7 +232,13 @@ class Peer:
             congestion_control=zenoh.CongestionControl.BLOCK,
         )
         self.kept.append(made)
-        return lambda message: made.put(write(type_name, message))
+        own, count = uuid.uuid4().bytes, itertools.count(1)
+
+        def put(message):
+            about = struct.pack("<qqB", next(count), time.time_ns(), len(own)) + own
+            made.put(write(type_name, message), attachment=about)
+
+        return put
 
     def announce(self, kind, topic, type_name, **about):
         where = token(self.session, kind, topic, type_name, **about)

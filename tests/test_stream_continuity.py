@@ -85,9 +85,12 @@ def test_memory_does_not_grow_with_the_holes() -> None:
 
 
 def test_a_device_that_counts_anew_starts_a_new_section() -> None:
-    frames = [frame(n) for n in [*range(5000, 5010), *range(10)]]
-    counts = watched(frames).counts
-    assert (counts.restarts, counts.dropped, counts.out_of_order) == (1, 0, 0)
+    # Ten seconds at the 100 frames per second of these tests, and a bit over one.
+    for back in (1000, 101):
+        numbers = [*range(5000, 5010), *range(5009 - back, 5019 - back)]
+        counts = watched([frame(n) for n in numbers]).counts
+        assert (counts.restarts, counts.dropped, counts.out_of_order) == (1, 0, 0)
+        assert (counts.received, counts.repeated) == (20, 0)
 
 
 def test_same_markers_under_a_new_number_are_frozen_and_unseen_ones_are_not() -> None:

@@ -62,8 +62,8 @@ def address(graph, topic, more=""):
 class Sender:
     """Publishes messages from a thread while a source is being opened."""
 
-    def __init__(self, peer, topic, messages):
-        put = peer.publisher(topic, TYPE)
+    def __init__(self, peer, topic, messages, **about):
+        put = peer.publisher(topic, TYPE, **about)
 
         def send():
             while not self.done.wait(0.005):
@@ -211,6 +211,44 @@ def test_after_a_break_of_the_router_frames_come_again():
                     told = " ".join(event.text for event in source.events)
         peer.close()
     assert "the router went away" in told
+
+
+def test_two_publishers_of_a_topic_are_refused(graph, peer):
+    ours, theirs = (endless(lambda k: message(k, POINTS[k % 60])) for _ in range(2))
+    with Sender(peer, "/both", ours), Sender(peer, "/both", theirs, node="stage"):
+        with pytest.raises(StreamError) as error:
+            open_source(address(graph, "/both"))
+    assert "found frames of 2 (nodes stage and theirs); stop" in str(error.value)
+
+
+def test_a_second_publisher_is_ignored_until_the_first_has_stopped(graph, peer):
+    """Theirs has other places and numbers far ahead."""
+    other = endless(lambda k: message(10**6 + k, POINTS[k % 60] + 9.0))
+    with Sender(peer, "/taken", endless(lambda k: message(k, POINTS[k % 60]))) as first:
+        with open_source(address(graph, "/taken")) as source:
+            read(source, 3)
+            with Sender(peer, "/taken", other):
+                give_up = time.monotonic() + 20
+                while not source.events:
+                    assert (read(source, 1)[0].markers < 5.0).all()
+                    assert time.monotonic() < give_up
+                ours = read(source, 20)
+                first.done.set()
+                first.thread.join()
+                while (new := read(source, 1)[0]).markers.max() < 5.0:
+                    ours.append(new)
+                assert time.monotonic() - ours[-1].receive_time > 0.9
+                theirs = [new, *read(source, 20)]
+            told = [event.text for event in source.events]
+            counts = source.continuity.counts
+    assert all((frame.markers < 5.0).all() for frame in ours)
+    assert all((frame.markers > 5.0).all() for frame in theirs)
+    assert [frame.number for frame in theirs] == [
+        ours[-1].number + 1 + k for k in range(21)
+    ]
+    assert (counts.dropped, counts.repeated, counts.out_of_order) == (0, 0, 0)
+    assert "frames of another publisher also arrive and are ignored" in told[0]
+    assert any("another publisher is read, as frames of the first" in t for t in told)
 
 
 def test_damaged_messages_are_told_and_left_out(graph, peer):

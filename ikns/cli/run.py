@@ -157,7 +157,6 @@ def run(
     with ExitStack() as stack:
         opened = open_source(source, subject=calibrated, names=names)
         stream = stack.enter_context(opened)
-        say_undriven(n_dof, group.dofs)
         simulated = is_simulated(calibrated, subject, played_files(source))
         shared = publishing(
             publish or [],
@@ -191,7 +190,8 @@ def run(
         )
         writer = stack.enter_context(log)
         arm = threading.Event()
-        shown = [stack.enter_context(_status_line(arm))]
+        told = _once(lambda: say_undriven(n_dof, group.dofs))  # with all connected
+        shown = [told, stack.enter_context(_status_line(arm))]
         if view:
             body = _body(
                 stack, calibrated, subject, simulated=simulated, dofs=group.dofs
@@ -212,6 +212,7 @@ def run(
             listener=publisher,
             realtime=realtime,
         )
+        told()  # it may have been too short for a status
     session = _kept(report, writer, session)
     title = f"{source} to {'nothing (dry run)' if dry_run else ' and '.join(addresses)}"
     _show_report(report, title, session, losses, publisher, as_json=as_json)
@@ -364,6 +365,17 @@ def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], N
             one(status)
 
     return show
+
+
+def _once(call: Callable[[], None]) -> Callable[..., None]:
+    """Return what does something the first time that it is called."""
+    left = [call]
+
+    def tell(*_: LoopStatus) -> None:
+        while left:
+            left.pop()()
+
+    return tell
 
 
 def _line(s: LoopStatus) -> str:

@@ -182,7 +182,7 @@ class RosJoint:
         """Leave the graph."""
         self._node.close()
 
-    def _take(self, data: bytes, received: float) -> None:
+    def _take(self, data: bytes, received: float, _: bytes) -> None:
         """Take feedback, in zenoh's thread."""
         target = self._target
         try:

@@ -39,10 +39,15 @@ _PROBE, _PROBE_ENDS = 0.05, 5.0
 #: own 1 ms drops messages on a machine that is merely busy.
 _ROOM = 0.02
 _QUEUE = "transport/link/tx/queue/congestion_control"
+#: What comes with a message, as in rmw_zenoh: number, time, and the identity of who
+#: sends with its length before it.
+_ABOUT = "<qqB"
+_BEFORE_ID = struct.calcsize(_ABOUT)
 
-#: Called with the bytes of a message and the time of its receipt, s of
-#: `time.monotonic`, from a thread of zenoh.
-Receiver = Callable[[bytes, float], None]
+#: Called with the bytes of a message, the time of its receipt, s of `time.monotonic`,
+#: and what identifies its publisher (empty where it does not say), from a thread of
+#: zenoh.
+Receiver = Callable[[bytes, float, bytes], None]
 
 
 class RosNode:
@@ -127,7 +132,9 @@ class RosNode:
         """Hear of every message of a topic."""
 
         def take(sample: Any) -> None:
-            receive(sample.payload.to_bytes(), time.monotonic())
+            received, about = time.monotonic(), sample.attachment
+            told = b"" if about is None else about.to_bytes()[_BEFORE_ID:]
+            receive(sample.payload.to_bytes(), received, told)
 
         key = topic_key(self.address.domain, topic, type_name)
         # In zenoh's own thread: another one would keep a program from ending.
@@ -252,8 +259,7 @@ class RosPublisher:
         data = encode(self._type, message)
         with self._lock:
             self._count += 1
-            # As rmw_zenoh: number, time, and the identity of who sends.
-            about = struct.pack("<qqB", self._count, at, len(self._id)) + self._id
+            about = struct.pack(_ABOUT, self._count, at, len(self._id)) + self._id
             self._publisher.put(data, attachment=about)
 
 

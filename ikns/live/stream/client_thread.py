@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections import deque
@@ -141,12 +142,20 @@ class ClientThread:
         else:
             self._ready.set_result(None)
 
-    def no_answer(self) -> StreamError:
-        """Make the error for a server that does not answer."""
-        return StreamError(
-            f"{self.name}: expected {self.server} to answer at {self._address} within "
-            f"{self.timeout:g} s, found no answer."
-        )
+    def no_answer(self, why: OSError | None = None) -> StreamError:
+        """Make the error for a server that does not answer.
+
+        Parameters
+        ----------
+        why : OSError, optional
+            What the system says; a timeout where there is none.
+        """
+        expected = f"{self.name}: expected {self.server} to answer at {self._address}"
+        if isinstance(why, socket.gaierror):
+            return StreamError(f"{expected}, found no computer of that name.")
+        if isinstance(why, ConnectionError):
+            return StreamError(f"{expected}, found no program that does.")
+        return StreamError(f"{expected} within {self.timeout:g} s, found no answer.")
 
     def _run(self, serve: Callable[[], None]) -> None:
         try:

@@ -78,8 +78,9 @@ class Continuity:
         self._speed = speed
         period = 1 / (rate * speed) if speed else math.inf
         self.late_after = period if late_after is None else late_after
-        # A number more than ten seconds back is a restart, not a late frame.
-        self._horizon = max(100, round(10 * rate))
+        # A number more than a second back is a restart, not a late frame: a server
+        # was started again, or plays its file from the beginning.
+        self._horizon = max(100, round(rate))
         self._delays = Delays()
         self._received = self._dropped = self._late = self._repeated = 0
         self._out_of_order = self._frozen = self._restarts = 0

@@ -65,8 +65,8 @@ class NatNetLink:
             self._sockets[0].setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
             try:
                 self._server = socket.gethostbyname(host), port
-            except OSError:
-                raise client.no_answer() from None
+            except OSError as error:
+                raise client.no_answer(error) from None
             self.hello, self._server = self._find_server()
         except BaseException:
             self.close()

@@ -145,7 +145,7 @@ class QualisysFeed(ClientFeed):
             if made and made[0].transport is not None:
                 made[0].transport.close()
             if isinstance(error, OSError):  # refused, unknown host, or a timeout
-                raise self._client.no_answer() from None
+                raise self._client.no_answer(error) from None
             raise StreamError(f"{self.name}: QTM answered {error}.") from None
         return self._qtm.QRTConnection(made[0], timeout=self._client.timeout)
 

@@ -25,6 +25,9 @@ from ikns.live.stream.ros_markers import MARKERS, MarkersReader, RosMarkers
 _FIRST = 20
 #: Without an answer for so long, the router is taken to be gone, s.
 _SILENCE = 2.0
+#: Frames of another publisher are read once those of the first are missing for so long,
+#: s: longer than it takes until a finger is in its safe state.
+_GONE = 1.0
 _LOOK = 0.1  # time between looks at the router, s
 
 
@@ -62,6 +65,8 @@ class RosFeed(ClientFeed):
         super().__init__(ClientThread(name, "the router", address.router, timeout))
         self._reader = MarkersReader()
         self._first: list[RosMarkers] = []
+        self._senders: dict[bytes, None] = {}  # of the first frames
+        self._sender, self._heard, self._ahead, self._number = b"", -math.inf, 0, 0
         self._enough = threading.Event()
         self._since = 0
         self._columns: dict[tuple[str, ...], np.typing.NDArray[np.int64]] = {}
@@ -73,7 +78,7 @@ class RosFeed(ClientFeed):
             node.subscribe(self._address.name, MARKERS, self._take)
             if not self._enough.wait(self._client.timeout):
                 raise self._nothing(node)
-            self._begin()
+            self._begin(node)
             self._client.set_connected()
             self._watch(node)
         finally:
@@ -91,7 +96,7 @@ class RosFeed(ClientFeed):
                 self._client.add_event(f"{self.name}: the router is back.")
             there = now
 
-    def _take(self, data: bytes, received: float) -> None:
+    def _take(self, data: bytes, received: float, sender: bytes) -> None:
         """Take a message, in zenoh's thread."""
         try:
             found = self._reader.read(data)
@@ -99,14 +104,46 @@ class RosFeed(ClientFeed):
             self._client.add_event(f"{self.name}: a frame is not read: {error}.")
             return
         if self._client.connected:
-            self._client.inbox.put(self._frame(found, received))
+            if self._is_ours(sender, found.number, received):
+                self._client.inbox.put(self._frame(found, received))
         elif len(self._first) < _FIRST:
             self._first.append(found)
+            self._senders[sender] = None
             if len(self._first) == _FIRST:
                 self._enough.set()
 
-    def _begin(self) -> None:
-        """Take names and rate from the first frames."""
+    def _is_ours(self, sender: bytes, number: int, received: float) -> bool:
+        """Whether a frame is of the publisher that is read: one, never two at a time.
+
+        One that does not say who it is cannot be told from another.
+        """
+        if sender != self._sender and sender and self._sender:
+            if received - self._heard < _GONE:
+                self._client.add_event(
+                    f"{self.name}: frames of another publisher also arrive and are "
+                    "ignored."
+                )
+                return False
+            self._client.add_event(
+                f"{self.name}: another publisher is read, as frames of the first "
+                "stopped."
+            )
+            self._ahead = self._number + 1 - number  # it counts in its own way
+        self._sender = sender or self._sender
+        self._heard, self._number = received, number + self._ahead
+        return True
+
+    def _begin(self, node: RosNode) -> None:
+        """Take publisher, names and rate from the first frames."""
+        if len(self._senders) > 1:
+            topic = node.publishers(self._address.name)
+            nodes = sorted(each.node for each in topic if each.type == MARKERS)
+            raise StreamError(
+                f"{self.name}: expected one publisher on this topic, found frames of "
+                f"{len(self._senders)} (nodes {' and '.join(nodes)}); stop all but "
+                "one, or give them topics of their own."
+            )
+        self._sender = next(iter(self._senders))
         names: dict[str, None] = {}
         for found in self._first:
             named = [name for name in found.names if name]
@@ -150,7 +187,7 @@ class RosFeed(ClientFeed):
         markers = np.full((len(self._client.labels), 3), math.nan)
         known = columns >= 0
         markers[columns[known]] = found.markers[known]
-        return Frame(found.number, self._time(found), received, markers)
+        return Frame(self._number, self._time(found), received, markers)
 
     def _places(self, names: tuple[str, ...]) -> np.typing.NDArray[np.int64]:
         """Return where markers of a message belong among the labels; -1: nowhere."""
