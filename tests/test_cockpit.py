@@ -54,6 +54,14 @@ GAMEPAD = """
             axes: stick.axes, buttons, timestamp: performance.now() }, null, null];
     };
 """
+#: Names and values of the panel's rows, and on how many lines the values stand.
+ROWS = """() => [...document.querySelectorAll("#facts dt")].map(
+    name => [name.textContent, name.nextSibling.textContent])"""
+LINES = """() => [...document.querySelectorAll("#facts dt")].map(name => {
+    const value = document.createRange();
+    value.selectNodeContents(name.nextSibling);
+    return [name.textContent, value.getClientRects().length];
+})"""
 #: How much time passes at once, s: less than a signal may be old, which is 0.2 s.
 STEP = 0.15
 
@@ -517,6 +525,27 @@ def test_old_values_are_shown_as_unknown(chromium: Any, tmp_path: Path) -> None:
                 arg=told,
             )
             assert ("inside the points" in panel.inner_text("#facts")) == (age < 1)
+        arm.shown = {"kind": "ikns", "dof": 2, "session": ""} | recent_values(
+            ({"flexion": 0.2, "c_1": 0.3, "flexion_1": 0.4, "measured_1": None}, 0.1)
+        )
+        panel.wait_for_function(
+            "() => document.getElementById('facts').textContent.includes('of finger 1')"
+        )
+        rows = panel.evaluate(ROWS)
+        assert rows[0][0] == "c of finger 2"
+        assert [row for row in rows if row[0][-1].isdigit()][1:] == [
+            ["Flexion commanded 2", "0.20"],
+            ["c of finger 1", "0.30"],
+            ["Flexion commanded 1", "0.40"],
+            ["Flexion measured 1", "\N{EN DASH}"],
+        ]
+        for width in (390, 1280, 1920):
+            panel.set_viewport_size({"width": width, "height": 800})
+            lines = dict(panel.evaluate(LINES))
+            # One line each, within the window: "recorded" is one word.
+            assert {lines[name] for name in (*dict(rows), "Session")} == {1}, width
+            wide = panel.evaluate("document.documentElement.scrollWidth")
+            assert wide <= width
         visit.clock.stop.set()
         try:
             says_news = "() => document.getElementById('lost').textContent"

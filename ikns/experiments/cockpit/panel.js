@@ -69,9 +69,13 @@ function showPlace() {
 
 const number = (value, digits, unit = "") => (known(value) ? `${value.toFixed(digits)}${unit}` : "\u2013");
 
+// What a row is called; of several fingers each has its number, the trial's first.
+const CALLED = { c: ["c", "c of finger "], flexion: ["Flexion commanded", "Flexion commanded "], measured: ["Flexion measured", "Flexion measured "] };
+const called = (what, dof) => (dof === undefined ? CALLED[what][0] : CALLED[what][1] + dof);
+
 function facts() {
-  const source = shown.source, of = known(source.dof) ? `, finger ${source.dof}` : "";
-  const rows = [[`c${of}`, number(shown.c, 3), known(shown.c) ? "" : "bad"]];
+  const source = shown.source;
+  const rows = [[called("c", source.dof), number(shown.c, 3), known(shown.c) ? "" : "bad"]];
   if (source.kind === "page") {
     rows.push(["Participant's page", shown.page_connected ? "connected" : "not open", shown.page_connected ? "good" : "bad"]);
     if (source.device) rows.push(["Gamepad", source.device, known(shown.c) ? "" : "bad"]);
@@ -85,13 +89,10 @@ function facts() {
     rows.push(old ? [name, "unknown", "bad"] : [name, text(source[key]), kind(source[key])]);
   };
   add("state", "Control", String, (state) => ({ active: "good", stopped: "bad" })[state] ?? "");
-  if (source.finger !== "") add("finger", of ? "Fingers" : "Finger", String, (finger) => (finger.startsWith("stopped") ? "bad" : ""));
-  add("flexion", `Flexion commanded${of}`, (value) => number(value, 2));
-  add("measured", `Flexion measured${of}`, (value) => number(value, 2));
+  if (source.finger !== "") add("finger", known(source.dof) ? "Fingers" : "Finger", String, (finger) => (finger.startsWith("stopped") ? "bad" : ""));
+  for (const what of ["flexion", "measured"]) add(what, called(what, source.dof), (value) => number(value, 2));
   for (const key of Object.keys(source).filter((name) => /^(c|flexion|measured)_\d+$/.test(name))) {
-    const [what, dof] = key.split("_");
-    const words = { c: "c", flexion: "Flexion commanded", measured: "Flexion measured" };
-    add(key, `${words[what]}, finger ${dof}`, (value) => number(value, 2));
+    add(key, called(...key.split("_")), (value) => number(value, 2));
   }
   add("rate", "Frames", (value) => number(value, 0, " /s"));
   add("latency", "Receipt to command, p99", (value) => milli(value, 2, " ms"));

@@ -56,10 +56,11 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
     badge = '<p class="badge">Simulated subject</p>' if scene.simulated else ""
     title = escape(scene.title)
     rows = "".join(
-        f"""<span class="name">{name}<small>control signal</small></span>
+        f"""<div class="signal">
+<span class="name">{name}<small>control signal</small></span>
 <div id="{name}_curve" class="curve"></div>
 <output id="{name}"></output>
-<div id="{name}_gauge" class="gauge"><i></i></div>
+<div id="{name}_gauge" class="gauge"><i></i></div></div>
 """
         for name in scene.signals
     )
