@@ -128,7 +128,8 @@ class FrameLoop:
             self._first_device_time = frame.device_time
         # Rounded as on disk, so that a replay computes with the same numbers.
         markers = micro(frame.markers[self._columns])
-        markers[self._absent] = np.nan
+        if len(self._absent):
+            markers[self._absent] = np.nan
         device_time = round(frame.device_time - self._first_device_time, 6)
         receive_time = round(received - self._start, 6)
         began = time.monotonic()

@@ -125,7 +125,8 @@ def mark_gaps(markers: Array) -> Mask:
     >>> mark_gaps(markers).tolist(), np.isnan(markers[:, 0]).tolist()
     ([True, False, True], [True, False, True])
     """
-    gap = np.isnan(markers).any(axis=-1) | (markers == 0).all(axis=-1)
+    # The largest is NaN where one is, and 0 where all are.
+    gap = ~(np.abs(markers).max(axis=-1) > 0)
     markers[gap] = np.nan
     return gap
 
