@@ -359,14 +359,18 @@ def test_torque_left_on_is_switched_off_when_asked_again(servo, wire, monkeypatc
 
 
 def test_an_exception_is_not_hidden_by_one_of_relaxing(wire):
+    finger = finger_on(wire)
+
     def fail():
-        with finger_on(wire):
+        with finger:
             wire.inject("mute")
             raise KeyError("mine")
 
     with pytest.raises(KeyError) as caught:
         fail()
     assert "did not confirm" in caught.value.__notes__[0]
+    wire.clear_faults()
+    finger.relax()
 
 
 class TestRefusals:
