@@ -525,6 +525,35 @@ def test_after_a_kill_the_servos_own_watchdog_stops_it(servo, wire):
     wait_for(lambda: servo.motor.velocity == 0)
 
 
+UNPLUGGED = """
+import os, sys
+from ikns.finger import DynamixelFinger, FingerError
+finger = DynamixelFinger(sys.argv[1], baud=1_000_000)
+finger.connect()
+os.unlink(sys.argv[1])
+finger.make_safe("a test")
+finger._bus.close()
+if sys.argv[2] == "asked":
+    try:
+        finger.relax()
+    except FingerError as error:
+        sys.stderr.write(f"first: {error}\\n")
+"""
+
+
+@pytest.mark.parametrize("asked", ["asked", "never"])
+def test_torque_that_stays_on_is_told_once(wire, asked):
+    done = subprocess.run(
+        [sys.executable, "-c", UNPLUGGED, str(wire.port), asked],
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+    )
+    (line,) = done.stderr.splitlines()
+    assert line.startswith({"asked": "first: ", "never": "ikns: "}[asked])
+    assert "did not confirm that its torque is off" in line
+
+
 def test_no_thread_outlives_a_finger(wire):
     before = set(threading.enumerate())
     for _ in range(3):

@@ -17,7 +17,7 @@ from ikns.finger.drive import Drive
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.models import model_named
-from ikns.finger.relax_at_exit import forget, relax_at_exit
+from ikns.finger.relax_at_exit import forget, not_relaxed, relax_at_exit
 from ikns.finger.state import FingerState
 
 #: Timeout for switching the torque off, s.
@@ -197,7 +197,7 @@ class DynamixelFinger:
             owed = self._torque_owed
         if owed:
             watchdog = "bus_watchdog" in self._model
-            raise FingerError(
+            raise not_relaxed(
                 f"{self._bus.port}: servo {self._bus.id} did not confirm that its "
                 "torque is off, cut its power"
                 + (" (its own watchdog stops it)." if watchdog else ".")

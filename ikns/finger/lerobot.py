@@ -15,7 +15,7 @@ from ikns.finger.attempt import Attempt, relax_after
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.lerobot_joint import RobotDevice, RobotJoint
-from ikns.finger.relax_at_exit import forget, relax_at_exit
+from ikns.finger.relax_at_exit import forget, not_relaxed, relax_at_exit
 from ikns.finger.state import FingerState
 
 #: Torque is tried to be switched off for so long at the end, s, and how long that is
@@ -162,7 +162,7 @@ class LeRobotFinger:
                 if not thread.is_alive():
                     self._thread = thread = None
             if thread is not None or not self._joint.off:
-                raise FingerError(
+                raise not_relaxed(
                     f"{self._name} did not confirm that its torque is off, cut its "
                     "power."
                 )

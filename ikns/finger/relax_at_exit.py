@@ -21,6 +21,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from ikns.endings import exit_on_signals
+from ikns.finger.errors import FingerError
 
 
 class _Connected(Protocol):
@@ -30,6 +31,7 @@ class _Connected(Protocol):
 
 
 _connected: list[_Connected] = []
+_told: set[str] = set()
 _lock = threading.Lock()
 _hook_before: Callable[[threading.ExceptHookArgs], object] = threading.excepthook
 
@@ -56,6 +58,15 @@ def forget(finger: _Connected) -> None:
             threading.excepthook = _hook_before
 
 
+def not_relaxed(sentence: str) -> FingerError:
+    """Return the error for a finger that is not relaxed, which is told now.
+
+    It is tried again when the program ends, and told again only in other words.
+    """
+    _told.add(sentence)
+    return FingerError(sentence)
+
+
 def _make_all_safe(about: threading.ExceptHookArgs) -> None:
     """Make every finger safe after an exception has ended a thread."""
     name = "a thread" if about.thread is None else f"the thread '{about.thread.name}'"
@@ -69,11 +80,14 @@ def _relax_all() -> None:
         # What ends the program must not stop this too; each finger has its deadline.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
             signal.signal(number, signal.SIG_IGN)
+    before = frozenset(_told)
     for finger in tuple(_connected):
         try:
             finger.relax()
         # A failure must not leave other fingers under torque.
         except Exception as error:
+            if str(error) in before:
+                continue
             with contextlib.suppress(OSError):  # the terminal may be gone
                 sys.stderr.write(f"ikns: {error}\n")
 
