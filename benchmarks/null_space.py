@@ -23,7 +23,7 @@ from scipy.linalg import null_space as scipy_null_space
 from scipy.linalg import subspace_angles
 from threadpoolctl import threadpool_limits
 
-from ikns.body.chains import CHAINS
+from ikns.body.chains import chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.numerics.subspace import null_spaces, principal_angles
 
@@ -45,7 +45,7 @@ class Loop:
         self.model = pin.buildModelFromXML(skeleton.urdf, pin.JointModelFreeFlyer())
         self.data = self.model.createData()
         self.frame = self.model.getFrameId("right_knuckle")
-        self.columns = skeleton.columns(CHAINS[chain])
+        self.columns = skeleton.columns(chain_joints(chain))
         self.rows = 6 if task == "pose" else 3
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:

@@ -14,6 +14,9 @@ Skeleton: the body of a person, or a robot
     MarkerSet                    which label sits on which segment
     scale                        fit a skeleton to a static trial
     fit_lengths                  the same with an exploration, by optimization
+    Chain                        joints of a task, and the links that perform it
+    load_chain                   a chain by its name or from a file
+    extrinsic_chain              joints that a task leaves alone, to be read as well
     Robot                        any robot arm from its URDF
 
 Motion: joints over time

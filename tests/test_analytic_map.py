@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ikns.body.chains import CHAINS
+from ikns.body.chains import chain_joints
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import (
@@ -86,7 +86,7 @@ def exploration():
     T = len(q)
     hands = np.zeros((T, 2, 3))
     hands[:, 0] = [ARM.hand(row)[0] for row in q]
-    joints = CHAINS["both_arms"]
+    joints = chain_joints("both_arms")
     motion = Motion(
         time=np.arange(T) / 100,
         q=np.hstack([q, np.zeros((T, 7))])[:, :14],

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from ikns.body.chains import CHAINS
+from ikns.body.chains import chain_joints
 from ikns.errors import IknsError, InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import MapWarning, NullSpaceMap, null_space_samples, still_mask
@@ -241,7 +241,7 @@ def test_spanning_tree_is_the_strongest(seed, n):
 def motion(speed, *, chain="right_arm", missing=()):
     """A motion whose right hand has these speeds (m/s); the left hand rests."""
     T = len(speed)
-    joints = CHAINS["both_arms"]
+    joints = chain_joints("both_arms")
     velocity = np.zeros((T, 2, 3))
     velocity[:, 0, 1] = speed
     hand = rng.normal(size=(T, 2, 3))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.arrays import Array
-from ikns.body.chains import chain_sides
+from ikns.body.chains import whole_arms
 from ikns.calibration.readouts import moving_samples
 from ikns.calibration.subject import Subject
 from ikns.motion.motion import Motion
@@ -46,7 +46,7 @@ class Folds:
     ) -> None:
         self.postures: list[NaturalPosture] = []
         self._part: dict[int, Array] = {}
-        if "intent" not in subject.readouts or len(chain_sides(subject.chain)) != 1:
+        if "intent" not in subject.readouts or len(whole_arms(subject.chain)) != 1:
             return
         learned = subject.readout("intent").map
         assert isinstance(learned, IntentMap)

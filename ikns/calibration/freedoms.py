@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import chain_joints, chain_sides
+from ikns.body.chains import ChainLike, chain_joints
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.elbow import elbow_reference
+from ikns.calibration.elbow import motion_rows
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.map.dual import Motions
 
@@ -16,7 +16,7 @@ _CORRELATED = 0.5
 
 
 def freedom_motions(
-    skeleton: Skeleton, posture: Array, chain: str, *, n_dof: int
+    skeleton: Skeleton, posture: Array, chain: ChainLike, *, n_dof: int
 ) -> Motions | None:
     """Return the motions that the outputs of a map shall read, one row each.
 
@@ -39,20 +39,17 @@ def freedom_motions(
         From the joint vector (n,) of the chain to motions (n_dof, n), unit rows. None
         when there are fewer motions than degrees of freedom.
     """
-    if elbow_reference(skeleton, posture, chain, n_dof=n_dof) is None:
+    if len(motion_rows(skeleton, posture, chain)[0]) < n_dof:
         return None
-    sides = len(chain_sides(chain))
     columns = [skeleton.joint_names.index(joint) for joint in chain_joints(chain)]
 
     def motions(q: Array) -> Array:
         at = np.array(posture)
         at[columns] = q
-        rows = elbow_reference(skeleton, at, chain, n_dof=max(n_dof, sides + 1))
-        assert rows is not None
-        rows = np.array(rows[:n_dof])
+        rows, elbows = motion_rows(skeleton, at, chain)
+        rows, elbows = rows[:n_dof], min(elbows, n_dof)
         basis, rank = skeleton.null_spaces(at, chain)
         free = basis[: len(columns) - int(rank)]
-        elbows = min(sides, n_dof)
         rows[:elbows] = rows[:elbows] @ free.T @ free
         return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused
@@ -20,7 +21,7 @@ def judged_motion(
     skeleton: Skeleton,
     recording: Recording,
     *,
-    chain: str | None = None,
+    chain: ChainLike | None = None,
     static: Recording | None = None,
     measured: bool = True,
     progress: Callable[[int, int], None] | None = None,
@@ -35,7 +36,7 @@ def judged_motion(
         The person's.
     recording : Recording
     chain : str, optional
-        What the recording is meant to show, see :data:`ikns.body.chains.CHAINS`.
+        What the recording is meant to show, see :class:`ikns.Chain`.
     static : Recording, optional
         The static trial, whose subject must be the recording's.
     measured : bool
@@ -77,7 +78,7 @@ def require_usable(
     skeleton: Skeleton,
     recording: Recording,
     *,
-    chain: str = "both_arms",
+    chain: ChainLike = "both_arms",
     static: Recording | None = None,
     measured: bool = True,
 ) -> list[str]:
@@ -97,7 +98,7 @@ def known_findings(
     skeleton: Skeleton,
     recording: Recording,
     *,
-    chain: str = "both_arms",
+    chain: ChainLike = "both_arms",
     measured: bool = True,
 ) -> list[Finding]:
     """Judge a recording of a known person, the worst first, and refuse nothing.

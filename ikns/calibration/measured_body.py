@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.exploration_fit import BodyReport, fit_explorations
@@ -40,7 +40,7 @@ def measured_body(
     *,
     generic: Skeleton | None,
     marker_set: str | Path,
-    chain: str,
+    chain: ChainLike,
     min_static: float,
     progress: Callable[[str, int, int], None] | None,
     known: bool = False,
@@ -117,7 +117,7 @@ def _assumed(scaling: ScalingReport) -> str:
 def _tracked(
     skeleton: Skeleton,
     recordings: Sequence[Recording],
-    chain: str,
+    chain: ChainLike,
     progress: Callable[[str, int, int], None] | None,
 ) -> tuple[Motion, ...]:
     """Marker inverse kinematics of every recording."""
@@ -137,7 +137,7 @@ def _left_out(
     scaling: ScalingReport,
     marker_set: str | Path,
     recordings: Sequence[Recording],
-    chain: str,
+    chain: ChainLike,
 ) -> list[str]:
     """Name markers, of the chain or seen later, that the static trial lacks.
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ikns.arrays import Array, Indices
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, end_sides
 from ikns.calibration.folds import Folds
 from ikns.calibration.subject import Subject
 from ikns.motion.motion import Motion
@@ -124,7 +124,7 @@ def no_range_learned(summary: dict[str, Any]) -> str:
     return ""
 
 
-def _reaches(motion: Motion, chain: str, speed: float) -> Indices:
+def _reaches(motion: Motion, chain: ChainLike, speed: float) -> Indices:
     """First and last frame of each reach, (R, 2)."""
     return find_reaches(
         motion.hand_speed(chain),
@@ -170,7 +170,7 @@ def _turned(subject: Subject, readout: Readout) -> float | None:
         return None
     columns = [
         subject.skeleton.joint_names.index(f"{side}_forearm_pronation")
-        for side in chain_sides(subject.chain)
+        for side in end_sides(subject.chain)
     ]
     ends = []
     for turn in (-TURN, TURN):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ikns.arrays import Array, Mask
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, chain_sides
 from ikns.errors import NotEnoughData
 from ikns.motion.excursion import other_hand_moves
 from ikns.motion.motion import Motion
@@ -43,7 +43,7 @@ def check_covered(wrist_in_thorax: Array) -> None:
         )
 
 
-def check_own_arm(natural: Sequence[Motion], chain: str) -> None:
+def check_own_arm(natural: Sequence[Motion], chain: ChainLike) -> None:
     """Refuse natural movement of the other arm.
 
     Raises
@@ -57,7 +57,7 @@ def check_own_arm(natural: Sequence[Motion], chain: str) -> None:
         )
 
 
-def elbow_degrees(motion: Motion, gate: Mask, chain: str) -> float:
+def elbow_degrees(motion: Motion, gate: Mask, chain: ChainLike) -> float:
     """Largest median flexion of the chain's elbows in some frames, deg; 0 if unseen."""
     found = [0.0]
     for side in chain_sides(chain):

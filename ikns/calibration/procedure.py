@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ikns.arrays import Array, Mask
-from ikns.body.chains import chain_joints
-from ikns.body.skeleton import Skeleton
+from ikns.body.chains import ChainLike, chain_joints
+from ikns.body.skeleton import Skeleton, check_chain
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.freedoms import check_freedoms, freedom_motions
 from ikns.calibration.measured_body import measured_body
@@ -49,7 +49,7 @@ def calibrate(
     natural: Sequence[Recording] = (),
     generic: Skeleton | None = None,
     marker_set: str | Path = "oxford24",
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     n_points: int = 10,
     n_dof: int = 1,
     max_hand_speed: float = 0.05,
@@ -82,9 +82,10 @@ def calibrate(
         sex are known. Default: the generic adult.
     marker_set : str or Path
         The markers on the person.
-    chain : str
-        Joints of the task, see :data:`ikns.body.chains.CHAINS`. All others are
-        extrinsic: how much they moved is reported.
+    chain : str or Chain
+        Joints of the task, by the name of a chain that comes with the package
+        (``urdf/chains.toml``) or as a :class:`ikns.Chain`. All others are extrinsic:
+        how much they moved is reported.
     n_points, n_dof, variance, radius, outside, interpolation
         Of :class:`NullSpaceMap`; radius in m.
     max_hand_speed : float
@@ -132,6 +133,8 @@ def calibrate(
     """
     if not explorations:
         raise InvalidInput("expected at least one exploration recording, found none.")
+    if not isinstance(chain, str):
+        check_chain(generic or Skeleton.load(), chain, n_dof=n_dof)
     _check_seconds(min_still=min_still, min_rest=min_rest)
     names = ", ".join(recording.source for recording in explorations)
     measured = measured_body(
@@ -181,7 +184,7 @@ def calibrate(
                 max_hand_speed=max_hand_speed,
             )
     report = {
-        "chain": chain,
+        "chain": str(chain),
         "marker_set": skeleton.marker_set.name,
         "settings": _settings(learned, max_hand_speed, min_rest),
         "methods": methods,
@@ -238,7 +241,7 @@ def _fit(
     learned: NullSpaceMap,
     skeleton: Skeleton,
     pairs: Sequence[tuple[Motion, Mask]],
-    chain: str,
+    chain: ChainLike,
     side: str,
 ) -> tuple[Array, list[str]]:
     """Fit the map to the still samples; return their hand positions, and warnings.
@@ -271,14 +274,14 @@ def _fit(
     return x, [*together, *(str(warning.message) for warning in caught)]
 
 
-def _faults(learned: NullSpaceMap, chain: str, side: str) -> list[str]:
+def _faults(learned: NullSpaceMap, chain: ChainLike, side: str) -> list[str]:
     """Say what speaks against the chain or its freedoms."""
     arms = two_arms_fault(chain, learned.n_dof, learned.n_components_)
     return [fault for fault in (side, arms and f"{arms}.") if fault]
 
 
 def _rejections(
-    recordings: Sequence[Recording], motions: Sequence[Motion], chain: str
+    recordings: Sequence[Recording], motions: Sequence[Motion], chain: ChainLike
 ) -> list[str]:
     """Say which frames were left out."""
     return [
@@ -288,7 +291,7 @@ def _rejections(
     ]
 
 
-def _say_side(other: str, chain: str) -> str:
+def _say_side(other: str, chain: ChainLike) -> str:
     """Say that the other hand moved, if it did."""
     if not other:
         return ""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ikns.arrays import Array, Mask
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, no_swivel, whole_arms
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.natural import (
     LEAST_BENT,
@@ -32,7 +32,7 @@ def learn_readouts(
     skeleton: Skeleton,
     learned: NullSpaceMap,
     explorations: Sequence[tuple[Motion, Mask]],
-    chain: str,
+    chain: ChainLike,
     *,
     natural: Sequence[Motion] = (),
     max_hand_speed: float = 0.05,
@@ -72,6 +72,10 @@ def learn_readouts(
         reason = "reads one degree of freedom, and the map has more"
         report["without"] = dict.fromkeys(("proximal", "intent"), reason)
         return found, report
+    if not whole_arms(chain):
+        reason = no_swivel(chain).rstrip(".")
+        report["without"] = dict.fromkeys(("proximal", "intent"), reason)
+        return found, report
     moving = _natural_samples(
         skeleton, learned, explorations, chain, natural, max_hand_speed=max_hand_speed
     )
@@ -107,7 +111,7 @@ def _proximal(
     skeleton: Skeleton,
     learned: NullSpaceMap,
     explorations: Sequence[tuple[Motion, Mask]],
-    chain: str,
+    chain: ChainLike,
 ) -> Readout:
     still = np.concatenate([motion.angles[gate] for motion, gate in explorations])
     reference = mean_orientation(skeleton, still, chain)
@@ -134,7 +138,7 @@ def _intent(
     skeleton: Skeleton,
     learned: NullSpaceMap,
     explorations: Sequence[tuple[Motion, Mask]],
-    chain: str,
+    chain: ChainLike,
     moving: tuple[Array, Array] | None,
 ) -> Readout:
     bent = max(elbow_degrees(motion, gate, chain) for motion, gate in explorations)
@@ -193,7 +197,7 @@ def _natural_samples(
     skeleton: Skeleton,
     learned: NullSpaceMap,
     explorations: Sequence[tuple[Motion, Mask]],
-    chain: str,
+    chain: ChainLike,
     natural: Sequence[Motion],
     *,
     max_hand_speed: float,
@@ -203,7 +207,7 @@ def _natural_samples(
     In the explorations these are the frames away from every held place.
     """
     check_own_arm(natural, chain)
-    if len(chain_sides(chain)) != 1:
+    if len(whole_arms(chain)) != 1:
         return None
     found = moving_samples(
         skeleton,
@@ -232,7 +236,7 @@ def moving_samples(
     learned: NullSpaceMap,
     explorations: Sequence[Motion],
     natural: Sequence[Motion],
-    chain: str,
+    chain: ChainLike,
     *,
     max_hand_speed: float,
 ) -> list[tuple[Array, Array, Mask]]:

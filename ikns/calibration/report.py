@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ikns.arrays import Mask
-from ikns.body.chains import chain_joints
+from ikns.body.chains import ChainLike, chain_joints
 from ikns.body.joint_axes import TILTS
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.exploration_fit import BodyReport
@@ -57,7 +57,7 @@ def body_report(fitted: BodyReport | None) -> dict[str, Any] | None:
 
 
 def exploration_report(
-    recording: Recording, motion: Motion, gate: Mask, chain: str
+    recording: Recording, motion: Motion, gate: Mask, chain: ChainLike
 ) -> dict[str, Any]:
     """How well a recording was tracked and how much of it is still."""
     residual = motion.residual[np.isfinite(motion.residual)]
@@ -101,7 +101,7 @@ def points_report(learned: NullSpaceMap, *, rate: float) -> list[dict[str, Any]]
 
 
 def extrinsic_report(
-    skeleton: Skeleton, pairs: Sequence[tuple[Motion, Mask]], chain: str
+    skeleton: Skeleton, pairs: Sequence[tuple[Motion, Mask]], chain: ChainLike
 ) -> dict[str, Any]:
     """Motion of thorax and joints outside the chain while the hand was still.
 

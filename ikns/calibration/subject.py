@@ -16,9 +16,16 @@ from typing import Any
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import chain_joints
+from ikns.body.chain_files import chain_of_table, shipped_chains
+from ikns.body.chains import (
+    ChainLike,
+    as_chain,
+    chain_joints,
+    no_swivel,
+    whole_arms,
+)
 from ikns.body.marker_set import MarkerSet
-from ikns.body.skeleton import Skeleton
+from ikns.body.skeleton import Skeleton, check_chain
 from ikns.body.skeleton.model import read_urdf
 from ikns.calibration.subject_files import (
     FILES,
@@ -38,6 +45,8 @@ FORMAT = 1
 #: Columns of the still samples: hand position, m in the thorax frame, and number of the
 #: PCA point, from 1; 0 for none.
 _COLUMNS = "x_m,y_m,z_m,point"
+#: What a map of a chain that does not come with the package says of it.
+_OF_CHAIN = ("joints", "ends", "base", "extrinsic")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +59,8 @@ class Subject:
         The scaled body with its markers.
     null_space_map : NullSpaceMap
         Fitted, or from a file.
-    chain : str
-        Joints of the map, see :data:`ikns.body.chains.CHAINS`.
+    chain : str or Chain
+        Joints of the map, see :class:`ikns.Chain`.
     report : dict
         How the calibration went: strings, finite numbers, None, lists and dicts.
     motions : tuple of Motion
@@ -76,7 +85,7 @@ class Subject:
 
     skeleton: Skeleton
     null_space_map: NullSpaceMap
-    chain: str
+    chain: ChainLike
     report: dict[str, Any]
     motions: tuple[Motion, ...] = field(default=(), repr=False)
     samples: Array | None = field(default=None, repr=False)
@@ -108,6 +117,8 @@ class Subject:
                 f"expected a method of {', '.join(METHODS)}, found '{method}'."
             )
         if method not in self.readouts:
+            if not whole_arms(self.chain):
+                raise InvalidInput(no_swivel(self.chain))
             known = self.methods
             lost = [other for other in OTHERS if other not in self.readouts]
             raise InvalidInput(
@@ -175,7 +186,8 @@ class Subject:
         del report["format"]
         table = _read_json(place / "map.json")
         try:
-            chain = table["chain"]
+            chain = _chain(table)
+            check_chain(skeleton, chain)
             if tuple(table["joints"]) != chain_joints(chain):
                 raise InvalidInput(
                     f"expected the joints {', '.join(chain_joints(chain))}, found "
@@ -245,6 +257,9 @@ class Subject:
 
     def _map(self) -> dict[str, Any]:
         learned = self.null_space_map
+        # What a chain of one's own is, nothing else says.
+        known_chain = str(self.chain) in shipped_chains()
+        own = {} if known_chain else as_chain(self.chain).table()
         # A map that was not fitted has no postures.
         known = getattr(learned, "cluster_means_", None)
         means: list[dict[str, Any]] = [{} for _ in learned.centers_]
@@ -252,8 +267,9 @@ class Subject:
             means = [{"mean_rad": mean.tolist()} for mean in known]
         return {
             "format": FORMAT,
-            "chain": self.chain,
+            "chain": str(self.chain),
             "joints": list(chain_joints(self.chain)),
+            **own,
             "outside": learned.outside,
             "interpolation": learned.interpolation,
             "radius_m": learned.radius_,
@@ -308,16 +324,24 @@ def _read_samples(path: Path, *, n_points: int) -> Array | None:
     return samples
 
 
-def _read_readout(path: Path, method: str, chain: str) -> Readout:
+def _chain(table: dict[str, Any]) -> ChainLike:
+    """Return the name of a chain that comes with the package, or the chain."""
+    name = table["chain"]
+    if "ends" not in table:
+        return str(as_chain(name))
+    return chain_of_table(name, {key: table[key] for key in _OF_CHAIN})
+
+
+def _read_readout(path: Path, method: str, chain: ChainLike) -> Readout:
     """Read the map of a method beside the paper's."""
     table = _read_json(path)
     try:
-        if (table["method"], table["chain"]) != (method, chain):
+        if (table["method"], table["chain"]) != (method, str(chain)):
             raise InvalidInput(
                 f"expected {method} of {chain}, found {table['method']} of "
                 f"{table['chain']}."
             )
-        return Readout.from_table(table)
+        return Readout.from_table(table, chain)
     except (LookupError, TypeError, ValueError) as error:
         fault = f"{error}" if isinstance(error, IknsError) else f"({error!r})."
         raise FileError(

@@ -13,10 +13,19 @@ from typing import Annotated, Any, Literal
 import typer
 
 import ikns
+from ikns.body.chain import ChainLike
 from ikns.cli.calibration_options import check_options
 from ikns.cli.calibration_tables import calibration_parts, methods_parts, shift_sentence
 from ikns.cli.live_calibration import LiveOptions, record_live
-from ikns.cli.options import AsJson, Force, From, MarkerSetName, MinStatic, To
+from ikns.cli.options import (
+    AsJson,
+    ChainName,
+    Force,
+    From,
+    MarkerSetName,
+    MinStatic,
+    To,
+)
 from ikns.cli.output import notes, progress, show
 from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import InvalidInput
@@ -96,6 +105,7 @@ def calibrate(
     clavicle: Annotated[
         bool, typer.Option("--clavicle", help="Include the clavicle in the chain.")
     ] = False,
+    chain: ChainName = None,
     stature: Annotated[
         float | None,
         typer.Option(
@@ -190,9 +200,9 @@ def calibrate(
     """
     from ikns.calibration.subject_files import FILES
 
-    chain = _chain(side, clavicle=clavicle)
-    generic = _body_of(stature, mass, sex)
     given_names = check_options(context, live=live, rewear=rewear, short=short)
+    own = _chain(chain, side, clavicle=clavicle, given=given_names)
+    generic = _body_of(stature, mass, sex)
     inputs = [static, *(exploration or []), *(natural or []), marker_set, subject]
     check_output_folder(out, FILES, force=force, inputs=[*inputs, recordings])
     if rewear:
@@ -215,7 +225,7 @@ def calibrate(
     common: dict[str, Any] = {
         "generic": generic,
         "marker_set": marker_set,
-        "chain": chain,
+        "chain": own,
         "n_dof": n_dof,
         "max_hand_speed": max_hand_speed,
         "min_static": min_static,
@@ -260,7 +270,7 @@ def calibrate(
             **common,
         )
     for frames in explorations:
-        warn_unseen(person.skeleton, frames, chain)
+        warn_unseen(person.skeleton, frames, own)
     person.save(out, force=force)
     show(
         {"subject": out} | person.report | ({"takes": takes} if live else {}),
@@ -270,7 +280,16 @@ def calibrate(
     )
 
 
-def _chain(side: str, *, clavicle: bool) -> str:
+def _chain(
+    name: str | None, side: str, *, clavicle: bool, given: Container[str]
+) -> ChainLike:
+    if name is not None:
+        if "side" in given or clavicle:
+            raise InvalidInput("--chain says the joints; leave out --side, --clavicle.")
+        from ikns.body.chain_files import load_chain
+        from ikns.body.chains import shipped_chains
+
+        return name if name in shipped_chains() else load_chain(name)
     if side != "both":
         return f"{side}_arm" + "_clavicle" * clavicle
     if clavicle:

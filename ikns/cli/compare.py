@@ -36,6 +36,7 @@ from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
     from ikns.analysis.compare import Crosstalk, NullSpaceComparison
+    from ikns.body.chains import ChainLike
     from ikns.nullspace.readout import Readout
 
 _UNITS = {"max_hand_speed": "m_s", "min_duration": "s"}
@@ -60,10 +61,12 @@ def compare(
         ),
     ] = "both",
     chain: Annotated[
-        Literal["own", "both"],
+        str,
         typer.Option(
-            help="Joints to compare: those of the map, or the arm with (without) "
-            "the clavicle, learned again."
+            metavar="own|both|NAME|FILE",
+            help="Joints to compare: those of the map (own), also the arm with "
+            "(without) the clavicle, learned again (both), or another chain of the "
+            "same hand, by its name or from a .toml file.",
         ),
     ] = "both",
     coordinates: Annotated[
@@ -141,7 +144,9 @@ def compare(
         calibrated, subject, [p for p in (recording, reaches) if p is not None]
     )
     plain = [
-        each for each in found if each[0][0] == own and each[0][2] == found[0][0][2]
+        each
+        for each in found
+        if each[0][0] == str(own) and each[0][2] == found[0][0][2]
     ]
     if figure is not None:
         _draw(figure, plain, across, simulated=simulated, force=force)
@@ -152,7 +157,7 @@ def compare(
             "recording": recording,
             "reaches": reaches,
             "simulated": simulated,
-            "chain": own,
+            "chain": str(own),
             "method": method,
             "task": task,
             "settings": options
@@ -245,10 +250,16 @@ def _combinations(
 ) -> tuple[list[Named], list[str]]:
     """Return the comparisons asked for, and warnings of chains that have none."""
     from ikns.analysis.compare import COORDINATES, compare_combinations
-    from ikns.body.chains import clavicle_counterpart
+    from ikns.body.chain_files import load_chain
+    from ikns.body.chains import as_chain, clavicle_counterpart
+    from ikns.body.skeleton import check_chain
 
     own = subject.chain
-    other = clavicle_counterpart(own) if chain == "both" else None
+    other: ChainLike | None = None
+    if chain == "both":
+        other = clavicle_counterpart(own)
+    elif chain != "own" and (named := load_chain(chain)) != as_chain(own):
+        other = check_chain(subject.skeleton, named)
     with naming(source):
         compared = compare_combinations(
             subject.null_space_map,

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import ikns
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, joint_sides
 from ikns.errors import InvalidInput, NotEnoughData
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def record_live(
     *,
     generic: ikns.Skeleton | None,
     marker_set: str,
-    chain: str,
+    chain: ChainLike,
     n_dof: int,
     max_hand_speed: float,
     min_static: float,
@@ -122,7 +122,9 @@ def record_live(
     with ExitStack() as stack:
         source = stack.enter_context(open_source(options.source))
         check_labels(source, marker_set, chain, generic=body)
-        settings = {"marker_set": marker_set, "chain": chain, "rate": source.rate}
+        settings = {"marker_set": marker_set, "chain": str(chain), "rate": source.rate}
+        if not isinstance(chain, str):
+            settings["chain_definition"] = chain.table()
         folder = RecordingsFolder(options.recordings, settings, resume=options.resume)
         stack.enter_context(folder.locked())
         ikns.warm_up()
@@ -136,7 +138,7 @@ def record_live(
             accepted=folder.accepted,
             pending={name: ikns.read(path) for name, path in pending.items()},
         )
-        turn = n_dof > len(chain_sides(chain))
+        turn = n_dof > len(joint_sides(chain))
         screen = _Screen(steps, auto=options.auto, turn=turn)
         with _keys(listen=not options.auto) as keys:
             run_protocol(

@@ -102,6 +102,16 @@ MinStatic = Annotated[
     float,
     typer.Option(help="Shortest static trial accepted, s.", min=0.0, max=3600.0),
 ]
+#: A chain of joints, by name or file.
+ChainName = Annotated[
+    str | None,
+    typer.Option(
+        "--chain",
+        metavar="NAME|FILE",
+        help="Joints of the task, in place of --side: a chain such as right_arm, or a "
+        ".toml file with one of your own (FILE:NAME of several).",
+    ),
+]
 #: What reads c off recordings.
 AnyMethod = Annotated[
     Literal["paper", "proximal", "intent"],

@@ -122,7 +122,7 @@ def ucm(
         {
             "recordings": recordings,
             "simulated": simulated,
-            "chain": calibrated.chain,
+            "chain": str(calibrated.chain),
             "task": task,
             "onset_speed_m_s": onset_speed,
             "most_different": most_different,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import SIDES, chain_sides
+from ikns.body.chains import SIDES, ChainLike, as_chain, end_sides
 from ikns.motion.motion import Motion
 
 #: Share of the samples at either end of each axis that do not count.
@@ -31,15 +31,15 @@ def hand_excursions(motions: Sequence[Motion]) -> Array:
 
 
 def other_hand_moves(
-    motions: Sequence[Motion], chain: str, *, times: float = 1.0
+    motions: Sequence[Motion], chain: ChainLike, *, times: float = 1.0
 ) -> str:
     """Say that not a chain's hand moves but the other one; empty where it does not.
 
     The other one moves more than so many `times` as far. Of two hands none is the
-    other.
+    other, and with joints of the other arm that one moves as it likes.
     """
-    sides = chain_sides(chain)
-    if len(sides) > 1:
+    sides = end_sides(chain)
+    if len(sides) != 1 or as_chain(chain).extrinsic:
         return ""
     (own,) = sides
     other = SIDES[1 - SIDES.index(own)]

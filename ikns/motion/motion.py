@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ikns.arrays import Array, Indices, Mask
-from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.chains import SIDES, ChainLike, as_chain, chain_joints, chain_sides
+from ikns.errors import InvalidInput
 from ikns.motion.labeled import data_frame, dataset
 
 
@@ -64,6 +65,11 @@ class Motion:
         :func:`ikns.motion.marker_ik.rejection.count_rejections`.
     reasons : tuple of str
         In words.
+    ends : tuple of (str, str)
+        Other links than hands whose pose is known, each with the link from which it is
+        seen; see :func:`ikns.motion.ends.with_ends`.
+    end_in_base, end_rotation_in_base, end_velocity_in_base : array
+        Their pose and velocity, (T, E, 3) m, (T, E, 3, 3) and (T, E, 3) m/s.
 
     Examples
     --------
@@ -94,6 +100,10 @@ class Motion:
     known: Mask = field(default_factory=lambda: np.ones((1, 1), bool))
     rejected: Indices = field(default_factory=lambda: np.full((1, len(SIDES)), -1))
     reasons: tuple[str, ...] = ()
+    ends: tuple[tuple[str, str], ...] = ()
+    end_in_base: Array = field(default_factory=lambda: np.empty((0, 0, 3)))
+    end_rotation_in_base: Array = field(default_factory=lambda: np.empty((0, 0, 3, 3)))
+    end_velocity_in_base: Array = field(default_factory=lambda: np.empty((0, 0, 3)))
 
     def __post_init__(self) -> None:
         """Hide what was not seen, and freeze the arrays."""
@@ -139,15 +149,15 @@ class Motion:
         pose = self.q[:, : -len(self.joint_names)]
         return np.where(self._thorax_known()[:, None], pose, np.nan)
 
-    def in_sight(self, chain: str) -> Mask:
+    def in_sight(self, chain: ChainLike) -> Mask:
         """Whether the thorax and every segment of a chain were seen, (T,)."""
         return all_seen(self.segments, self.seen, *chain_sides(chain))
 
-    def believed(self, chain: str) -> Mask:
+    def believed(self, chain: ChainLike) -> Mask:
         """Whether the markers of the thorax and a chain were not rejected, (T,)."""
         return np.asarray((self.rejected[:, self._sides(chain)] < 0).all(axis=1))
 
-    def never_seen(self, chain: str) -> tuple[str, ...]:
+    def never_seen(self, chain: ChainLike) -> tuple[str, ...]:
         """Segments of a chain, or the thorax, that no frame shows."""
         own = ("thorax", *chain_sides(chain))
         return tuple(
@@ -156,30 +166,35 @@ class Motion:
             if link.startswith(own) and not seen.any()
         )
 
-    def chain_angles(self, chain: str) -> Array:
+    def chain_angles(self, chain: ChainLike) -> Array:
         """Joint angles of a chain, (T, n) radians in chain order; NaN where not known.
 
         That is where the chain is out of sight or its markers were rejected.
         """
         return self._while_in_sight(chain, self.angles)
 
-    def chain_velocities(self, chain: str) -> Array:
+    def chain_velocities(self, chain: ChainLike) -> Array:
         """Joint velocities of a chain, (T, n) rad/s, likewise."""
         return self._while_in_sight(chain, self.v[:, -len(self.joint_names) :])
 
-    def task_position(self, chain: str) -> Array:
+    def task_position(self, chain: ChainLike) -> Array:
         """Where the task happens: the hand, or the midpoint of both, (T, 3) m.
 
-        NaN while the chain is out of sight.
+        Of a chain with other ends, these in its base. NaN while the chain is out of
+        sight.
         """
-        return self.hand_in_thorax[:, self._sides(chain)].mean(axis=1)
+        return self._of_ends(chain, "in").mean(axis=1)
 
-    def hand_speed(self, chain: str) -> Array:
+    def task_rotation(self, chain: ChainLike) -> Array:
+        """Orientation of the (first) hand or end of a chain, (T, 3, 3), likewise."""
+        return self._of_ends(chain, "rotation_in")[:, 0]
+
+    def hand_speed(self, chain: ChainLike) -> Array:
         """Speed of the chain's fastest hand relative to the thorax, (T,) m/s.
 
         NaN while the chain is out of sight.
         """
-        velocity = self.hand_velocity_in_thorax[:, self._sides(chain)]
+        velocity = self._of_ends(chain, "velocity_in")
         return np.linalg.norm(velocity, axis=2).max(axis=1)
 
     def to_dataframe(self) -> Any:
@@ -232,7 +247,7 @@ class Motion:
             },
         )
 
-    def _while_in_sight(self, chain: str, values: Array) -> Array:
+    def _while_in_sight(self, chain: ChainLike, values: Array) -> Array:
         columns = [self.joint_names.index(name) for name in chain_joints(chain)]
         shown = self.in_sight(chain) & self.believed(chain)
         return np.where(shown[:, None], values[:, columns], np.nan)
@@ -242,7 +257,22 @@ class Motion:
         judged = np.asarray((self.rejected < 0).any(axis=1), dtype=bool)
         return all_seen(self.segments, self.seen) & judged
 
-    def _sides(self, chain: str) -> list[int]:
+    def _of_ends(self, chain: ChainLike, what: str) -> Array:
+        """Return what is known of a chain's ends, (T, E, ...)."""
+        own = as_chain(chain)
+        if own.hands is not None:
+            return np.asarray(getattr(self, f"hand_{what}_thorax"))[:, list(own.hands)]
+        wanted = [(end, own.base) for end in own.ends]
+        if not set(wanted) <= set(self.ends):
+            raise InvalidInput(
+                f"the motion does not hold where {' and '.join(own.ends)} of the chain "
+                f"'{own}' is; track it with that chain, or add it with "
+                "ikns.motion.ends.with_ends."
+            )
+        columns = [self.ends.index(each) for each in wanted]
+        return np.asarray(getattr(self, f"end_{what}_base"))[:, columns]
+
+    def _sides(self, chain: ChainLike) -> list[int]:
         return [SIDES.index(side) for side in chain_sides(chain)]
 
 

@@ -6,14 +6,14 @@ import warnings
 
 import numpy as np
 
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import RecordingWarning, naming
 from ikns.recording.recording import Recording
 
 
 def warn_unseen(
-    skeleton: Skeleton, recording: Recording, chain: str | None = None
+    skeleton: Skeleton, recording: Recording, chain: ChainLike | None = None
 ) -> tuple[str, ...]:
     """Warn of markers that no frame shows, and return their labels.
 

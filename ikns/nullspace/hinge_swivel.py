@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, no_swivel, whole_arms
 from ikns.errors import InvalidInput
 from ikns.numerics.cross_product import cross
 
@@ -114,7 +114,9 @@ def mirrored_axis(axis_in_thorax: Array, side: str) -> Array:
     return axis_in_thorax * [-1.0, -1.0, 1.0] if side == "left" else axis_in_thorax
 
 
-def arm_swivel(skeleton: Skeleton, q: ArrayLike, chain: str) -> tuple[Array, Array]:
+def arm_swivel(
+    skeleton: Skeleton, q: ArrayLike, chain: ChainLike
+) -> tuple[Array, Array]:
     """Wrist center and hinge swivel of a chain with one arm.
 
     Parameters
@@ -123,7 +125,7 @@ def arm_swivel(skeleton: Skeleton, q: ArrayLike, chain: str) -> tuple[Array, Arr
     q : (..., 25) or (..., 18) array
         Configurations, or joint angles alone; rad.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
 
     Returns
     -------
@@ -135,15 +137,11 @@ def arm_swivel(skeleton: Skeleton, q: ArrayLike, chain: str) -> tuple[Array, Arr
     Raises
     ------
     InvalidInput
-        When the chain has two arms.
+        When the chain is not one whole arm.
     """
-    sides = chain_sides(chain)
-    if len(sides) != 1:
-        raise InvalidInput(
-            f"the swivel is that of one arm, found the chain '{chain}'; calibrate each "
-            "arm by itself."
-        )
-    side = sides[0]
+    if reason := no_swivel(chain):
+        raise InvalidInput(reason)
+    (side,) = whole_arms(chain)
     shoulder, rotation = skeleton.link_in_thorax(q, f"{side}_upper_arm")
     wrist, _ = skeleton.link_in_thorax(q, f"{side}_hand")
     swivel = hinge_swivel(shoulder, wrist, rotation[..., :, 2], side=side)

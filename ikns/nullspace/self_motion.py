@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array
-from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.chains import SIDES, ChainLike, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import null_projector
@@ -34,7 +34,7 @@ _MOST_STEPS = 200
 def posture_at_point(
     skeleton: Skeleton,
     learned: NullSpaceMap,
-    chain: str,
+    chain: ChainLike,
     point: int,
     *,
     start: ArrayLike | None = None,
@@ -51,14 +51,13 @@ def posture_at_point(
     if start is not None:
         rest = np.array(start, dtype=np.float64)[-len(rest) :]
     columns = _columns(skeleton, chain)
-    sides = [SIDES.index(side) for side in chain_sides(chain)]
     z, center = learned.directions_[point], learned.centers_[point]
     middle = (learned.lower_[point] + learned.upper_[point]) / 2
     q = rest.copy()
     for _ in range(60):
-        place = skeleton.hands_in_thorax(q)[0][sides].mean(axis=0)
+        place = skeleton.chain_ends(q, chain)[0].mean(axis=0)
         J = skeleton.chain_jacobian(q, chain, task="position")
-        A = np.vstack([J.reshape(len(sides), 3, -1).mean(axis=0), z])
+        A = np.vstack([J.reshape(-1, 3, len(columns)).mean(axis=0), z])
         error = np.concatenate([center - place, middle - z @ q[columns]])
         home = (rest - q)[columns]
         step = home + np.linalg.pinv(A, rcond=1e-3) @ (error - A @ home)
@@ -72,7 +71,7 @@ def posture_at_point(
 
 
 def visited_posture(
-    skeleton: Skeleton, learned: NullSpaceMap, chain: str, point: int
+    skeleton: Skeleton, learned: NullSpaceMap, chain: ChainLike, point: int
 ) -> Array | None:
     """Mean posture at a PCA point, (18,) rad; None for a map that was not fitted.
 
@@ -88,7 +87,7 @@ def visited_posture(
 def postures_along(
     skeleton: Skeleton,
     learned: NullSpaceMap,
-    chain: str,
+    chain: ChainLike,
     point: int,
     q: Array,
     c: Array,
@@ -109,7 +108,7 @@ def postures_along(
 
 
 def self_motion(
-    skeleton: Skeleton, learned: NullSpaceMap, chain: str, point: int, q: Array
+    skeleton: Skeleton, learned: NullSpaceMap, chain: ChainLike, point: int, q: Array
 ) -> Array:
     """Self-motion through `q`: postures that hold the pose of the hands, (N, 18).
 
@@ -126,7 +125,7 @@ def self_motion(
 
 
 def _sweep(
-    skeleton: Skeleton, chain: str, q: Array, z: Array, end: float
+    skeleton: Skeleton, chain: ChainLike, q: Array, z: Array, end: float
 ) -> list[Array]:
     """Postures after `q` while ``z @ q`` rises to `end`."""
     columns = _columns(skeleton, chain)
@@ -160,7 +159,7 @@ def _sweep(
 
 
 def _corrected(
-    skeleton: Skeleton, chain: str, q: Array, target: tuple[Array, Array]
+    skeleton: Skeleton, chain: ChainLike, q: Array, target: tuple[Array, Array]
 ) -> Array | None:
     """Posture near `q` with the hands at their target, or None where Newton fails."""
     columns = _columns(skeleton, chain)
@@ -182,17 +181,15 @@ def _pose_error(hands: tuple[Array, Array], target: tuple[Array, Array]) -> Arra
     return np.concatenate([target[0] - hands[0], rotation], axis=1).ravel()
 
 
-def _hands(skeleton: Skeleton, chain: str, q: Array) -> tuple[Array, Array]:
-    sides = [SIDES.index(side) for side in chain_sides(chain)]
-    place, rotation = skeleton.hands_in_thorax(q)
-    return place[sides], rotation[sides]
+def _hands(skeleton: Skeleton, chain: ChainLike, q: Array) -> tuple[Array, Array]:
+    return skeleton.chain_ends(q, chain)
 
 
-def _jacobian(skeleton: Skeleton, chain: str, q: Array) -> Array:
+def _jacobian(skeleton: Skeleton, chain: ChainLike, q: Array) -> Array:
     return skeleton.chain_jacobian(q, chain, task="pose")
 
 
-def _columns(skeleton: Skeleton, chain: str) -> list[int]:
+def _columns(skeleton: Skeleton, chain: ChainLike) -> list[int]:
     return [skeleton.joint_names.index(joint) for joint in chain_joints(chain)]
 
 

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.body.tree import Tree
-from ikns.body.chains import chain_joints, chain_sides
+from ikns.body.chains import ChainLike, chain_joints, chain_sides
 from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput
 from ikns.symbolic.kinematics import (
     End,
     Pose,
+    ends_of,
     frame,
     joint_frames,
     path_jacobian,
@@ -28,7 +29,7 @@ Pair = tuple[Capsule, Capsule]
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class ChainModel:
     """The joints of a task in a body.
 
     Parameters
@@ -95,11 +96,11 @@ class Held:
 
 def chain_of(
     body: Skeleton | Robot,
-    chain: str | None = None,
+    chain: ChainLike | None = None,
     *,
     hands_move: bool = False,
     pairs: Sequence[Pair] | None = None,
-) -> Chain:
+) -> ChainModel:
     """Describe the chain of a skeleton, or a whole robot.
 
     `hands_move` says whether a skeleton's hands turn, so that they too can touch the
@@ -121,7 +122,7 @@ def chain_of(
             way.insert(0, joint)
             joint = int(body.tree.parent[joint])
         columns = np.array(way, dtype=np.int64) - 1
-        return Chain(
+        return ChainModel(
             tree=body.tree,
             columns=columns,
             names=body.joint_names,
@@ -141,18 +142,18 @@ def chain_of(
         pairs = arm_pairs(capsules(body.urdf), sides, hands=hands_move)
     links = {capsule.link for pair in pairs for capsule in pair}
     ends = {link: body.tree_link(link) for link in links}
-    return Chain(
+    return ChainModel(
         tree=body.tree,
         columns=columns,
         names=names,
         lower=body.lower[columns],
         upper=body.upper[columns],
-        ends=tuple(body.tree_link(f"{side}_knuckle") for side in sides),
+        ends=tuple(body.tree_link(end) for end in ends_of(chain)),
         pairs=tuple((a, ends[a.link], b, ends[b.link]) for a, b in pairs),
     )
 
 
-def held(chain: Chain, *, task: str) -> Held:
+def held(chain: ChainModel, *, task: str) -> Held:
     """Build the functions of a chain that holds its hands' pose or position."""
     if task not in ("pose", "position"):
         raise InvalidInput(f"task must be 'pose' or 'position', not '{task}'.")

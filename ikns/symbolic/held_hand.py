@@ -22,6 +22,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput
 from ikns.symbolic.chain import Pair, chain_of, held
@@ -47,7 +48,7 @@ class HeldHand:
     ----------
     body : Skeleton or Robot
     chain : str, optional
-        Of a skeleton, see :data:`ikns.body.chains.CHAINS`.
+        Of a skeleton, see :class:`ikns.Chain`.
     task : {"pose", "position"}
         What the hand keeps.
     pairs : sequence of (Capsule, Capsule), optional
@@ -58,7 +59,7 @@ class HeldHand:
     def __init__(
         self,
         body: Skeleton | Robot,
-        chain: str | None = None,
+        chain: ChainLike | None = None,
         *,
         task: str = "pose",
         pairs: Sequence[Pair] | None = None,
@@ -241,7 +242,7 @@ class HeldHand:
 def available_range(
     body: Skeleton | Robot,
     q: ArrayLike,
-    chain: str | None,
+    chain: ChainLike | None,
     direction: ArrayLike,
     *,
     task: str = "pose",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.body.tree import FREE_FLYER, PRISMATIC, Tree
-from ikns.body.chains import chain_joints, chain_sides
+from ikns.body.chains import ChainLike, as_chain, chain_joints
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.markers import part_along
@@ -106,7 +106,7 @@ def link_in_thorax(skeleton: Skeleton, link: str) -> ca.Function:
 
 
 def chain_jacobian(
-    skeleton: Skeleton, chain: str, *, task: str = "pose"
+    skeleton: Skeleton, chain: ChainLike, *, task: str = "pose"
 ) -> ca.Function:
     """Return the function from joint angles (18,) to a chain's Jacobian (k, n).
 
@@ -123,14 +123,26 @@ def chain_jacobian(
         path_jacobian(
             tree,
             frames,
-            skeleton.tree_link(f"{side}_knuckle"),
+            skeleton.tree_link(end),
             joints,
             rows=6 if task == "pose" else 3,
         )
-        for side in chain_sides(chain)
+        for end in ends_of(chain)
     ]
     J = ca.vertcat(*blocks)
     return ca.Function("chain_jacobian", [angles], [J], ["angles"], ["jacobian"])
+
+
+def ends_of(chain: ChainLike) -> tuple[str, ...]:
+    """Return the links that end a chain, which are seen from the thorax."""
+    own = as_chain(chain)
+    if own.base != "thorax" or own.extrinsic:
+        raise InvalidInput(
+            f"the chain '{own}' is {'extrinsic' if own.extrinsic else 'seen from'}"
+            f"{'' if own.extrinsic else f' {own.base}'}; expected one whose joints "
+            "move its ends in the thorax frame."
+        )
+    return own.ends
 
 
 def markers_in_world(skeleton: Skeleton) -> ca.Function:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ikns._kernels.body.tree import PRISMATIC
 from ikns.errors import InvalidInput
-from ikns.symbolic.chain import Chain, Held
+from ikns.symbolic.chain import ChainModel, Held
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Start:
         return np.concatenate([self.angles, *(m.ravel(order="F") for m in matrices)])
 
 
-def start_of(chain: Chain, held: Held, q: ArrayLike) -> Start:
+def start_of(chain: ChainModel, held: Held, q: ArrayLike) -> Start:
     """Check a posture and compute the hand pose to hold.
 
     `q` has the angles of the body, or its configuration; the chain's own for a robot.
@@ -87,7 +87,7 @@ def start_of(chain: Chain, held: Held, q: ArrayLike) -> Start:
     return Start(x, angles, positions, rotations, rows[rank:])
 
 
-def binding(chain: Chain, held: Held, x: Array, angles: Array) -> tuple[str, ...]:
+def binding(chain: ChainModel, held: Held, x: Array, angles: Array) -> tuple[str, ...]:
     """Name the limits and volumes that are active at a posture x (n,)."""
     limits = [
         f"{name} at its {end} limit"

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.symbolic.chain import Chain, Held
+from ikns.symbolic.chain import ChainModel, Held
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ NODES = 8
 class Climber:
     """Maximize ``Z @ x`` over the postures x that hold the hand."""
 
-    def __init__(self, chain: Chain, held: Held) -> None:
+    def __init__(self, chain: ChainModel, held: Held) -> None:
         x, hold = _symbols(chain)
         Z = ca.SX.sym("Z", x.size1())
         self._chain = chain
@@ -71,7 +71,7 @@ class Climber:
 class Sweeper:
     """Maximize the step of an even polygon of postures that hold the hand."""
 
-    def __init__(self, chain: Chain, held: Held) -> None:
+    def __init__(self, chain: ChainModel, held: Held) -> None:
         start, hold = _symbols(chain)
         n = start.size1()
         ahead, step = ca.SX.sym("ahead", n), ca.SX.sym("h")
@@ -120,7 +120,7 @@ class Sweeper:
         return (np.vstack([guess[0], nodes]), *_outcome(self._solver))
 
 
-def _symbols(chain: Chain) -> tuple[ca.SX, tuple[ca.SX, ca.SX, ca.SX]]:
+def _symbols(chain: ChainModel) -> tuple[ca.SX, tuple[ca.SX, ca.SX, ca.SX]]:
     """Joints of the chain; angles of the body, hands' positions and rotations."""
     h = len(chain.ends)
     hold = (

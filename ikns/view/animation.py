@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ikns.arrays import Array
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.view.scene.commands import ROOT, property_command
@@ -38,7 +38,12 @@ _HIDDEN = tuple(
 
 
 def animation_bytes(
-    scene: Scene, skeleton: Skeleton, chain: str, *, caption: str, format: str = "GIF"
+    scene: Scene,
+    skeleton: Skeleton,
+    chain: ChainLike,
+    *,
+    caption: str,
+    format: str = "GIF",
 ) -> bytes:
     """Draw a scene that moves, frame by frame, with c below it.
 

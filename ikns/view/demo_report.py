@@ -81,7 +81,7 @@ def write_demo_report(path: Path, demo: Demo, summary: Mapping[str, Any]) -> Non
             "sex": summary["person"]["sex"],
             "stature (m)": round(summary["person"]["stature_m"], 3),
             "mass (kg)": round(summary["person"]["mass_kg"], 1),
-            "chain": demo.subject.chain,
+            "chain": str(demo.subject.chain),
             "PCA points": len(demo.subject.null_space_map.centers_),
             "ikns": version("ikns"),
             "Python": platform.python_version(),

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ikns.arrays import Array
-from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.chains import SIDES, ChainLike, chain_joints, whole_arms
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.subject import Subject
 from ikns.finger.geometry import FULL_FLEXION
@@ -28,12 +28,12 @@ from ikns.view.scene.scene import camera_and_target
 
 
 def elbow_widget(subject: Subject) -> Widget | None:
-    """Return an arm to move; None for both arms, whose two elbows are not one.
+    """Return an arm to move; None for a chain that is not one whole arm.
 
     Of a map of several freedoms the first moves the finger.
     """
-    sides = chain_sides(subject.chain)
-    if len(sides) > 1:
+    sides = whole_arms(subject.chain)
+    if len(sides) != 1:
         return None
     here = files("ikns.view")
     html, script = (
@@ -81,7 +81,9 @@ def _readout(learned: NullSpaceMap, point: int, hand: Array) -> dict[str, Any]:
     return {"z": z.tolist(), "lower": float(lower[0]), "upper": float(upper[0])}
 
 
-def _posture(body: Skeleton, learned: NullSpaceMap, chain: str, point: int) -> Array:
+def _posture(
+    body: Skeleton, learned: NullSpaceMap, chain: ChainLike, point: int
+) -> Array:
     start = visited_posture(body, learned, chain, point)
     return posture_at_point(body, learned, chain, point, start=start)
 

@@ -67,11 +67,12 @@ def control_frame(
     :class:`ikns._kernels.body.frame_constants.FrameConstants`;
     `seen_before` (M, 5) is the memory of markers of
     :mod:`ikns._kernels.body.uncertainty`, `dt` the time since the frame before, s;
-    `work`, `cavity_work`, `rotation` (1, 2, 3, 3) and `weights` (P,) are scratch.
-    Written are the pose `q` (nq,), the right and left hand `position` (1, 2, 3) and the
-    task's `place` (3,) in the thorax frame, m, the signals `c` (d,), not clipped, and
-    their standard `deviations` (d,): NaN where the weights are NaN or the range is
-    zero, and without a marker.
+    `work`, `cavity_work`, `rotation` (1, E, 3, 3), for E of at least 2, and `weights`
+    (P,) are scratch. Written are the pose `q` (nq,), the right and left hand's (or the
+    chain's ends') `position` (1, E, 3) and the task's `place` (3,) in the thorax frame
+    (or the chain's base), m, the signals `c` (d,), not clipped, and their standard
+    `deviations` (d,): NaN where the weights are NaN or the range is zero, and without a
+    marker.
 
     Returns
     -------
@@ -109,12 +110,12 @@ def control_frame(
     )
     worst, intermarker = figures[0, THORAX], figures[1, THORAX]
     believed = True
-    for hand in control_map.hands:
+    for side in control_map.sides:
         # The first is NaN where nothing of the thorax is seen.
-        if not worst >= figures[0, 1 + hand]:
-            worst = figures[0, 1 + hand]
-        intermarker = max(intermarker, figures[1, 1 + hand])
-        believed = believed and passed[hand]
+        if not worst >= figures[0, 1 + side]:
+            worst = figures[0, 1 + side]
+        intermarker = max(intermarker, figures[1, 1 + side])
+        believed = believed and passed[side]
     seen = _in_sight(markers, control_map.link, control_map.need)
     status = _read_pose(
         problem, s, constants, q, dt, believed, seen_before, np.isfinite(residual),
@@ -181,12 +182,12 @@ def _read_pose(
     """Read the signals off a pose whose errors are in `s`, if markers `posed` it."""
     paths, _, control_map, intent, segments = constants
     place_frames(paths, q[7:].reshape(1, len(q) - 7), rotation, position)
-    hands = control_map.hands
+    ends = control_map.ends
     for k in range(3):
         place[k] = 0.0
-        for h in range(len(hands)):
-            place[k] += position[0, hands[h], k]
-        place[k] /= len(hands)
+        for h in range(len(ends)):
+            place[k] += position[0, ends[h], k]
+        place[k] /= len(ends)
     for k in range(len(c)):
         c[k] = deviations[k] = np.nan
     hidden = note_markers(problem, s, dt, believed, segments, seen_before)
@@ -331,8 +332,8 @@ def _add_slopes(
                 slope[a] = change * way
     axes, R, p = np.empty((len(paths.joint), 6)), np.empty((3, 3)), np.empty(3)
     for a in range(3):
-        slope[a] /= REACH * len(control_map.hands)
-    for e in control_map.hands:
+        slope[a] /= REACH * len(control_map.ends)
+    for e in control_map.ends:
         follow_path(paths, e, angles, R, p, axes)
         for i in range(paths.ends[e - 1] if e > 0 else 0, paths.ends[e]):
             x, y, z = axes[i, 0], axes[i, 1], axes[i, 2]

@@ -27,7 +27,8 @@ class ControlMap(NamedTuple):
     lower: Array  # (P, d) rad
     upper: Array  # (P, d) rad
     columns: Indices  # (n,) the chain's joints among the angles
-    hands: Indices  # (1,) or (2,) the chain's hands, of right and left
+    sides: Indices  # (1,) or (2,) the chain's, 0 right and 1 left
+    ends: Indices  # (E,) the chain's ends among the paths
     link: Indices  # (M,) link that a marker belongs to, or -1
     need: Indices  # (L,) how many markers of a link must be seen
 
@@ -43,7 +44,7 @@ class IntentNumbers(NamedTuple):
 class FrameConstants(NamedTuple):
     """What a frame takes besides the packed marker problem."""
 
-    paths: Paths  # to both hands
+    paths: Paths  # to both hands, or to other ends of the chain
     gate: MarkerGate
     control_map: ControlMap
     intent: IntentNumbers
@@ -58,15 +59,15 @@ def pack_constants(constants: FrameConstants) -> tuple[Indices, Array]:
         *(len(each.ends) for each in (paths, intent.paths)),
         *(len(each.joint) for each in (paths, intent.paths)),
         len(gate.group), len(gate.pair), P, d, n,
-        len(learned.numbers), len(learned.indices), len(learned.hands),
+        len(learned.numbers), len(learned.indices), len(learned.sides),
         len(learned.need), len(segments.speed), len(intent.numbers),
-        len(intent.leverage), segments.total,
+        len(intent.leverage), segments.total, len(learned.ends),
     ]  # fmt: skip
     whole = [
         np.array(header), paths.ends, paths.joint, intent.paths.ends,
         intent.paths.joint, gate.group, gate.pair, gate.pair_group, learned.indices,
-        learned.columns, learned.hands, learned.link, learned.need, segments.of_marker,
-        segments.of_joint,
+        learned.columns, learned.sides, learned.ends, learned.link, learned.need,
+        segments.of_marker, segments.of_joint,
     ]  # fmt: skip
     real = [
         paths.rotation, paths.translation, intent.paths.rotation,
@@ -85,16 +86,17 @@ def unpack_constants(whole: Indices, real: Array) -> FrameConstants:
     """Unpack them."""
     E, F, K, L = whole[0], whole[1], whole[2], whole[3]
     M, N, P, d, n = whole[4], whole[5], whole[6], whole[7], whole[8]
-    size, count, hands, links = whole[9], whole[10], whole[11], whole[12]
+    size, count, sides, links = whole[9], whole[10], whole[11], whole[12]
     dofs, own, leverage = whole[13], whole[14], whole[15]
-    a = 17
+    a = 18
     b = a + E + 3 * K
     c = b + F + 3 * L
     e = c + M + 2 * N
     f = e + N
     g = f + count
     h = g + n
-    i = h + hands
+    o = h + sides
+    i = o + whole[17]
     j = i + M
     k = j + links
     r = 12 * (K + E)
@@ -123,7 +125,8 @@ def unpack_constants(whole: Indices, real: Array) -> FrameConstants:
             real[w : w + P * d].reshape(P, d),
             real[w + P * d : x].reshape(P, d),
             whole[g:h],
-            whole[h:i],
+            whole[h:o],
+            whole[o:i],
             whole[i:j],
             whole[j:k],
         ),

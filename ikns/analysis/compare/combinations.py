@@ -7,6 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 from ikns.analysis.compare.from_motion import compare_motion
 from ikns.analysis.compare.samples import NullSpaceComparison
+from ikns.body.chains import ChainLike, as_chain
 from ikns.body.skeleton import Skeleton
 from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
@@ -25,8 +26,8 @@ def compare_combinations(
     skeleton: Skeleton,
     motion: Motion,
     *,
-    chain: str = "right_arm",
-    chains: Sequence[str] = (),
+    chain: ChainLike = "right_arm",
+    chains: Sequence[ChainLike] = (),
     tasks: Sequence[Literal["pose", "position"]] = ("pose", "position"),
     coordinates: Sequence[str] = ("internal",),
     **options: Any,
@@ -56,7 +57,7 @@ def compare_combinations(
         try:
             for task in tasks:
                 for name in coordinates:
-                    found[analyzed, task, name] = compare_motion(
+                    found[str(analyzed), task, name] = compare_motion(
                         learned,
                         skeleton,
                         motion,
@@ -67,7 +68,7 @@ def compare_combinations(
                         **options,
                     )
         except NotEnoughData as error:
-            if analyzed == chain:
+            if as_chain(analyzed) == as_chain(chain):
                 raise
-            left_out[analyzed] = str(error)
+            left_out[str(analyzed)] = str(error)
     return Combinations(found, left_out)

@@ -18,7 +18,7 @@ from ikns.analysis.compare.map_samples import (
 )
 from ikns.analysis.compare.reaching import Crosstalk, crosstalk
 from ikns.analysis.compare.samples import NullSpaceComparison
-from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.chains import SIDES, ChainLike, as_chain, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
@@ -34,8 +34,8 @@ def compare_motion(
     skeleton: Skeleton,
     motion: Motion,
     *,
-    chain: str = "right_arm",
-    analyzed: str | None = None,
+    chain: ChainLike = "right_arm",
+    analyzed: ChainLike | None = None,
     task: Literal["pose", "position"] = "pose",
     coordinates: str = "internal",
     max_hand_speed: float = 0.05,
@@ -53,7 +53,7 @@ def compare_motion(
     motion : Motion
         What the arm did; its still samples near each PCA point are compared.
     chain : str
-        Joints of the map, see :data:`ikns.body.chains.CHAINS`.
+        Joints of the map, see :class:`ikns.Chain`.
     analyzed : str, optional
         Another chain of the same hands, with or without the clavicle. Then directions
         and ranges are learned again from the same samples of its joints, signs as in
@@ -117,9 +117,7 @@ def compare_motion(
         q=motion.chain_angles(whole)[used],
         jacobians=skeleton.chain_jacobian(angles, whole, task=task),
         position=motion.task_position(chain)[used],
-        rotation=motion.hand_rotation_in_thorax[used][
-            :, SIDES.index(chain_sides(whole)[0])
-        ],
+        rotation=motion.task_rotation(chain)[used],
         labels=labels,
         directions=_embedded(learned.directions_[points], chain_joints(chain), names),
         lower=learned.lower_[points],
@@ -127,9 +125,14 @@ def compare_motion(
         kinematics=[_kinematics(skeleton, whole, task, columns, q) for q in rest],
     )
     if coordinates != "internal":
+        if not _shoulders(names):
+            raise InvalidInput(
+                f"the chain '{whole}' has no whole shoulder; expected its coordinates "
+                f"internal, found {coordinates}."
+            )
         for shoulder in _shoulders(names):
             samples = change_coordinates(samples, coordinates, shoulder)
-    if whole != chain or coordinates != "internal":
+    if as_chain(whole) != as_chain(chain) or coordinates != "internal":
         samples = learn_again(samples, variance=learned.variance)
     return compare_map_samples(
         samples, points, variance=learned.variance, options=options
@@ -140,7 +143,7 @@ def motion_crosstalk(
     learned: NullSpaceMap,
     motion: Motion,
     *,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     c: Array | None = None,
     max_hand_speed: float = 0.05,
     **options: Any,
@@ -163,11 +166,18 @@ def motion_crosstalk(
     )
 
 
-def _check_chains(learned: NullSpaceMap, chain: str, whole: str) -> None:
-    if chain_sides(whole) != chain_sides(chain):
+def _check_chains(learned: NullSpaceMap, chain: ChainLike, whole: ChainLike) -> None:
+    own, other = as_chain(chain), as_chain(whole)
+    if (other.ends, other.base) != (own.ends, own.base):
+        ends = [end.replace("_knuckle", " hand") for end in own.ends]
         raise InvalidInput(
-            f"expected a chain that ends in the {' and '.join(chain_sides(chain))} "
-            f"hand as the map's {chain} does, found {whole}."
+            f"expected a chain that ends in the {' and '.join(ends)} as the map's "
+            f"{chain} does, found {whole}."
+        )
+    if own.extrinsic or other.extrinsic:
+        raise InvalidInput(
+            f"the chain '{own if own.extrinsic else other}' is extrinsic: its task "
+            "leaves its joints alone, so no Jacobian says which of their motions do."
         )
     if learned.directions_.shape[2] != len(chain_joints(chain)):
         raise InvalidInput(
@@ -177,10 +187,9 @@ def _check_chains(learned: NullSpaceMap, chain: str, whole: str) -> None:
 
 
 def _kinematics(
-    skeleton: Skeleton, chain: str, task: str, columns: list[int], rest: Array
+    skeleton: Skeleton, chain: ChainLike, task: str, columns: list[int], rest: Array
 ) -> Kinematics:
     """Kinematics of a chain's hands; the other joints stay as in `rest` (18,) rad."""
-    sides = [SIDES.index(side) for side in chain_sides(chain)]
 
     def posture(given: Array) -> Array:
         full = np.broadcast_to(rest, (*given.shape[:-1], len(rest))).copy()
@@ -188,8 +197,8 @@ def _kinematics(
         return full
 
     def pose(given: Array) -> tuple[Array, Array]:
-        place, turn = skeleton.hands_in_thorax(posture(given))
-        return place[..., sides, :].mean(axis=-2), turn[..., sides[0], :, :]
+        place, turn = skeleton.chain_ends(posture(given), chain)
+        return place.mean(axis=-2), turn[..., 0, :, :]
 
     return Kinematics(
         pose, lambda y: skeleton.chain_jacobian(posture(y), chain, task=task)
@@ -210,5 +219,5 @@ def _shoulders(names: Sequence[str]) -> list[list[int]]:
     return [
         [list(names).index(f"{side}_{joint}") for joint in _SHOULDER]
         for side in SIDES
-        if f"{side}_{_SHOULDER[0]}" in names
+        if all(f"{side}_{joint}" in names for joint in _SHOULDER)
     ]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ikns.analysis.compare.leak import hand_turns, slope_scores, slopes
 from ikns.analysis.compare.resampling import draw
-from ikns.body.chains import SIDES, chain_sides
+from ikns.body.chains import ChainLike
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
@@ -70,7 +70,7 @@ def compare(
     analytic: NullSpaceMap,
     motion: Motion,
     *,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
     resamples: int = 400,
@@ -89,7 +89,7 @@ def compare(
     motion : Motion
         Any motion with still hands near the points.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     max_hand_speed, min_duration : float
         Gate on the hand, see :func:`ikns.nullspace.map.still_mask`, m/s and s.
     resamples : int
@@ -126,8 +126,7 @@ def compare(
     limits = {"max_hand_speed": max_hand_speed, "min_duration": min_duration}
     x, q = null_space_samples(motion, chain, **limits)
     gate = still_mask(motion, chain, **limits)
-    side = SIDES.index(chain_sides(chain)[0])
-    rotation = motion.hand_rotation_in_thorax[gate][:, side]
+    rotation = motion.task_rotation(chain)[gate]
     radius = getattr(learned, "radius_", None)
     labels, _ = nearest_center(x, learned.centers_, radius=radius)
     rng = np.random.default_rng(seed)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.analysis.compare.maps import MapComparison, compare
+from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.errors import NotEnoughData
 from ikns.motion.motion import Motion
@@ -40,7 +41,7 @@ def compare_visited(
     skeleton: Skeleton,
     motion: Motion,
     *,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     task: Literal["pose", "position"] = "pose",
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ikns.analysis.ucm.split import VarianceSplit, variance_split
 from ikns.analysis.ucm.tasks import chain_task
 from ikns.analysis.ucm.trials import aligned_angles
-from ikns.body.chains import chain_joints
+from ikns.body.chains import ChainLike, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
@@ -20,7 +20,7 @@ def across_trials(
     skeleton: Skeleton,
     motions: Sequence[Motion],
     *,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     task: str = "position",
     samples: int = 101,
     threshold: float = 0.05,
@@ -34,7 +34,7 @@ def across_trials(
     motions : sequence of Motion
         Repetitions of one movement; each is cut to it by the hand's speed.
     chain : str
-        Joints of the split, see :data:`ikns.body.chains.CHAINS`. The others take their
+        Joints of the split, see :class:`ikns.Chain`. The others take their
         mean over the trials.
     task : {"position", "pose"}
         Of the hand in the thorax frame.
@@ -82,7 +82,7 @@ def within_trial(
     motion: Motion,
     where: ArrayLike,
     *,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     task: str = "position",
     min_samples: int | None = None,
 ) -> VarianceSplit:
@@ -137,7 +137,7 @@ def within_trial(
 def _split(
     skeleton: Skeleton,
     angles: NDArray[np.float64],
-    chain: str,
+    chain: ChainLike,
     task: str,
     least: int | None,
 ) -> VarianceSplit:

@@ -13,7 +13,7 @@ from ikns.analysis.ucm.intervals import Interval, confidence_interval
 from ikns.analysis.ucm.split import VarianceSplit
 from ikns.analysis.ucm.surrogates import SurrogateTest, surrogate_test
 from ikns.analysis.ucm.trials import check_repeats, movement
-from ikns.body.chains import chain_joints
+from ikns.body.chains import ChainLike, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion.motion import Motion
@@ -57,7 +57,7 @@ def analyze_trials(
     skeleton: Skeleton,
     motions: Sequence[Motion],
     *,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     task: str = "position",
     threshold: float = 0.05,
     n_surrogates: int = 1000,
@@ -120,7 +120,7 @@ def analyze_points(
     motion: Motion,
     learned: NullSpaceMap,
     *,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     task: str = "position",
     max_hand_speed: float = 0.05,
     min_still: float = 0.5,

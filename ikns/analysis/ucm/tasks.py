@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ikns.body.chains import chain_joints
+from ikns.body.chains import ChainLike, as_chain, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def chain_task(
-    skeleton: Skeleton, chain: str, angles: ArrayLike, *, task: str = "position"
+    skeleton: Skeleton, chain: ChainLike, angles: ArrayLike, *, task: str = "position"
 ) -> Callable[[Array], Array]:
     """Jacobian of a chain's hands as a function of the chain's joints.
 
@@ -23,7 +23,7 @@ def chain_task(
     ----------
     skeleton : Skeleton
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     angles : (..., 18) array
         Joint angles of the whole body, rad. Those outside the chain stay there, such as
         the clavicle's: give their mean.
@@ -41,6 +41,11 @@ def chain_task(
     >>> task(np.zeros((5, 7))).shape
     (5, 3, 7)
     """
+    if as_chain(chain).extrinsic:
+        raise InvalidInput(
+            f"the chain '{chain}' is extrinsic: its joints do not move its task, so "
+            "there is no variance that would."
+        )
     body = np.asarray(angles, dtype=np.float64)
     columns = [skeleton.joint_names.index(name) for name in chain_joints(chain)]
     if body.shape[-1:] != (len(skeleton.joint_names),):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
+from ikns.body.chains import ChainLike
 from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion.excursion import other_hand_moves
 from ikns.motion.motion import Motion
@@ -145,7 +146,7 @@ def normalize_time(
 def check_repeats(
     motions: Sequence[Motion],
     names: Sequence[str],
-    chain: str,
+    chain: ChainLike,
     *,
     threshold: float = 0.05,
     most_different: float = 0.25,
@@ -207,7 +208,7 @@ def check_repeats(
 
 def aligned_angles(
     motions: Sequence[Motion],
-    chain: str,
+    chain: ChainLike,
     *,
     samples: int = 101,
     threshold: float = 0.05,

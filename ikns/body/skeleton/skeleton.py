@@ -23,7 +23,7 @@ from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.tree import Tree
 from ikns.arrays import Array, Indices
 from ikns.body.anthropometry import Segment, segments
-from ikns.body.chains import SIDES
+from ikns.body.chains import SIDES, ChainLike, as_chain
 from ikns.body.joint_axes import tilt_urdf
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import (
@@ -213,12 +213,17 @@ class Skeleton:
         """From the thorax to the right and left shoulder, elbow and wrist."""
         return self._frames.elbow_paths
 
-    def paths(self, links: tuple[str, ...], columns: tuple[str, ...] = ()) -> Paths:
-        """Return the paths from the thorax to links, for a kernel.
+    def paths(
+        self,
+        links: tuple[str, ...],
+        columns: tuple[str, ...] = (),
+        base: str = "thorax",
+    ) -> Paths:
+        """Return the paths from the thorax, or another base, to links, for a kernel.
 
         `columns` are the joints of a Jacobian's columns.
         """
-        return self._frames.paths(links, columns)
+        return self._frames.paths(links, columns, base)
 
     @cached_property
     def _along(self) -> Array:
@@ -266,28 +271,39 @@ class Skeleton:
         """Right and left knuckle, (..., 2, 3) m, and orientation, (..., 2, 3, 3)."""
         return self._frames.place(q, [f"{side}_knuckle" for side in SIDES])
 
-    def chain_jacobian(self, q: ArrayLike, chain: str, *, task: str = "pose") -> Array:
-        """Jacobian of a chain's hands in the thorax frame.
+    def chain_ends(self, q: ArrayLike, chain: ChainLike) -> tuple[Array, Array]:
+        """Return a chain's ends in its base, (..., E, 3) m, and their orientation.
+
+        Of ``"right_arm"`` that is the right knuckle in the thorax frame. Orientations
+        are (..., E, 3, 3).
+        """
+        own = as_chain(chain)
+        return self._frames.place(q, own.ends, own.base)
+
+    def chain_jacobian(
+        self, q: ArrayLike, chain: ChainLike, *, task: str = "pose"
+    ) -> Array:
+        """Jacobian of a chain's ends, its hands, in the thorax frame (or its base's).
 
         Parameters
         ----------
         q : (..., 25) or (..., 18) array
             Configurations, or joint angles alone.
         chain : str
-            See :data:`ikns.body.chains.CHAINS`.
+            See :class:`ikns.Chain`.
         task : {"pose", "position"}
             Hand position and orientation, or position alone.
 
         Returns
         -------
         (..., k, n) array
-            Per hand 3 rows of linear velocity (m/rad), then for ``"pose"`` 3 rows of
+            Per end 3 rows of linear velocity (m/rad), then for ``"pose"`` 3 rows of
             angular velocity (rad/rad); columns in chain order.
         """
         return self._frames.jacobian(q, chain, task)
 
     def null_spaces(
-        self, q: ArrayLike, chain: str, *, task: str = "pose", rtol: float = 1e-9
+        self, q: ArrayLike, chain: ChainLike, *, task: str = "pose", rtol: float = 1e-9
     ) -> tuple[Array, Indices]:
         """Joint motions of a chain that leave its hands where they are.
 

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from ikns.arrays import Array, Indices, Mask
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.distances import (
@@ -57,7 +57,7 @@ def judge_exploration(
     generic: Skeleton,
     *,
     skeleton: Skeleton | None = None,
-    chain: str = "both_arms",
+    chain: ChainLike = "both_arms",
 ) -> list[Finding]:
     """Judge a recording in which a person moves.
 
@@ -71,7 +71,7 @@ def judge_exploration(
     skeleton : Skeleton, optional
         The person's, from the static trial.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`; what is wrong with the other arm alone is
+        See :class:`ikns.Chain`; what is wrong with the other arm alone is
         left out.
 
     Returns

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.body.chains import SIDES, chain_sides
+from ikns.body.chains import ChainLike
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.live.calibration.judge import Judge
@@ -63,14 +63,16 @@ class HandTracker:
     skeleton : Skeleton
         The person's.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     labels : sequence of str
         Labels of the frames' markers.
     """
 
-    def __init__(self, skeleton: Skeleton, chain: str, labels: Sequence[str]) -> None:
+    def __init__(
+        self, skeleton: Skeleton, chain: ChainLike, labels: Sequence[str]
+    ) -> None:
         self._skeleton, self._labels = skeleton, tuple(labels)
-        self._sides = [SIDES.index(side) for side in chain_sides(chain)]
+        self._chain = chain
         self._solver = MarkerIK(skeleton)
         self._q: Array | None = None
 
@@ -81,8 +83,8 @@ class HandTracker:
         if not math.isfinite(pose.residual):
             return None
         self._q = pose.q
-        hands = self._skeleton.hands_in_thorax(pose.q)[0]
-        return np.asarray(hands[self._sides].mean(axis=0))
+        ends = self._skeleton.chain_ends(pose.q, self._chain)[0]
+        return np.asarray(ends.mean(axis=0))
 
 
 class Guidance:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.body.chains import chain_joints
-from ikns.body.skeleton import Skeleton
+from ikns.body.chains import ChainLike, chain_joints
+from ikns.body.skeleton import Skeleton, check_chain
 from ikns.errors import IknsError, InvalidInput
 from ikns.live.calibration.natural_verdict import (
     half_explored,
@@ -54,7 +54,7 @@ class Judge:
         generic: Skeleton,
         *,
         marker_set: str = "oxford24",
-        chain: str = "right_arm",
+        chain: ChainLike = "right_arm",
         n_dof: int = 1,
         variance: float = 0.8,
         max_hand_speed: float = 0.05,
@@ -62,6 +62,7 @@ class Judge:
         min_still: float = 0.5,
         min_rest: float = 0.0,
     ) -> None:
+        check_chain(generic, chain, n_dof=n_dof)
         n = len(chain_joints(chain))
         for right, sentence in (
             (1 <= n_dof <= n, f"n_dof between 1 and the {n} joints, found {n_dof}"),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.motion.marker_ik.rejection import rejection_sentence
@@ -21,7 +22,7 @@ SEEN_SHARE = 0.5
 
 
 def tracking_fault(
-    skeleton: Skeleton, recording: Recording, motion: Motion, *, chain: str
+    skeleton: Skeleton, recording: Recording, motion: Motion, *, chain: ChainLike
 ) -> str:
     """Describe a fault of markers or tracking; empty if there is none.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, whole_arms
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.natural import LEAST_COVERED, LEAST_NATURAL
 from ikns.errors import IknsError
@@ -45,7 +45,7 @@ def judge_natural(
     recording: Recording,
     skeleton: Skeleton,
     *,
-    chain: str,
+    chain: ChainLike,
     max_hand_speed: float = 0.05,
 ) -> Verdict:
     """Judge ordinary movement: the hand moves most of the time, and not in one place.
@@ -56,7 +56,7 @@ def judge_natural(
     skeleton : Skeleton
         The person's.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     max_hand_speed : float
         Faster hands move, m/s.
     """
@@ -103,10 +103,10 @@ def judge_natural(
 
 
 def natural_of(
-    motions: list[tuple[Skeleton, Motion]], chain: str, *, max_hand_speed: float
+    motions: list[tuple[Skeleton, Motion]], chain: ChainLike, *, max_hand_speed: float
 ) -> NaturalPosture:
     """Return the natural posture by what was accepted; without enough, of people."""
-    if len(chain_sides(chain)) != 1:
+    if len(whole_arms(chain)) != 1:
         return NaturalPosture.of_people()
     wrists, swivels, seconds = [], [], 0.0
     for skeleton, motion in motions:
@@ -125,11 +125,11 @@ def ends_beyond(
     skeleton: Skeleton,
     motion: Motion,
     gate: NDArray[np.bool_],
-    chain: str,
+    chain: ChainLike,
     natural: NaturalPosture,
 ) -> tuple[float, float] | None:
     """Return the ends of s - s_nat while the hand is still, rad; None if unknown."""
-    if len(chain_sides(chain)) != 1:
+    if len(whole_arms(chain)) != 1:
         return None
     wrist, swivel = readout_samples(skeleton, motion, chain, "intent")
     row = gate & np.isfinite(wrist).all(axis=1) & np.isfinite(swivel[:, 0])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.analysis.compare.leak import slopes
-from ikns.body.chains import chain_joints
+from ikns.body.chains import ChainLike, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import elbow_reference, two_arms_fault
 from ikns.calibration.natural import LEAST_BENT, elbow_degrees
@@ -48,7 +48,7 @@ def judge_point(
     recording: Recording,
     skeleton: Skeleton,
     *,
-    chain: str,
+    chain: ChainLike,
     n_dof: int = 1,
     variance: float = 0.8,
     max_hand_speed: float = 0.05,
@@ -69,7 +69,7 @@ def judge_point(
     skeleton : Skeleton
         The person's.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     n_dof, variance, max_hand_speed, min_still, min_rest
         See :func:`ikns.calibrate`.
     earlier : mapping of str to (3,) array

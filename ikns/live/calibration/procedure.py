@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from ikns.body.chains import ChainLike
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import sight_needs
@@ -35,7 +36,7 @@ _WAIT = 0.05
 
 
 def check_labels(
-    source: Source, marker_set: str, chain: str, *, generic: Skeleton
+    source: Source, marker_set: str, chain: ChainLike, *, generic: Skeleton
 ) -> None:
     """Check that the source has every marker of the thorax and of the chain.
 

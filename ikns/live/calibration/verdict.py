@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.body.chains import ChainLike
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import scaling
@@ -160,7 +161,9 @@ def _lost(
     ]
 
 
-def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdict:
+def judge_free(
+    recording: Recording, skeleton: Skeleton, *, chain: ChainLike
+) -> Verdict:
     """Judge the free exploration, which only shows where the hand can go.
 
     Parameters
@@ -169,7 +172,7 @@ def judge_free(recording: Recording, skeleton: Skeleton, *, chain: str) -> Verdi
     skeleton : Skeleton
         The person's.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     """
     values: dict[str, Any] = {
         "seconds": len(recording.time) / recording.rate,

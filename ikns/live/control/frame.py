@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +15,11 @@ from ikns._kernels.body.frame_constants import (
     IntentNumbers,
     pack_constants,
 )
+from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.uncertainty import Segments, new_marker_memory
 from ikns._kernels.voronoi.diagram import INSIDE_HULL, new_work
 from ikns.arrays import Array, Mask
-from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.chains import SIDES, ChainLike, as_chain, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.live.control.intent import intent_numbers
@@ -93,7 +95,7 @@ class FrameSolver:
     null_space_map : NullSpaceMap
         Fitted, for `chain`.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     readout : Readout, optional
         Of this skeleton and chain: what reads c instead of the map, by a second
         compiled call. Live these are ``"paper"``, which changes nothing, and
@@ -128,7 +130,7 @@ class FrameSolver:
         self,
         skeleton: Skeleton,
         null_space_map: NullSpaceMap,
-        chain: str,
+        chain: ChainLike,
         *,
         readout: Readout | None = None,
         max_uncertainty: float | None = MAX_UNCERTAINTY,
@@ -145,13 +147,14 @@ class FrameSolver:
                 "expected a map of points in space, found points with "
                 f"{null_space_map.centers_.shape[1]} coordinates."
             )
-        if readout is not None and readout.chain != chain:
+        if readout is not None and as_chain(readout.chain) != as_chain(chain):
             raise InvalidInput(
                 f"expected a readout of {chain}, found one of {readout.chain}."
             )
         self.skeleton, self.null_space_map, self.chain = skeleton, null_space_map, chain
         self.max_uncertainty = max_uncertainty
         self._ik = KernelSolver(skeleton)
+        paths, _ = _paths(skeleton, chain)
         intent = IntentNumbers(skeleton.hand_paths, np.empty(0), np.empty((0, 0)))
         if readout is not None and readout.method != "paper":
             intent = intent_numbers(skeleton, readout)
@@ -159,7 +162,7 @@ class FrameSolver:
         control_map = _control_map(skeleton, null_space_map, chain)
         of_marker[control_map.link < 0] = -1
         constants = FrameConstants(
-            skeleton.hand_paths,
+            paths,
             self._ik.gate,
             control_map,
             intent,
@@ -171,7 +174,9 @@ class FrameSolver:
         self._seen_before = new_marker_memory(len(of_marker))
         indices = control_map.indices
         self._cavity = new_work(indices) if len(indices) else np.empty(0)
-        self._rotation, self._position = np.empty((1, 2, 3, 3)), np.empty((1, 2, 3))
+        ends = max(2, len(paths.ends))  # or as much as intent takes
+        self._rotation = np.empty((1, ends, 3, 3))
+        self._position = np.empty((1, ends, 3))
         self._weights = np.empty(len(null_space_map.centers_))
         self._markers = np.empty((len(skeleton.marker_set.markers), 3))
         self._memory = self._ik.new_memory()
@@ -294,7 +299,17 @@ class FrameSolver:
         return c, uncertainty
 
 
-def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> ControlMap:
+def _paths(skeleton: Skeleton, chain: ChainLike) -> tuple[Paths, Sequence[int]]:
+    """Paths to a chain's ends or to both hands, and which of them are its ends."""
+    own = as_chain(chain)
+    if own.hands is not None:
+        return skeleton.hand_paths, own.hands
+    return skeleton.paths(own.ends, (), own.base), range(len(own.ends))
+
+
+def _control_map(
+    skeleton: Skeleton, learned: NullSpaceMap, chain: ChainLike
+) -> ControlMap:
     labels = list(skeleton.marker_set.labels)
     link = np.full(len(labels), -1, dtype=np.int64)
     need: list[int] = []
@@ -310,7 +325,7 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
             "expected a map between natural neighbors or nearest points, found "
             f"{type(interpolator).__name__}, which the live kernel does not support."
         )
-    hands = [SIDES.index(side) for side in chain_sides(chain)]
+    sides = [SIDES.index(side) for side in chain_sides(chain)]
     return ControlMap(
         points=np.array(learned.centers_, order="C"),
         numbers=numbers,
@@ -319,7 +334,8 @@ def _control_map(skeleton: Skeleton, learned: NullSpaceMap, chain: str) -> Contr
         lower=np.array(learned.lower_, order="C"),
         upper=np.array(learned.upper_, order="C"),
         columns=skeleton.columns(chain_joints(chain)) - 6,
-        hands=np.array(hands, dtype=np.int64),
+        sides=np.array(sides, dtype=np.int64),
+        ends=np.array(_paths(skeleton, chain)[1], dtype=np.int64),
         link=link,
         need=np.array(need, dtype=np.int64),
     )

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.live.control.frame import ControlFrame, FrameSolver
 from ikns.live.control.settings import ControlSettings
@@ -93,7 +94,10 @@ def rejection_reason(
 
 
 def uncertain_reason(
-    skeleton: Skeleton, chain: str, markers: NDArray[np.float64], signal: str = "c"
+    skeleton: Skeleton,
+    chain: ChainLike,
+    markers: NDArray[np.float64],
+    signal: str = "c",
 ) -> str:
     """Say which hidden markers of a chain leave a signal uncertain, the first three."""
     columns = chain_columns(skeleton, chain)

@@ -12,7 +12,7 @@ import time
 from collections.abc import Mapping
 from functools import partial
 
-from ikns.body.chains import chain_joints
+from ikns.body.chains import ChainLike, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.model import NQ_ROOT
 from ikns.errors import StreamError
@@ -31,7 +31,7 @@ _REPEAT = 1.0
 _SILENCE = 1.0
 
 
-def joint_places(skeleton: Skeleton, chain: str) -> dict[str, int]:
+def joint_places(skeleton: Skeleton, chain: ChainLike) -> dict[str, int]:
     """Return the joints of a chain, with their places in a configuration q.
 
     Examples

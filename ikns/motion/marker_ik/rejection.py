@@ -9,7 +9,7 @@ import numpy as np
 
 from ikns._kernels.body.marker_gate import THORAX, MarkerGate
 from ikns.arrays import Array, Indices
-from ikns.body.chains import SIDES, chain_sides
+from ikns.body.chains import SIDES, ChainLike, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.gate import GateLimits
 from ikns.motion.marker_ik.label_changes import exchanges
@@ -31,20 +31,20 @@ class _Worn(NamedTuple):
 
 # A reason is asked for by frame, and finding the segments takes longer than saying it.
 @lru_cache(maxsize=8)
-def _worn(skeleton: Skeleton, chain: str) -> _Worn:
+def _worn(skeleton: Skeleton, chain: ChainLike) -> _Worn:
     needs = sight_needs(skeleton, chain).values()
     columns = np.concatenate([np.array(own, dtype=np.int64) for own, _ in needs])
     return _Worn(columns, *segment_pairs(skeleton, chain))
 
 
-def chain_columns(skeleton: Skeleton, chain: str) -> Indices:
+def chain_columns(skeleton: Skeleton, chain: ChainLike) -> Indices:
     """Columns of the markers of a chain and the thorax in the skeleton's set."""
     return _worn(skeleton, chain).columns
 
 
 def misfit_reason(
     skeleton: Skeleton,
-    chain: str,
+    chain: ChainLike,
     markers: Array,
     q: Array,
     residual: float,
@@ -56,7 +56,7 @@ def misfit_reason(
     ----------
     skeleton : Skeleton
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     markers : (M, 3) array
         Positions in the world, m; NaN = not seen.
     q : (nq,) array
@@ -138,7 +138,7 @@ def frame_errors(gate: MarkerGate, markers: Array, residual: Array) -> Array:
     return np.hypot(residual, apart.max(axis=1, initial=0.0))
 
 
-def count_rejections(motion: Motion, chain: str) -> dict[str, int]:
+def count_rejections(motion: Motion, chain: ChainLike) -> dict[str, int]:
     """Count the frames of a motion whose markers are not believed, by reason.
 
     The most frequent first; frames in which an arm is out of sight are not counted for
@@ -154,7 +154,7 @@ def count_rejections(motion: Motion, chain: str) -> dict[str, int]:
     return count.table()
 
 
-def rejection_sentence(motion: Motion, chain: str) -> str:
+def rejection_sentence(motion: Motion, chain: ChainLike) -> str:
     """Say how many frames are left out for their markers, and why; empty for none."""
     return say_rejections(count_rejections(motion, chain), len(motion.time))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.visibility import segment_pairs
 
@@ -19,7 +20,9 @@ _ALIKE, _WITHIN = 2 / 3, 0.18
 _GLANCES = 100
 
 
-def power_of_ten(skeleton: Skeleton, chain: str, markers: NDArray[np.float64]) -> int:
+def power_of_ten(
+    skeleton: Skeleton, chain: ChainLike, markers: NDArray[np.float64]
+) -> int:
     """Return the power of ten by which a body is larger than at calibration.
 
     That of the median ratio of the distances within segments, over distances and
@@ -30,7 +33,7 @@ def power_of_ten(skeleton: Skeleton, chain: str, markers: NDArray[np.float64]) -
     ----------
     skeleton : Skeleton
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     markers : (T, M, 3) array
         m in the world, in the order of the skeleton's marker set; NaN = not seen.
 

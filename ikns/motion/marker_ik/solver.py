@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array, Indices
-from ikns.body.chains import SIDES
+from ikns.body.chains import SIDES, ChainLike
 from ikns.body.set_choice import set_advice
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
+from ikns.motion.ends import with_ends
 from ikns.motion.marker_ik.kernel import KernelSolver
 from ikns.motion.marker_ik.pose import (
     MAX_ITERATIONS,
@@ -136,7 +137,7 @@ class MarkerIK:
         self,
         recording: Recording,
         *,
-        chain: str | None = None,
+        chain: ChainLike | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Motion:
         """Solve a whole recording.
@@ -146,7 +147,7 @@ class MarkerIK:
         recording : Recording
             Any recording that holds at least three of the skeleton's markers.
         chain : str, optional
-            What the recording is meant to show, see :data:`ikns.body.chains.CHAINS`.
+            What the recording is meant to show, see :class:`ikns.Chain`.
             Without it an arm that is never visible is just unknown in every frame.
         progress : callable, optional
             Called with (frames done, frames in total).
@@ -225,7 +226,8 @@ class MarkerIK:
         rejected, reasons = recorded_reasons(
             self.skeleton, self.solver.gate, markers, frames, recording.rate
         )
-        return self._motion(recording.time, frames, visibility, rejected, reasons)
+        motion = self._motion(recording.time, frames, visibility, rejected, reasons)
+        return motion if chain is None else with_ends(self.skeleton, motion, chain)
 
     def _motion(
         self,

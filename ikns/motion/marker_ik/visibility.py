@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ikns.arrays import Array, Indices, Mask
-from ikns.body.chains import SIDES, chain_sides
+from ikns.body.chains import SIDES, ChainLike, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import MarkerMismatch
 from ikns.motion.motion import all_seen
@@ -42,7 +42,9 @@ class _Segment(NamedTuple):
     turns: int  # 1 where the markers have a turn of their own, which takes one number
 
 
-def sight_needs(skeleton: Skeleton, chain: str) -> dict[str, tuple[list[int], int]]:
+def sight_needs(
+    skeleton: Skeleton, chain: ChainLike
+) -> dict[str, tuple[list[int], int]]:
     """By link of a chain, and the thorax: its markers, and how many must be seen."""
     return {
         link: (segment.columns, segment.need)
@@ -112,7 +114,7 @@ def visible_segments(skeleton: Skeleton, markers: Array) -> Visibility:
     return Visibility(names, shown, known)
 
 
-def require_sight(skeleton: Skeleton, visibility: Visibility, chain: str) -> None:
+def require_sight(skeleton: Skeleton, visibility: Visibility, chain: ChainLike) -> None:
     """Refuse a recording that never shows a segment of a chain, or the thorax."""
     worn = skeleton.marker_set
     for link, (own, need) in sight_needs(skeleton, chain).items():
@@ -127,7 +129,7 @@ def require_sight(skeleton: Skeleton, visibility: Visibility, chain: str) -> Non
             )
 
 
-def segment_pairs(skeleton: Skeleton, chain: str) -> tuple[Indices, Array]:
+def segment_pairs(skeleton: Skeleton, chain: ChainLike) -> tuple[Indices, Array]:
     """Markers of the same segment of a chain, or of the thorax, two and two.
 
     Segments hardly stretch: where a distance differs, a marker has moved, or is taken

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ikns.body.chains import ChainLike
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
@@ -26,7 +27,7 @@ def analytic_map(
     motion: Motion,
     centers: ArrayLike,
     *,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     task: Literal["pose", "position"] = "pose",
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
@@ -53,7 +54,7 @@ def analytic_map(
     centers : (P, 3) array
         PCA points, m; those of a learned map to compare with it.
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     task : {"pose", "position"}
         What is held: hand position and orientation, or position alone.
     max_hand_speed, min_duration : float

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array, Mask
+from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Robot
 from ikns.errors import NotEnoughData
 from ikns.motion.marker_ik.rejection import rejection_sentence
@@ -17,7 +18,7 @@ from ikns.numerics.turns import nearest_turn, without_turns
 
 def still_mask(
     motion: Motion,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     *,
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
@@ -28,7 +29,7 @@ def still_mask(
     ----------
     motion : Motion
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     max_hand_speed : float
         Hands slower than this in the thorax frame count as still, m/s. Lisini Baldi et
         al. (arXiv 2012.03600) choose it by task; the default is theirs.
@@ -59,7 +60,7 @@ def still_mask(
 
 def null_space_samples(
     motion: Motion,
-    chain: str = "right_arm",
+    chain: ChainLike = "right_arm",
     *,
     max_hand_speed: float = 0.05,
     min_duration: float = 0.0,
@@ -73,7 +74,7 @@ def null_space_samples(
     ----------
     motion : Motion
     chain : str
-        See :data:`ikns.body.chains.CHAINS`.
+        See :class:`ikns.Chain`.
     max_hand_speed, min_duration : float
         See :func:`still_mask`, m/s and s.
 
@@ -111,7 +112,7 @@ def null_space_samples(
 
 def no_still_sample(
     motions: Sequence[Motion],
-    chain: str,
+    chain: ChainLike,
     max_hand_speed: float,
     *,
     min_duration: float = 0.0,

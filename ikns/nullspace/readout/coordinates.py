@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.chains import ChainLike, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
@@ -29,7 +29,7 @@ _STEP = 1e-5
 def readout_samples(
     skeleton: Skeleton,
     motion: Motion,
-    chain: str,
+    chain: ChainLike,
     method: Method,
     *,
     reference: Array | None = None,
@@ -42,7 +42,7 @@ def readout_samples(
         Of the motion.
     motion : Motion
     chain : str
-        See :data:`ikns.body.chains.CHAINS`; of one arm for ``"intent"``.
+        See :class:`ikns.Chain`; of one arm for ``"intent"``.
     method : {"paper", "proximal", "intent"}
     reference : (S, 3, 3) array, optional
         For ``"proximal"``: a reference orientation of each upper arm of the chain in
@@ -68,7 +68,7 @@ def readout_samples(
 def posture_samples(
     skeleton: Skeleton,
     angles: Array,
-    chain: str,
+    chain: ChainLike,
     method: Method,
     *,
     reference: Array | None = None,
@@ -77,8 +77,7 @@ def posture_samples(
     if method == "intent":
         wrist, swivel = arm_swivel(skeleton, angles, chain)
         return wrist, swivel[:, None]
-    sides = [SIDES.index(side) for side in chain_sides(chain)]
-    hand = skeleton.hands_in_thorax(angles)[0][:, sides].mean(axis=1)
+    hand = skeleton.chain_ends(angles, chain)[0].mean(axis=1)
     if method == "paper":
         return hand, angles[:, [*map(skeleton.joint_names.index, chain_joints(chain))]]
     if method != "proximal" or reference is None:
@@ -106,7 +105,7 @@ def rotation_vector(upper_arm_in_thorax: Array, reference: Array) -> Array:
     return y.reshape(*upper_arm_in_thorax.shape[:-2], 3)
 
 
-def mean_orientation(skeleton: Skeleton, angles: Array, chain: str) -> Array:
+def mean_orientation(skeleton: Skeleton, angles: Array, chain: ChainLike) -> Array:
     """Mean orientation of each upper arm of a chain, (S, 3, 3), over postures (T, 18).
 
     Rotation vectors about it are shortest, and farthest from their end at pi.

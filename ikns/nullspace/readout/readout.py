@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ikns.arrays import Array, Mask
+from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
@@ -30,7 +31,7 @@ class Readout:
     ----------
     method : {"paper", "proximal", "intent"}
     chain : str
-        Joints of the map, see :data:`ikns.body.chains.CHAINS`.
+        Joints of the map, see :class:`ikns.Chain`.
     map : NullSpaceMap or IntentMap
         Fitted; it takes places and coordinates of
         :func:`ikns.nullspace.readout.readout_samples`.
@@ -39,7 +40,7 @@ class Readout:
     """
 
     method: Method
-    chain: str
+    chain: ChainLike
     map: NullSpaceMap | IntentMap
     reference: Array | None = None
 
@@ -68,7 +69,7 @@ class Readout:
 
     def table(self) -> dict[str, Any]:
         """Return what a file holds: text, numbers, lists and dicts."""
-        about: dict[str, Any] = {"method": self.method, "chain": self.chain}
+        about: dict[str, Any] = {"method": self.method, "chain": str(self.chain)}
         if isinstance(self.map, IntentMap):
             return about | _intent_table(self.map)
         known = self.map
@@ -84,8 +85,10 @@ class Readout:
         }
 
     @classmethod
-    def from_table(cls, table: dict[str, Any]) -> Readout:
-        """Make a readout from what a file holds.
+    def from_table(
+        cls, table: dict[str, Any], chain: ChainLike | None = None
+    ) -> Readout:
+        """Make a readout from what a file holds; of a chain that has the name there.
 
         Raises
         ------
@@ -97,8 +100,9 @@ class Readout:
             raise InvalidInput(
                 f"expected a method of {', '.join(METHODS)}, found '{method}'."
             )
+        chain = table["chain"] if chain is None else chain
         if method == "intent":
-            return cls(method, table["chain"], _intent_map(table))
+            return cls(method, chain, _intent_map(table))
         made = NullSpaceMap.from_arrays(
             table["centers_m"],
             table["directions"],
@@ -113,7 +117,7 @@ class Readout:
             reference @ np.swapaxes(reference, 1, 2), np.eye(3), atol=1e-6
         ):
             raise InvalidInput("expected a rotation matrix for each upper arm.")
-        return cls(method, table["chain"], made, reference)
+        return cls(method, chain, made, reference)
 
 
 def _intent_table(learned: IntentMap) -> dict[str, Any]:

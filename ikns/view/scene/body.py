@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.view.scene.commands import (
     ROOT,
@@ -28,7 +28,7 @@ def drawn_links(skeleton: Skeleton) -> list[str]:
     return list(dict.fromkeys(shape.link for shape in visual_shapes(skeleton.urdf)))
 
 
-def arm_links(skeleton: Skeleton, chain: str) -> list[str]:
+def arm_links(skeleton: Skeleton, chain: ChainLike) -> list[str]:
     """Drawn links that a chain's joints move: upper arm, forearm and hand."""
     sides = chain_sides(chain)
     still = [f"{side}_clavicle" for side in sides]
@@ -41,7 +41,7 @@ def link_poses(skeleton: Skeleton, q: Array, link: str) -> Array:
     return pose_matrix(rotation, position)
 
 
-def body_commands(skeleton: Skeleton, q: Array, chain: str) -> list[Command]:
+def body_commands(skeleton: Skeleton, q: Array, chain: ChainLike) -> list[Command]:
     """Draw the body at a posture; link ``x`` is the node ``/ikns/body/x``."""
     acting = set(arm_links(skeleton, chain))
     commands = _shapes(

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import to_hex
 
 from ikns.arrays import Indices
-from ikns.body.chains import chain_sides
+from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.nullspace.map import NullSpaceMap
@@ -32,7 +32,7 @@ _MANY = "conic-gradient({} 33%, {} 0 67%, {} 0)".format(
 def map_scene(
     skeleton: Skeleton,
     learned: NullSpaceMap,
-    chain: str,
+    chain: ChainLike,
     *,
     simulated: bool,
     title: str = "Null-space map",

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Indices
-from ikns.body.chains import SIDES, chain_sides
+from ikns.body.chains import SIDES, ChainLike, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.motion import Motion
@@ -50,7 +50,7 @@ _RATE = 30.0
 def recording_scene(
     skeleton: Skeleton,
     learned: NullSpaceMap,
-    chain: str,
+    chain: ChainLike,
     motion: Motion,
     recording: Recording,
     *,
@@ -152,7 +152,7 @@ def _seen_markers(
     return marker_tracks(places, worn.labels, f"{ROOT}/seen")
 
 
-def _trails(motion: Motion, chain: str, kept: Indices) -> list[Command]:
+def _trails(motion: Motion, chain: ChainLike, kept: Indices) -> list[Command]:
     commands: list[Command] = []
     for side in chain_sides(chain):
         hand = motion.hand_in_thorax[kept, SIDES.index(side)]

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import SIDES, chain_sides
+from ikns.body.chains import SIDES, ChainLike, as_chain, chain_sides
 from ikns.body.skeleton import Skeleton
+from ikns.errors import InvalidInput
 from ikns.nullspace.map import NullSpaceMap
 from ikns.view.scene.commands import Command
 
@@ -59,13 +60,18 @@ class Scene:
 
 
 def camera_and_target(
-    skeleton: Skeleton, learned: NullSpaceMap, chain: str, q: Array
+    skeleton: Skeleton, learned: NullSpaceMap, chain: ChainLike, q: Array
 ) -> tuple[Array, Array]:
     """Return a camera with trunk, acting arms and PCA points in view, and its target.
 
     Both are (3,) m in the thorax frame. Unknown postures (NaN) of `q` (..., 18 or 25)
     are ignored.
     """
+    if (base := as_chain(chain).base) != "thorax":
+        raise InvalidInput(
+            f"the map of the chain '{chain}' is seen from {base}; expected one seen "
+            "from the thorax, to be drawn on the body."
+        )
     sides = chain_sides(chain)
     shown = [learned.centers_, np.array(_TRUNK)]
     for side in SIDES:

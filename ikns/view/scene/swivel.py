@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import SIDES, chain_joints, chain_sides
+from ikns.body.chains import SIDES, ChainLike, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.self_motion import postures_along, self_motion
@@ -40,7 +40,12 @@ class Swivel:
 
     @classmethod
     def at(
-        cls, skeleton: Skeleton, learned: NullSpaceMap, chain: str, point: int, q: Array
+        cls,
+        skeleton: Skeleton,
+        learned: NullSpaceMap,
+        chain: ChainLike,
+        point: int,
+        q: Array,
     ) -> Swivel:
         """Postures through `q` (18,) at a point of a map."""
         sweep = self_motion(skeleton, learned, chain, point, q)
@@ -87,7 +92,7 @@ class Swivel:
 
 
 def swivel_commands(
-    skeleton: Skeleton, swivel: Swivel, chain: str, *, playing: bool
+    skeleton: Skeleton, swivel: Swivel, chain: ChainLike, *, playing: bool
 ) -> list[Command]:
     """Draw ghosts, paths of elbow and hand, and what moves.
 
@@ -135,7 +140,7 @@ def swivel_commands(
     return commands
 
 
-def swivel_tracks(skeleton: Skeleton, swivel: Swivel, chain: str) -> list[Track]:
+def swivel_tracks(skeleton: Skeleton, swivel: Swivel, chain: ChainLike) -> list[Track]:
     """Tracks of the body along the sweep and of the moving ghost along Z."""
     if len(swivel.sweep) < 2:
         return []
