@@ -91,11 +91,11 @@ def test_the_same_frames_give_the_same_bits():
     np.testing.assert_array_equal(*runs)
 
 
-def test_proximal_and_other_chains_are_refused_live():
+def test_other_methods_and_chains_are_refused_live():
     subject = small_person.subject()
-    with pytest.raises(InvalidInput, match="works with recordings only"):
-        ControlSettings(method="proximal")
-    with pytest.raises(InvalidInput, match="works with recordings only"):
+    with pytest.raises(InvalidInput, match="expected a method of paper, proximal"):
+        ControlSettings(method="proximate")
+    with pytest.raises(InvalidInput, match="expected a readout of intent"):
         intent_numbers(subject.skeleton, subject.readout("proximal"))
     other = dataclasses.replace(subject.readout("intent"), chain="left_arm")
     with pytest.raises(InvalidInput, match="expected a readout of right_arm"):

@@ -25,8 +25,8 @@ TURN = np.radians(29.0)
 #: A reach goes at least so far, m; fewer of them say nothing; c moves a lot by more
 #: than this.
 _FAR, _FEWEST, _LOT = 0.10, 5, 0.2
-#: Methods that `ikns run`, `track` and `pick` take.
-_LIVE: tuple[Method, ...] = ("paper", "intent")
+#: Methods that are recommended; proximal is there to be compared with.
+_CHOICES: tuple[Method, ...] = ("paper", "intent")
 
 
 def method_summary(
@@ -196,7 +196,7 @@ def _mean(values: Array) -> float | None:
 def _recommended(
     rows: dict[str, dict[str, float | None]], counts: dict[str, int]
 ) -> dict[str, str]:
-    """Choose the method whose c moves least, of those that run live.
+    """Choose the method whose c moves least.
 
     By the mean of what a reach and a turned hand do to c, where both are known.
     """
@@ -204,7 +204,7 @@ def _recommended(
         (k for k in ("natural", "between_places") if counts[k] >= _FEWEST), None
     )
     words = {"natural": "a natural reach", "between_places": "a reach between places"}
-    known = [m for m in _LIVE if m in rows]
+    known = [m for m in _CHOICES if m in rows]
     causes = {} if kind is None else {kind: words[kind]}
     causes |= {"turned_hand": "a turned hand"}
     moved = {

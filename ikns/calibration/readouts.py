@@ -113,6 +113,7 @@ def _proximal(
     explorations: Sequence[tuple[Motion, Mask]],
     chain: ChainLike,
 ) -> Readout:
+    _require_bent(explorations, chain)
     still = np.concatenate([motion.angles[gate] for motion, gate in explorations])
     reference = mean_orientation(skeleton, still, chain)
     rows = [
@@ -141,13 +142,7 @@ def _intent(
     chain: ChainLike,
     moving: tuple[Array, Array] | None,
 ) -> Readout:
-    bent = max(elbow_degrees(motion, gate, chain) for motion, gate in explorations)
-    if bent < LEAST_BENT:
-        raise NotEnoughData(
-            f"the arm is straight wherever the hand is held, with the elbow at "
-            f"{bent:.0f} deg at most; hold it closer, so that the elbow bends by "
-            f"{LEAST_BENT:.0f} deg or more"
-        )
+    _require_bent(explorations, chain)
     rows = [
         readout_samples(skeleton, motion, chain, "intent") for motion, _ in explorations
     ]
@@ -157,6 +152,19 @@ def _intent(
     made.fit(x, y, groups=learned.labels_, time=time, **natural)
     made.warn_of_scatter([f"point {point}" for point in _points(made, learned)])
     return Readout("intent", chain, made)
+
+
+def _require_bent(
+    explorations: Sequence[tuple[Motion, Mask]], chain: ChainLike
+) -> None:
+    """Refuse a straight arm, whose elbow goes nowhere as it swivels."""
+    bent = max(elbow_degrees(motion, gate, chain) for motion, gate in explorations)
+    if bent < LEAST_BENT:
+        raise NotEnoughData(
+            f"the arm is straight wherever the hand is held, with the elbow at "
+            f"{bent:.0f} deg at most; hold it closer, so that the elbow bends by "
+            f"{LEAST_BENT:.0f} deg or more"
+        )
 
 
 def _points(intent: IntentMap, learned: NullSpaceMap) -> list[int]:

@@ -25,6 +25,7 @@ from ikns.cli.live_session import (
     written,
 )
 from ikns.cli.options import (
+    AnyMethod,
     AsJson,
     Fingers,
     LabelFile,
@@ -104,13 +105,7 @@ def run(
             max=10.0,
         ),
     ] = 0.025,
-    method: Annotated[
-        Literal["paper", "intent"],
-        typer.Option(
-            help="How c is read from the posture: the paper's map, or the "
-            "departure from the natural posture."
-        ),
-    ] = "paper",
+    method: AnyMethod = "paper",
     publish: Publish = None,
     rerun: Rerun = False,
     rrd: Rrd = None,

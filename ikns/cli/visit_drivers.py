@@ -48,7 +48,7 @@ class ArmOptions:
         Whether the panel shows the body.
     realtime : bool
         Whether the control loop has real-time priority.
-    method : {"paper", "intent"}
+    method : {"paper", "proximal", "intent"}
         What reads c off the posture.
     names : dict
         Other labels for markers of the source, new by old.
@@ -69,7 +69,7 @@ class ArmOptions:
     hold_speed: float | None
     view: bool
     realtime: bool
-    method: Literal["paper", "intent"]
+    method: Literal["paper", "proximal", "intent"]
     names: dict[str, str]
     max_uncertainty: float
     publish: list[str] | None = None

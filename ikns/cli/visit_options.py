@@ -57,10 +57,11 @@ SafeState = Annotated[
     typer.Option(help="State of the finger when poses stop arriving."),
 ]
 LiveMethod = Annotated[
-    Literal["paper", "intent"],
+    Literal["paper", "proximal", "intent"],
     typer.Option(
-        help="For ikns: how c is read from the posture, by the paper's map "
-        "or the departure from the natural posture."
+        help="For ikns: how c is read from the posture: the paper's map of joint "
+        "angles, a map of upper arm and elbow only, or the departure "
+        "from the natural posture."
     ),
 ]
 MaxUncertainty = Annotated[

@@ -17,7 +17,7 @@ from ikns._kernels.body.frame_constants import (
 )
 from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.uncertainty import Segments, new_marker_memory
-from ikns._kernels.voronoi.diagram import INSIDE_HULL, new_work
+from ikns._kernels.voronoi.diagram import INSIDE_HULL, OUTSIDE_HULL, new_work
 from ikns.arrays import Array, Mask
 from ikns.body.chains import SIDES, ChainLike, as_chain, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
@@ -98,8 +98,9 @@ class FrameSolver:
         See :class:`ikns.Chain`.
     readout : Readout, optional
         Of this skeleton and chain: what reads c instead of the map, by a second
-        compiled call. Live these are ``"paper"``, which changes nothing, and
-        ``"intent"``, for which `inside` says where natural movement was taught.
+        compiled call. ``"paper"`` changes nothing; with ``"intent"`` `inside` says
+        where natural movement was taught. ``"proximal"`` compiles a kernel of its own
+        here, some seconds at its first use on a machine.
     max_uncertainty : float, optional
         c is NaN where its standard deviation is larger. A segment may then be hidden as
         long as c does not need it. None: no limit, and c is NaN whenever a segment of
@@ -156,8 +157,15 @@ class FrameSolver:
         self._ik = KernelSolver(skeleton)
         paths, _ = _paths(skeleton, chain)
         intent = IntentNumbers(skeleton.hand_paths, np.empty(0), np.empty((0, 0)))
-        if readout is not None and readout.method != "paper":
+        if readout is not None and readout.method == "intent":
             intent = intent_numbers(skeleton, readout)
+        self._proximal = None
+        if readout is not None and readout.method == "proximal":
+            # Other methods do not wait until this is compiled.
+            from ikns._kernels.body.proximal_frame import proximal_frame
+            from ikns.live.control.proximal import proximal_numbers
+
+            self._proximal = proximal_frame, proximal_numbers(skeleton, readout)
         of_marker, of_joint = joint_segments(skeleton)
         control_map = _control_map(skeleton, null_space_map, chain)
         of_marker[control_map.link < 0] = -1
@@ -181,6 +189,11 @@ class FrameSolver:
         self._markers = np.empty((len(skeleton.marker_set.markers), 3))
         self._memory = self._ik.new_memory()
         self.reset()
+        if self._proximal is not None:
+            self._ik.work[:] = 0.0  # no marker is seen: compile, and do nothing
+            self._read_proximal(
+                self._seen_before, self._q, np.zeros(3), np.zeros(1), np.zeros(1)
+            )
 
     def reset(self, q: ArrayLike | None = None) -> None:
         """Forget the pose; start the next frame from `q`, or from scratch."""
@@ -233,6 +246,11 @@ class FrameSolver:
             c,
             uncertainty,
         )
+        if self._proximal is not None:
+            inside = self._read_proximal(
+                self._seen_before, self._q, place, c, uncertainty
+            )
+            status = INSIDE_HULL if inside else OUTSIDE_HULL
         self._lost = self._lost and not np.isfinite(residual)
         self._memory.start[:] = self._q
         limit = self.max_uncertainty
@@ -279,24 +297,54 @@ class FrameSolver:
             c has no limit here, and is NaN only as the map's is, and without a marker.
         """
         seen = np.ascontiguousarray(markers, dtype=np.float64)
+        poses, steps = np.array(q, dtype=np.float64), np.diff(time, prepend=time[0])
         c, uncertainty = np.empty((2, len(q), self.null_space_map.directions_.shape[1]))
-        recorded_signals(
-            *self._ik.packed,
-            *self._constants,
-            seen,
-            np.diff(time, prepend=time[0]),
-            np.ascontiguousarray(believed),
-            new_marker_memory(seen.shape[1]),
-            np.array(q, dtype=np.float64),
-            self._ik.work,
-            self._cavity,
-            self._rotation,
-            self._position,
-            self._weights,
-            c,
-            uncertainty,
-        )
+        trusted = np.ascontiguousarray(believed)
+        memory = new_marker_memory(seen.shape[1])
+        # Proximal is read off what the call for a frame leaves in its work memory.
+        size = max(1, len(poses)) if self._proximal is None else 1
+        for i in range(0, len(poses), size):
+            rows = slice(i, i + size)
+            recorded_signals(
+                *self._ik.packed,
+                *self._constants,
+                seen[rows],
+                steps[rows],
+                trusted[rows],
+                memory,
+                poses[rows],
+                self._ik.work,
+                self._cavity,
+                self._rotation,
+                self._position,
+                self._weights,
+                c[rows],
+                uncertainty[rows],
+            )
+            if self._proximal is not None:
+                place = self.skeleton.chain_ends(poses[i], self.chain)[0].mean(axis=0)
+                self._read_proximal(memory, poses[i], place, c[i], uncertainty[i])
         return c, uncertainty
+
+    def _read_proximal(
+        self, memory: Array, q: Array, place: Array, c: Array, uncertainty: Array
+    ) -> bool:
+        """Write c of proximal for the frame last solved; return whether inside."""
+        assert self._proximal is not None
+        kernel, numbers = self._proximal
+        return bool(
+            kernel(
+                *self._ik.packed,
+                *self._constants,
+                numbers,
+                memory,
+                q,
+                self._ik.work,
+                place,
+                c,
+                uncertainty,
+            )
+        )
 
 
 def _paths(skeleton: Skeleton, chain: ChainLike) -> tuple[Paths, Sequence[int]]:

@@ -26,13 +26,12 @@ def intent_numbers(skeleton: Skeleton, readout: Readout) -> IntentNumbers:
     Raises
     ------
     InvalidInput
-        For another method, which the live kernel does not support.
+        For another method.
     """
     learned = readout.map
     if not isinstance(learned, IntentMap):
         raise InvalidInput(
-            f"the method '{readout.method}' works with recordings only; for live "
-            "control choose paper or intent."
+            f"expected a readout of intent, found one of {readout.method}."
         )
     (side,) = chain_sides(readout.chain)
     paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))

@@ -121,14 +121,12 @@ def control_table(
 
 def _knows(readout: Readout) -> bool:
     """Whether the live kernel knows a readout's map."""
-    if readout.method == "intent":
+    if readout.method != "paper":
         return True
     known = NaturalNeighborInterpolator, NearestPoint
     learned = readout.map
-    return (
-        readout.method == "paper"
-        and isinstance(learned, NullSpaceMap)
-        and isinstance(learned.interpolator_, known)
+    return isinstance(learned, NullSpaceMap) and isinstance(
+        learned.interpolator_, known
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from ikns.errors import InvalidInput
 from ikns.live.control.frame import MAX_UNCERTAINTY
 from ikns.motion.marker_ik.gate import GateLimits
-from ikns.nullspace.readout import Method
+from ikns.nullspace.readout import METHODS, Method
 
 _LIMITS = GateLimits()
 
@@ -36,7 +36,7 @@ class ControlSettings:
     max_uncertainty : float or None
         c moves nothing while its standard deviation is larger; see
         :class:`ikns.live.control.FrameSolver`.
-    method : {"paper", "intent"}
+    method : {"paper", "proximal", "intent"}
         What reads c off the posture, see :mod:`ikns.nullspace.readout`.
     hold_after, safe_after : float
         See :class:`ikns.live.control.safety.SafetyMachine`, s.
@@ -70,10 +70,9 @@ class ControlSettings:
                 "expected different dofs, counted from 1, found "
                 f"{', '.join(map(str, self.dofs)) or 'none'}."
             )
-        if self.method not in ("paper", "intent"):
+        if self.method not in METHODS:
             raise InvalidInput(
-                f"the method '{self.method}' works with recordings only; for live "
-                "control choose paper or intent."
+                f"expected a method of {', '.join(METHODS)}, found '{self.method}'."
             )
         for name in (
             "hold_speed",

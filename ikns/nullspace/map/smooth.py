@@ -50,6 +50,21 @@ class SmoothField:
             system[:p, p:], system[p:, :p] = affine, affine.T
             self._smoother = np.linalg.inv(system)[:, :p]
 
+    @property
+    def numbers(self) -> tuple[Array, Array, Array]:
+        """What the live kernel takes of it.
+
+        The smoother (P + d + 1, P), empty where all points weigh the same; the metric
+        (d, d) of the leverage; and the middle of the points, the scale of lengths, m,
+        and the largest leverage of a point, (d + 2,).
+        """
+        smoother = np.empty((0, 0)) if self._smoother is None else self._smoother
+        return (
+            np.array(smoother, order="C"),
+            np.array(self._metric, order="C"),
+            np.array([*self._middle, self._scale, self._most]),
+        )
+
     def weights(self, x: ArrayLike) -> Array:
         """Weights at queries (..., d), (..., P); NaN where a query is not finite."""
         queries = np.asarray(x, dtype=np.float64)

@@ -1,0 +1,65 @@
+"""The signal of the method proximal for a frame that was just solved.
+
+A file of its own, and a second call after that of the frame: it is compiled when a map
+of proximal is loaded, and other methods do not wait for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ikns._kernels.body.frame_constants import unpack_constants
+from ikns._kernels.body.marker_problem import cut, unpack
+from ikns._kernels.body.proximal_signal import ProximalNumbers, proximal_signal
+from ikns._kernels.body.uncertainty import deviation, factor_information
+from ikns._kernels.compiled import compiled
+from ikns.arrays import Array, Indices
+
+
+@compiled
+def proximal_frame(
+    whole: Indices,
+    real: Array,
+    whole_constants: Indices,
+    real_constants: Array,
+    numbers: ProximalNumbers,
+    seen_before: Array,
+    q: Array,
+    work: Array,
+    place: Array,
+    c: Array,
+    deviations: Array,
+) -> bool:
+    """Write the signal c and its standard deviation, (1,) each.
+
+    After :func:`ikns._kernels.body.control_frame.control_frame`, or `recorded_signals`
+    of one frame, with the same arguments: `work` has the errors at the pose `q`. Both
+    are NaN without a marker; returned is whether the `place` (3,), m, is among the
+    points.
+    """
+    problem = unpack(whole, real)
+    s = cut(problem, work)
+    paths, _, control_map, _, segments = unpack_constants(
+        whole_constants, real_constants
+    )
+    c[0] = deviations[0] = np.nan
+    posed = hidden = False
+    for m in range(len(seen_before)):
+        if s.weight[m] > 0:
+            posed = True
+        elif segments.of_marker[m] >= 0 and problem.marker_weight[m] > 0:
+            hidden = True
+    if not posed:
+        return False
+    spread = np.empty((2, len(problem.depth)))
+    solvable = factor_information(problem, s, q, segments, seen_before, spread)
+    for a in range(6):
+        s.gradient[a] = 0.0
+    c[0], inside = proximal_signal(
+        numbers, paths, control_map.ends, q[7:], place, s.gradient[6:]
+    )
+    if solvable and np.isfinite(c[0]):
+        deviations[0] = deviation(
+            problem, s, s.gradient, segments, seen_before, spread, hidden
+        )
+    return inside
