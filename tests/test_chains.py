@@ -23,6 +23,7 @@ from ikns.body.chains import (
 )
 from ikns.body.skeleton import Skeleton, check_chain
 from ikns.calibration.subject import Subject
+from ikns.cli import main
 from ikns.errors import FileError, IknsError, InvalidInput
 from ikns.live.control import FrameSolver
 from ikns.motion.ends import with_ends
@@ -330,3 +331,14 @@ def _shipped() -> Path:
     from ikns.body.model_file import urdf_folder
 
     return urdf_folder() / "chains.toml"
+
+
+def test_a_chain_is_not_replaced_by_the_folder_that_it_helps_to_make(tmp_path, capsys):
+    small_person.subject().save(tmp_path / "a")
+    mine = tmp_path / "a" / "markers.toml"
+    mine.write_text(RAISED.toml())
+    argv = ["calibrate", "--static", "x.c3d", "--exploration", "x.c3d", "--force"]
+    for name in (str(mine), f"{mine}:raised"):
+        assert main([*argv, "--out", str(tmp_path / "a"), "--chain", name]) == 2
+        assert "markers.toml" in capsys.readouterr().err
+    assert ikns.load_chain(mine) == RAISED

@@ -9,6 +9,7 @@ import small_person
 import ikns
 from ikns.calibration.subject import Subject
 from ikns.cli import main
+from ikns.live.control import FrameSolver
 from ikns.recording.recording import Recording
 
 #: The left elbow swings along this direction, rad, several times a second, so that
@@ -63,6 +64,12 @@ def test_a_planted_swing_of_the_resting_elbow_is_found(tmp_path, capsys):
     c = person.readout().control_signal(person.skeleton, motion)
     off = c - (1 + sign[0] * phase) / 2
     assert np.abs(off).max() < missed + tolerance
+    # Live, frame by frame, it is the same.
+    solver = FrameSolver(person.skeleton, learned, person.chain)
+    markers = person.skeleton.marker_set.pick(recording.labels, recording.markers)
+    live = [solver.solve(frame, 0.02).c[0] for frame in markers[:60]]
+    # Poses agree to the tolerance of the marker fit, 1e-6 rad or so.
+    np.testing.assert_allclose(live, c[:60], atol=1e-4)
     # The same reaches with the left arm at rest: c stays where it is.
     still = ikns.MarkerIK(person.skeleton).track(planted(swing=False)[0], chain=RESTING)
     c = person.readout().control_signal(person.skeleton, still)

@@ -306,6 +306,13 @@ TOGETHER = [
     "check {free} --subject {person} --to -1",
     "calibrate --static {static} --exploration {points} --out new --from 1e6",
     "calibrate --out new --static {static} --exploration {points} --short",
+    "calibrate --out new --static {static} --exploration {points} --chain right_arm "
+    "--side right",
+    "calibrate --out new --static {static} --exploration {points} --chain left_arm "
+    "--clavicle",
+    "calibrate --out new --static {static} --exploration {points} --chain {binary}",
+    "compare {points} --subject {person} --chain {nowhere}.toml",
+    "compare {points} --subject {person} --chain left_arm",
     "calibrate --out new --static {static} --exploration {points} --subject {person}",
     "calibrate --out new --rewear",
     "calibrate --out new --rewear --subject {person} --static {static}",

@@ -31,24 +31,35 @@ def load_chain(name_or_path: str | Path) -> Chain:
     >>> load_chain("both_arms").ends
     ('right_knuckle', 'left_knuckle')
     """
-    path, ending, wanted = str(name_or_path).rpartition(".toml")
-    if not ending or (wanted and not wanted.startswith(":")):
+    file, wanted = chain_file(name_or_path)
+    if file is None:
         if name_or_path not in (known := shipped_chains()):
             raise InvalidInput(
                 f"there is no chain '{name_or_path}'; known are {', '.join(known)}, or "
                 "the path of a .toml file."
             )
         return known[str(name_or_path)]
-    file = path + ending
     chains = read_chains(file)
     if not wanted and len(chains) == 1:
         return next(iter(chains.values()))
-    if wanted[1:] not in chains:
+    if wanted not in chains:
         raise InvalidInput(
             f"{file}: expected {file}:NAME with one of its chains, "
             f"{', '.join(chains)}, found '{name_or_path}'."
         )
-    return chains[wanted[1:]]
+    return chains[wanted]
+
+
+def chain_file(name_or_path: str | Path) -> tuple[Path | None, str]:
+    """Split what :func:`load_chain` takes into a file, if it is one, and a name.
+
+    >>> chain_file("mine.toml:elbow")[1], chain_file("right_arm")
+    ('elbow', (None, 'right_arm'))
+    """
+    path, ending, name = str(name_or_path).rpartition(".toml")
+    if not ending or (name and not name.startswith(":")):
+        return None, str(name_or_path)
+    return Path(path + ending), name[1:]
 
 
 @cache

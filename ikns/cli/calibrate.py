@@ -198,12 +198,14 @@ def calibrate(
     a shorter protocol, and --rewear adapts a subject to reapplied markers. --from and
     --to take a part of every exploration.
     """
+    from ikns.body.chain_files import chain_file
     from ikns.calibration.subject_files import FILES
 
     given_names = check_options(context, live=live, rewear=rewear, short=short)
     own = _chain(chain, side, clavicle=clavicle, given=given_names)
     generic = _body_of(stature, mass, sex)
     inputs = [static, *(exploration or []), *(natural or []), marker_set, subject]
+    inputs.append(None if chain is None else chain_file(chain)[0])
     check_output_folder(out, FILES, force=force, inputs=[*inputs, recordings])
     if rewear:
         assert subject is not None and static is not None  # noqa: PT018
@@ -286,8 +288,7 @@ def _chain(
     if name is not None:
         if "side" in given or clavicle:
             raise InvalidInput("--chain says the joints; leave out --side, --clavicle.")
-        from ikns.body.chain_files import load_chain
-        from ikns.body.chains import shipped_chains
+        from ikns.body.chain_files import load_chain, shipped_chains
 
         return name if name in shipped_chains() else load_chain(name)
     if side != "both":

@@ -104,7 +104,10 @@ def compare(
     are the paper's; crosstalk is that of --method. --from and --to take a part of the
     recording, not of --reaches.
     """
-    refuse_picture(figure, force=force, inputs=[recording, reaches, subject])
+    from ikns.body.chain_files import chain_file
+
+    inputs = [recording, reaches, subject, chain_file(chain)[0]]
+    refuse_picture(figure, force=force, inputs=inputs)
     check_inputs([recording, reaches], subject)
 
     from ikns.calibration.simulated import is_simulated
