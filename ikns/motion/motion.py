@@ -101,9 +101,9 @@ class Motion:
     rejected: Indices = field(default_factory=lambda: np.full((1, len(SIDES)), -1))
     reasons: tuple[str, ...] = ()
     ends: tuple[tuple[str, str], ...] = ()
-    end_in_base: Array = field(default_factory=lambda: np.empty((0, 0, 3)))
-    end_rotation_in_base: Array = field(default_factory=lambda: np.empty((0, 0, 3, 3)))
-    end_velocity_in_base: Array = field(default_factory=lambda: np.empty((0, 0, 3)))
+    end_in_base: Array = field(default_factory=lambda: np.empty((1, 0, 3)))
+    end_rotation_in_base: Array = field(default_factory=lambda: np.empty((1, 0, 3, 3)))
+    end_velocity_in_base: Array = field(default_factory=lambda: np.empty((1, 0, 3)))
 
     def __post_init__(self) -> None:
         """Hide what was not seen, and freeze the arrays."""
@@ -113,6 +113,10 @@ class Motion:
         rejected = np.broadcast_to(self.rejected, (n, len(SIDES)))
         if (rejected >= 0).any():
             known = known & believed_joints(self.joint_names, rejected)
+        for name in ("end_in_base", "end_rotation_in_base", "end_velocity_in_base"):
+            of_ends = getattr(self, name)
+            of_ends = np.broadcast_to(of_ends, (n, *of_ends.shape[1:]))
+            object.__setattr__(self, name, of_ends)
         object.__setattr__(self, "seen", seen)
         object.__setattr__(self, "known", known)
         object.__setattr__(self, "rejected", rejected)
