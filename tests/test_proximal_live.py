@@ -41,16 +41,8 @@ def readout(chain: str, n_points: int = 8) -> Readout:
 
 def kernel(body: Skeleton, one: Readout, angles: np.ndarray) -> tuple[float, bool]:
     gradient = np.empty(len(angles))
-    sides = [("right", "left").index(side) for side in whole_arms(one.chain)]
     place = body.chain_ends(angles, one.chain)[0].mean(axis=0)
-    c, inside = proximal_signal(
-        proximal_numbers(body, one),
-        body.hand_paths,
-        np.array(sides, dtype=np.int64),
-        angles,
-        place,
-        gradient,
-    )
+    c, inside = proximal_signal(proximal_numbers(body, one), angles, place, gradient)
     return c, inside, gradient
 
 

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.body.frame_constants import unpack_constants
 from ikns._kernels.body.marker_problem import cut, unpack
 from ikns._kernels.body.proximal_signal import ProximalNumbers, proximal_signal
-from ikns._kernels.body.uncertainty import deviation, factor_information
+from ikns._kernels.body.uncertainty import Segments, deviation, factor_information
 from ikns._kernels.compiled import compiled
 from ikns.arrays import Array, Indices
 
@@ -20,8 +19,7 @@ from ikns.arrays import Array, Indices
 def proximal_frame(
     whole: Indices,
     real: Array,
-    whole_constants: Indices,
-    real_constants: Array,
+    segments: Segments,
     numbers: ProximalNumbers,
     seen_before: Array,
     q: Array,
@@ -33,15 +31,13 @@ def proximal_frame(
     """Write the signal c and its standard deviation, (1,) each.
 
     After :func:`ikns._kernels.body.control_frame.control_frame`, or `recorded_signals`
-    of one frame, with the same arguments: `work` has the errors at the pose `q`. Both
-    are NaN without a marker; returned is whether the `place` (3,), m, is among the
-    points.
+    of one frame, with the same arguments: `work` has the errors at the pose `q`. The
+    segments come by themselves, as what they are packed with takes longer to compile
+    than all else here. Both are NaN without a marker; returned is whether the `place`
+    (3,), m, is among the points.
     """
     problem = unpack(whole, real)
     s = cut(problem, work)
-    paths, _, control_map, _, segments = unpack_constants(
-        whole_constants, real_constants
-    )
     c[0] = deviations[0] = np.nan
     posed = hidden = False
     for m in range(len(seen_before)):
@@ -55,9 +51,7 @@ def proximal_frame(
     solvable = factor_information(problem, s, q, segments, seen_before, spread)
     for a in range(6):
         s.gradient[a] = 0.0
-    c[0], inside = proximal_signal(
-        numbers, paths, control_map.ends, q[7:], place, s.gradient[6:]
-    )
+    c[0], inside = proximal_signal(numbers, q[7:], place, s.gradient[6:])
     if solvable and np.isfinite(c[0]):
         deviations[0] = deviation(
             problem, s, s.gradient, segments, seen_before, spread, hidden

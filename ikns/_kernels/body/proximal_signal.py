@@ -29,6 +29,7 @@ class ProximalNumbers(NamedTuple):
     """Constants of :func:`proximal_signal` for S arms and P points."""
 
     arms: Paths  # from the thorax to each upper arm
+    hands: Paths  # from the thorax to each hand, whose mean is the place
     flexion: Indices  # (S,) elbow flexion among the angles
     reference: Array  # (S, 3, 3)
     points: Array  # (P, 3) m
@@ -41,22 +42,17 @@ class ProximalNumbers(NamedTuple):
 
 @compiled
 def proximal_signal(
-    numbers: ProximalNumbers,
-    paths: Paths,
-    ends: Indices,
-    angles: Array,
-    place: Array,
-    gradient: Array,
+    numbers: ProximalNumbers, angles: Array, place: Array, gradient: Array
 ) -> tuple[float, bool]:
     """Return c, not clipped, and whether the place is among the points.
 
     Parameters
     ----------
     numbers : ProximalNumbers
-    paths, ends : Paths, (E,) integer array
-        The chain's ends, whose mean is the `place` (3,), m in the thorax frame.
     angles : (J,) array
         rad.
+    place : (3,) array
+        Of the hand, or the middle of both, m in the thorax frame.
     gradient : (J,) array
         Written, per rad.
     """
@@ -92,15 +88,16 @@ def proximal_signal(
     for e in range(len(numbers.flexion)):
         gradient[numbers.flexion[e]] += by_y[4 * e + 3]
         _add_turns(numbers, e, turns, y[4 * e : 4 * e + 3], by_y[4 * e :], gradient)
+    paths = numbers.hands
     axes = np.empty((len(paths.joint), 6))
-    for e in ends:
+    for e in range(len(paths.ends)):
         follow_path(paths, e, angles, R, p, axes)
         for k in range(paths.ends[e - 1] if e > 0 else 0, paths.ends[e]):
             x, z, w = axes[k, 0], axes[k, 1], axes[k, 2]
             dx, dy, dz = p[0] - axes[k, 3], p[1] - axes[k, 4], p[2] - axes[k, 5]
             moved = by_x[0] * (z * dz - w * dy) + by_x[1] * (w * dx - x * dz)
             moved += by_x[2] * (x * dy - z * dx)
-            gradient[paths.joint[k, 1]] += moved / len(ends)
+            gradient[paths.joint[k, 1]] += moved / len(paths.ends)
     return c, inside
 
 

@@ -169,14 +169,15 @@ class FrameSolver:
         of_marker, of_joint = joint_segments(skeleton)
         control_map = _control_map(skeleton, null_space_map, chain)
         of_marker[control_map.link < 0] = -1
+        self._segments = Segments(
+            of_marker, of_joint, joint_speeds(skeleton), int(of_joint.max()) + 1
+        )
         constants = FrameConstants(
             paths,
             self._ik.gate,
             control_map,
             intent,
-            Segments(
-                of_marker, of_joint, joint_speeds(skeleton), int(of_joint.max()) + 1
-            ),
+            self._segments,
         )
         self._constants = pack_constants(constants)
         self._seen_before = new_marker_memory(len(of_marker))
@@ -335,7 +336,7 @@ class FrameSolver:
         return bool(
             kernel(
                 *self._ik.packed,
-                *self._constants,
+                self._segments,
                 numbers,
                 memory,
                 q,

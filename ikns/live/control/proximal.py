@@ -41,6 +41,7 @@ def proximal_numbers(skeleton: Skeleton, readout: Readout) -> ProximalNumbers:
     flexion = [skeleton.joint_names.index(f"{side}_elbow_flexion") for side in sides]
     return ProximalNumbers(
         arms=skeleton.paths(tuple(f"{side}_upper_arm" for side in sides)),
+        hands=skeleton.paths(tuple(f"{side}_knuckle" for side in sides)),
         flexion=np.array(flexion, dtype=np.int64),
         reference=np.array(reference, order="C"),
         points=np.array(learned.centers_, order="C"),
