@@ -312,7 +312,6 @@ TOGETHER = [
     "--clavicle",
     "calibrate --out new --static {static} --exploration {points} --chain {binary}",
     "compare {points} --subject {person} --chain {nowhere}.toml",
-    "compare {points} --subject {person} --chain left_arm",
     "calibrate --out new --static {static} --exploration {points} --subject {person}",
     "calibrate --out new --rewear",
     "calibrate --out new --rewear --subject {person} --static {static}",

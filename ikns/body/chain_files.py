@@ -91,8 +91,12 @@ def _read(path: Path) -> dict[str, Chain]:
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(f"{path}: cannot be read as chains: {reason}.") from None
+        reason = (getattr(error, "strerror", None) or str(error)).rstrip(".")
+        if isinstance(error, UnicodeDecodeError):
+            reason = f"expected text in UTF-8, found other bytes at {error.start}"
+        raise FileError(
+            f"{path}: cannot be read as chains: {reason[:1].lower()}{reason[1:]}."
+        ) from None
     listed = table.get("chains")
     if table.get("format") != FORMAT or not isinstance(listed, dict) or not listed:
         raise FileError(

@@ -104,8 +104,9 @@ def compare(
     are the paper's; crosstalk is that of --method. --from and --to take a part of the
     recording, not of --reaches.
     """
-    from ikns.body.chain_files import chain_file
+    from ikns.body.chain_files import chain_file, load_chain
 
+    named = None if chain in ("own", "both") else load_chain(chain)
     inputs = [recording, reaches, subject, chain_file(chain)[0]]
     refuse_picture(figure, force=force, inputs=inputs)
     check_inputs([recording, reaches], subject)
@@ -132,7 +133,8 @@ def compare(
         motion,
         source=str(recording),
         tasks=("pose", "position") if task == "both" else (first,),
-        chain=chain,
+        counterpart=chain == "both",
+        named=named,
         coordinates=coordinates,
         options=options | gate,
     )
@@ -247,21 +249,23 @@ def _combinations(
     *,
     source: str,
     tasks: tuple[Literal["pose", "position"], ...],
-    chain: str,
+    counterpart: bool,
+    named: ChainLike | None,
     coordinates: str,
     options: dict[str, Any],
 ) -> tuple[list[Named], list[str]]:
-    """Return the comparisons asked for, and warnings of chains that have none."""
+    """Return the comparisons asked for, and warnings of chains that have none.
+
+    Besides the map's chain they are of its counterpart with or without the clavicle, or
+    of another one that is named.
+    """
     from ikns.analysis.compare import COORDINATES, compare_combinations
-    from ikns.body.chain_files import load_chain
     from ikns.body.chains import as_chain, clavicle_counterpart
     from ikns.body.skeleton import check_chain
 
     own = subject.chain
-    other: ChainLike | None = None
-    if chain == "both":
-        other = clavicle_counterpart(own)
-    elif chain != "own" and (named := load_chain(chain)) != as_chain(own):
+    other: ChainLike | None = clavicle_counterpart(own) if counterpart else None
+    if named is not None and as_chain(named) != as_chain(own):
         other = check_chain(subject.skeleton, named)
     with naming(source):
         compared = compare_combinations(
