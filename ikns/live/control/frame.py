@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,25 +9,22 @@ from numpy.typing import ArrayLike
 
 from ikns._kernels.body.control_frame import control_frame, recorded_signals
 from ikns._kernels.body.frame_constants import (
-    ControlMap,
     FrameConstants,
     IntentNumbers,
     pack_constants,
 )
-from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.uncertainty import Segments, new_marker_memory
 from ikns._kernels.voronoi.diagram import INSIDE_HULL, OUTSIDE_HULL, new_work
 from ikns.arrays import Array, Mask
-from ikns.body.chains import SIDES, ChainLike, as_chain, chain_joints, chain_sides
+from ikns.body.chains import ChainLike, as_chain, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.live.control.intent import intent_numbers
+from ikns.live.control.paper import end_paths, numbers_of_map
 from ikns.motion.marker_ik.joint_speed import joint_speeds
 from ikns.motion.marker_ik.kernel import KernelSolver
-from ikns.motion.marker_ik.visibility import joint_segments, sight_needs
-from ikns.nullspace.interpolation import NaturalNeighborInterpolator
+from ikns.motion.marker_ik.visibility import joint_segments
 from ikns.nullspace.map import NullSpaceMap
-from ikns.nullspace.map.interpolator import NearestPoint
 from ikns.nullspace.readout import Readout
 
 #: Largest standard deviation of c with which the finger moves: c is then within 0.05
@@ -155,7 +151,7 @@ class FrameSolver:
         self.skeleton, self.null_space_map, self.chain = skeleton, null_space_map, chain
         self.max_uncertainty = max_uncertainty
         self._ik = KernelSolver(skeleton)
-        paths, _ = _paths(skeleton, chain)
+        paths, _ = end_paths(skeleton, chain)
         intent = IntentNumbers(skeleton.hand_paths, np.empty(0), np.empty((0, 0)))
         if readout is not None and readout.method == "intent":
             intent = intent_numbers(skeleton, readout)
@@ -167,7 +163,7 @@ class FrameSolver:
 
             self._proximal = proximal_frame, proximal_numbers(skeleton, readout)
         of_marker, of_joint = joint_segments(skeleton)
-        control_map = _control_map(skeleton, null_space_map, chain)
+        control_map = numbers_of_map(skeleton, null_space_map, chain)
         of_marker[control_map.link < 0] = -1
         self._segments = Segments(
             of_marker, of_joint, joint_speeds(skeleton), int(of_joint.max()) + 1
@@ -346,45 +342,3 @@ class FrameSolver:
                 uncertainty,
             )
         )
-
-
-def _paths(skeleton: Skeleton, chain: ChainLike) -> tuple[Paths, Sequence[int]]:
-    """Paths to a chain's ends or to both hands, and which of them are its ends."""
-    own = as_chain(chain)
-    if own.hands is not None:
-        return skeleton.hand_paths, own.hands
-    return skeleton.paths(own.ends, (), own.base), range(len(own.ends))
-
-
-def _control_map(
-    skeleton: Skeleton, learned: NullSpaceMap, chain: ChainLike
-) -> ControlMap:
-    labels = list(skeleton.marker_set.labels)
-    link = np.full(len(labels), -1, dtype=np.int64)
-    need: list[int] = []
-    for columns, least in sight_needs(skeleton, chain).values():
-        link[columns] = len(need)
-        need.append(least)
-    interpolator = learned.interpolator_
-    numbers, indices = np.empty(0), np.empty(0, dtype=np.int64)
-    if isinstance(interpolator, NaturalNeighborInterpolator):
-        numbers, indices = interpolator.packed
-    elif not isinstance(interpolator, NearestPoint):
-        raise InvalidInput(
-            "expected a map between natural neighbors or nearest points, found "
-            f"{type(interpolator).__name__}, which the live kernel does not support."
-        )
-    sides = [SIDES.index(side) for side in chain_sides(chain)]
-    return ControlMap(
-        points=np.array(learned.centers_, order="C"),
-        numbers=numbers,
-        indices=indices,
-        directions=np.array(learned.directions_, order="C"),
-        lower=np.array(learned.lower_, order="C"),
-        upper=np.array(learned.upper_, order="C"),
-        columns=skeleton.columns(chain_joints(chain)) - 6,
-        sides=np.array(sides, dtype=np.int64),
-        ends=np.array(_paths(skeleton, chain)[1], dtype=np.int64),
-        link=link,
-        need=np.array(need, dtype=np.int64),
-    )
