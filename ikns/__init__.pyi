@@ -6,13 +6,13 @@ from .recording.files import write_c3d as write_c3d
 from .recording.recording import Recording as Recording
 
 # Skeleton
-from .body.chain import Chain as Chain
-from .body.chain_files import extrinsic_chain as extrinsic_chain
-from .body.chain_files import load_chain as load_chain
 from .body.skeleton import Skeleton as Skeleton
 from .body.marker_set import MarkerSet as MarkerSet
 from .calibration.scaling import scale as scale
 from .symbolic import fit_lengths as fit_lengths
+from .body.chain import Chain as Chain
+from .body.chain_files import load_chain as load_chain
+from .body.chain_files import extrinsic_chain as extrinsic_chain
 from .body.skeleton import Robot as Robot
 
 # Motion
