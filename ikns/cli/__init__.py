@@ -18,7 +18,7 @@ __all__ = ["main"]
 
 #: New objects between two collections of garbage; Python's 700 are for programs that do
 #: not import a million objects which then stay.
-_COLLECT_EVERY = 100_000
+_COLLECT_EVERY = 300_000
 
 
 def main(argv: Sequence[str] | None = None) -> int:

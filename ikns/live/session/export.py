@@ -7,7 +7,6 @@ import io
 from pathlib import Path
 
 import numpy as np
-from scipy.io import savemat
 
 from ikns.errors import InvalidInput
 from ikns.live.session.reader import Run
@@ -60,6 +59,8 @@ def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
         "receive_time": run.receive_time,
     }
     if kind == "mat":
+        from scipy.io import savemat  # slow to load
+
         table = io.BytesIO()
         savemat(
             table,

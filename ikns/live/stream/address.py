@@ -13,7 +13,6 @@ from ikns.calibration.subject import Subject
 from ikns.errors import IknsError, InvalidInput, MarkerMismatch
 from ikns.finger.ros2.address import OPTIONS as ROS_OPTIONS
 from ikns.finger.ros2.address import ros_address
-from ikns.live.stream import natnet, qualisys, vicon
 from ikns.live.stream.frame import Feed
 from ikns.live.stream.lsl_feed import LslFeed
 from ikns.live.stream.lsl_search import Wanted
@@ -199,15 +198,21 @@ def _lsl(stream: str, options: Options) -> Feed:
 
 
 def _qualisys(host: str, options: Options) -> Feed:
-    return qualisys.QualisysFeed(*_host(host, qualisys.PORT), timeout=_timeout(options))
+    from ikns.live.stream.qualisys import PORT, QualisysFeed
+
+    return QualisysFeed(*_host(host, PORT), timeout=_timeout(options))
 
 
 def _vicon(host: str, options: Options) -> Feed:
-    return vicon.ViconFeed(*_host(host, vicon.PORT), timeout=_timeout(options))
+    from ikns.live.stream.vicon import PORT, ViconFeed
+
+    return ViconFeed(*_host(host, PORT), timeout=_timeout(options))
 
 
 def _natnet(host: str, options: Options) -> Feed:
-    return natnet.NatNetFeed(*_host(host, natnet.PORT), timeout=_timeout(options))
+    from ikns.live.stream.natnet import PORT, NatNetFeed
+
+    return NatNetFeed(*_host(host, PORT), timeout=_timeout(options))
 
 
 def _ros(topic: str, options: Options) -> Feed:
