@@ -21,7 +21,7 @@ the spreads say so.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -151,9 +151,18 @@ class _Problem:
         tilts = [KNOWN_SD if known else sd for _, _, sd in TILTS]
         rest = np.r_[self.placement.ravel(), tilts]
         self.prior[range(s, len(rest) + s), range(s, len(rest) + s)] = rest**-2.0
+        self._last: tuple[_Shape | None, Any] = None, None
+        self._last_errors: tuple[_Shape | None, Any, Any] = None, None, None
 
     def body(self, shape: _Shape) -> tuple[Skeleton, Skeleton]:
         """Return the body with markers at nominal places and at their own."""
+        known, bodies = self._last
+        if known is not shape:  # errors and slopes ask for the same one
+            bodies = self._bodies(shape)
+            self._last = shape, bodies
+        return bodies
+
+    def _bodies(self, shape: _Shape) -> tuple[Skeleton, Skeleton]:
         tilts: dict[str, Array] = {}
         for (joint, component, _), angle in zip(TILTS, shape.tilts, strict=True):
             tilts.setdefault(joint, np.zeros(3))[component] = angle
@@ -163,9 +172,13 @@ class _Problem:
 
     def errors(self, shape: _Shape, q: Array) -> Array:
         """Markers of the body minus those seen, (1 + F, M, 3) m; 0 where not seen."""
-        _, placed = self.body(shape)
-        model = np.stack([placed.markers_in_world(row) for row in q])
-        return np.where(self.shown[..., None], model - self.seen, 0.0)
+        last_shape, last_q, errors = self._last_errors
+        if last_shape is not shape or last_q is not q:  # the spread asks for them too
+            _, placed = self.body(shape)
+            model = np.stack([placed.markers_in_world(row) for row in q])
+            errors = np.where(self.shown[..., None], model - self.seen, 0.0)
+            self._last_errors = shape, q, errors
+        return errors
 
     def weights(self, sd: float) -> Array:
         """Inverse variances, (1 + F, M) 1/m^2."""

@@ -16,11 +16,13 @@ a part that all segments share (stature), one per kind of segment, and one per s
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ikns.arrays import Array, Indices, Mask
+from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.static_trial import seen_markers
@@ -73,9 +75,16 @@ def fit_sizes(generic: Skeleton, target: Array, *, known: bool = False) -> SizeF
     positions in the world (M, 3), m; NaN where never seen. `known` says that the body
     is the person's, so that sizes stay.
     """
+    places = np.asarray(target, dtype=np.float64).tobytes()
+    return _fit_sizes(generic.urdf, generic.marker_set, places, known)
+
+
+@lru_cache(maxsize=1)
+def _fit_sizes(urdf: str, worn: MarkerSet, places: bytes, known: bool) -> SizeFit:
+    """Do so once: scaling and the fit to explorations start from the same one."""
     from scipy.linalg import cho_factor, cho_solve  # takes a while to load
 
-    worn = generic.marker_set
+    generic, target = Skeleton(urdf, worn), np.frombuffer(places).reshape(-1, 3)
     seen = seen_markers(target)
     weight = np.linalg.cholesky(np.linalg.inv(size_covariance(known=known))).T
     placement = np.array([m.placement_sd for m in worn.markers])
@@ -135,7 +144,10 @@ def fit_sizes(generic: Skeleton, target: Array, *, known: bool = False) -> SizeF
     by_size, by_place = sized.size_jacobian(q)
     J = _assemble(by_size, by_place, by_pose, seen, weight, placement, free)
     covariance = cho_solve(cho_factor(J.T @ J), np.eye(J.shape[1], n_sizes))[:n_sizes]
-    return SizeFit(sizes, sized.marker_positions + offsets, q, covariance, converged)
+    found = sizes, sized.marker_positions + offsets, q, covariance
+    for array in found:
+        array.flags.writeable = False
+    return SizeFit(*found, converged)
 
 
 def _assemble(

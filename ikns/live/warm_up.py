@@ -11,12 +11,9 @@ import numpy as np
 
 from ikns._kernels.compiled import can_keep, on_disk
 from ikns.body.skeleton import Skeleton
-from ikns.live.control import FrameSolver
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
-from ikns.nullspace.natural_posture import NaturalPosture
-from ikns.nullspace.readout import IntentMap, Readout
 from ikns.numerics.subspace import principal_angles
 
 _CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)
@@ -107,6 +104,11 @@ def _map() -> NullSpaceMap:
 
 
 def _frame() -> None:
+    # Commands that only ask whether all is compiled do not load live control.
+    from ikns.live.control import FrameSolver
+    from ikns.nullspace.natural_posture import NaturalPosture
+    from ikns.nullspace.readout import IntentMap, Readout
+
     body = Skeleton.load()
     markers = body.markers_in_world(body.neutral())
     people = NaturalPosture.of_people()

@@ -123,7 +123,7 @@ def occlusions(
         )
     hidden = np.zeros((n, len(links)), dtype=bool)
     shortest, mean, longest = (max(1, round(s * rate)) for s in _BURST_S)
-    while hidden.mean() < share:
+    while np.count_nonzero(hidden) / hidden.size < share:
         burst = shortest + rng.geometric(1 / (mean - shortest + 1)) - 1
         start = rng.integers(-shortest, n)
         rows = slice(max(0, start), start + min(burst, longest))

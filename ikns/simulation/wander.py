@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,10 +29,7 @@ def wander(
     Its velocity has a standard deviation of ``2 pi cutoff sd``: the second moment of
     the Butterworth spectrum of order two is the square of its cut-off.
     """
-    from scipy.signal import butter  # slow to load
-
-    sos = butter(2, cutoff, fs=rate, output="sos")
-    return _filtered(rng, n, width, sd, sos, settle=int(3 * rate / cutoff))
+    return _filtered(rng, n, width, sd, cutoff, rate, settle=int(3 * rate / cutoff))
 
 
 def tremor(
@@ -48,10 +47,7 @@ def tremor(
             f"expected a rate above {2 * _TREMOR_BAND[1]:g} Hz, which tremor of up to "
             f"{_TREMOR_BAND[1]:g} Hz needs, found {rate:g}."
         )
-    from scipy.signal import butter
-
-    sos = butter(2, _TREMOR_BAND, btype="bandpass", fs=rate, output="sos")
-    return _filtered(rng, n, width, sd, sos, settle=int(rate))
+    return _filtered(rng, n, width, sd, _TREMOR_BAND, rate, settle=int(rate))
 
 
 def minimum_jerk(n: int) -> Array:
@@ -63,13 +59,33 @@ def minimum_jerk(n: int) -> Array:
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
+Edges = float | tuple[float, float]
+
+
+@cache
+def _filter(edges: Edges, rate: float, settle: int) -> tuple[Array, float]:
+    """Filter with these edges, Hz, and its gain of white noise."""
+    from scipy.signal import butter, sosfilt  # slow to load
+
+    kind = "bandpass" if isinstance(edges, tuple) else "lowpass"
+    sos = butter(2, edges, btype=kind, fs=rate, output="sos")
+    impulse = np.zeros(20 * settle)
+    impulse[0] = 1.0
+    return sos, np.sqrt(np.sum(sosfilt(sos, impulse) ** 2))
+
+
 def _filtered(
-    rng: np.random.Generator, n: int, width: int, sd: float, sos: Array, settle: int
+    rng: np.random.Generator,
+    n: int,
+    width: int,
+    sd: float,
+    edges: Edges,
+    rate: float,
+    *,
+    settle: int,
 ) -> Array:
     from scipy.signal import sosfilt
 
-    impulse = np.zeros(20 * settle)
-    impulse[0] = 1.0
-    gain = np.sqrt(np.sum(sosfilt(sos, impulse) ** 2))
+    sos, gain = _filter(edges, rate, settle)
     noise = rng.normal(size=(settle + n, width))
     return np.asarray(sosfilt(sos, noise, axis=0)[settle:]) * (sd / gain)

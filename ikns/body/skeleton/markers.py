@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 
-from ikns.arrays import Array
+from ikns.arrays import Array, Mask
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS, segment_ends
 from ikns.errors import MarkerMismatch
@@ -34,19 +35,26 @@ class Markers:
                 for f, m in zip(frames, marker_set.markers, strict=True)
             ]
         ).reshape(-1, 3)
-        # Which markers each joint moves.
-        self._beyond = [
-            np.isin(self.joint, list(subtree)) for subtree in model.subtrees
-        ]
         self._carried = []
         for joint in np.unique(self.joint):
             rows = np.flatnonzero(self.joint == joint)
             self._carried.append((int(joint), rows, self.in_joint[rows]))
-        self._moves = np.zeros((len(frames), model.nv))
-        for row, joint in zip(self._moves, self.joint, strict=True):
+
+    @cached_property
+    def _beyond(self) -> list[Mask]:
+        """Which markers (M,) each joint moves."""
+        return [np.isin(self.joint, list(subtree)) for subtree in self._model.subtrees]
+
+    @cached_property
+    def _moves(self) -> Array:
+        """1 where a rate moves a marker, else 0, (M, nv)."""
+        model = self._model
+        moves = np.zeros((len(self.joint), model.nv))
+        for row, joint in zip(moves, self.joint, strict=True):
             for ancestor in model.supports[int(joint)][1:]:
                 start = model.idx_vs[ancestor]
                 row[start : start + model.nvs[ancestor]] = 1.0
+        return moves
 
     def place(self, q: Array) -> Array:
         """Positions in the world, (M, 3) m."""

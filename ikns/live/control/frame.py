@@ -23,7 +23,7 @@ from ikns.live.control.intent import intent_numbers
 from ikns.live.control.paper import end_paths, numbers_of_map
 from ikns.motion.marker_ik.joint_speed import joint_speeds
 from ikns.motion.marker_ik.kernel import KernelSolver
-from ikns.motion.marker_ik.visibility import joint_segments
+from ikns.motion.marker_ik.visibility import joint_segments, sight_needs
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.readout import Readout
 
@@ -163,7 +163,10 @@ class FrameSolver:
 
             self._proximal = proximal_frame, proximal_numbers(skeleton, readout)
         of_marker, of_joint = joint_segments(skeleton)
-        control_map = numbers_of_map(skeleton, null_space_map, chain)
+        self.sight_needs = sight_needs(skeleton, chain)
+        control_map = numbers_of_map(
+            skeleton, null_space_map, chain, self.sight_needs.values()
+        )
         of_marker[control_map.link < 0] = -1
         self._segments = Segments(
             of_marker, of_joint, joint_speeds(skeleton), int(of_joint.max()) + 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from ikns._kernels.body.paths import Paths
 from ikns.body.chains import SIDES, ChainLike, as_chain, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-from ikns.motion.marker_ik.visibility import sight_needs
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.map.interpolator import NearestPoint
@@ -26,13 +25,19 @@ def end_paths(skeleton: Skeleton, chain: ChainLike) -> tuple[Paths, Sequence[int
 
 
 def numbers_of_map(
-    skeleton: Skeleton, learned: NullSpaceMap, chain: ChainLike
+    skeleton: Skeleton,
+    learned: NullSpaceMap,
+    chain: ChainLike,
+    needs: Iterable[tuple[list[int], int]],
 ) -> ControlMap:
-    """Return what the kernels take of a map; one between other points is refused."""
+    """Return what the kernels take of a map; one between other points is refused.
+
+    `needs` are the values of :func:`ikns.motion.marker_ik.visibility.sight_needs`.
+    """
     labels = list(skeleton.marker_set.labels)
     link = np.full(len(labels), -1, dtype=np.int64)
     need: list[int] = []
-    for columns, least in sight_needs(skeleton, chain).values():
+    for columns, least in needs:
         link[columns] = len(need)
         need.append(least)
     interpolator = learned.interpolator_

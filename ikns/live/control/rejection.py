@@ -16,7 +16,6 @@ from ikns.motion.marker_ik.rejection import (
     misfit_reason,
     say_exchanged,
 )
-from ikns.motion.marker_ik.visibility import sight_needs
 from ikns.nullspace.signal_names import signal_names
 
 NONE_EXCHANGED: NDArray[np.int64] = np.empty(0, dtype=np.int64)
@@ -111,6 +110,9 @@ def uncertain_reason(
 
 def _hidden(solver: FrameSolver, markers: NDArray[np.float64]) -> str:
     seen = np.all(np.isfinite(markers), axis=1)
-    needs = sight_needs(solver.skeleton, solver.chain)
-    hidden = [link for link, (own, need) in needs.items() if seen[own].sum() < need]
+    hidden = [
+        link
+        for link, (own, need) in solver.sight_needs.items()
+        if seen[own].sum() < need
+    ]
     return ", ".join(hidden).replace("_", " ")

@@ -7,6 +7,7 @@ change back. Where it does neither, two wrongs make a right.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import NamedTuple
 
@@ -51,6 +52,7 @@ class LabelWatch:
 
     def __init__(self, n_labels: int) -> None:
         n = n_labels
+        self._labels = np.arange(n)
         self._last, self._age = np.full((n, 3), np.nan), np.full(n, np.inf)
         #: Labels that ever changed places with each other have the same number.
         self._group = np.arange(n)
@@ -76,18 +78,18 @@ class LabelWatch:
         """
         self._frame += 1
         back = self._age + dt > _LONGEST
-        came = np.arange(len(self._group))
+        came = self._labels.copy()
         late, mended = 0, self.wrong
         if follow_labels(markers, dt, _LONGEST, self._last, self._age, came):
-            own = self._merge(came != np.arange(len(came)))
+            own = self._merge(came != self._labels)
             late = self._decide(own, came, error, _TOLD)
-        else:
+        elif back.any():
             back &= np.isfinite(markers).all(axis=1)
             for number in np.unique(self._group[back]).tolist():
                 own = self._group == number
                 if own.sum() > 1:
                     late = self._decide(own, came, error, _TOLD_AFTER_GAP)
-        if np.isfinite(error):
+        if math.isfinite(error):
             self._recent.append(error)
         if late:
             mended = mended ^ own
@@ -96,7 +98,7 @@ class LabelWatch:
     @property
     def wrong(self) -> Mask:
         """Which labels stand wrong, (K,)."""
-        return np.asarray(self._carried != np.arange(len(self._carried)))
+        return np.asarray(self._carried != self._labels)
 
     def _merge(self, changed: Mask) -> Mask:
         """Make one group of labels that changed places; return its labels."""

@@ -152,7 +152,7 @@ def pick(
             f"expected drift for the {frames} frames of a limit above 0 s, found "
             f"{len(drift)}."
         )
-    goal = way(1.0)[0]
+    goal, resting = way(1.0)[0], grasp.solid.extent[2] / 2
     seen = grasp.seen()
     phases, trace, in_hand = [], np.empty((frames, 6)), np.empty((frames, 3))
     judge = _Judge(grasp, goal)
@@ -163,11 +163,12 @@ def pick(
         person.step(grasp.time, seen)
         command = drive(person.command, person.place, seen)
         shift, yaw = way(person.place)
-        turn = drift[k, 3:] + [0.0, 0.0, yaw]
+        turn = drift[k, 3:].copy()
+        turn[2] += yaw
         seen = grasp.frame(command, shift + drift[k, :3], turn)
         phases.append(person.phase)
         c = getattr(drive, "c", command)
-        height = seen.place[2] - grasp.solid.extent[2] / 2  # risen by
+        height = seen.place[2] - resting  # risen by
         trace[k] = c, command, seen.flexion, seen.finger, height, person.place
         in_hand[k] = seen.in_hand
         ended = judge.step(person.phase, seen, float(shift[2]))
