@@ -10,6 +10,7 @@ import small_person
 from ikns.body.chains import chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate, elbow_reference
+from ikns.calibration.steps import calibration_steps
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
 from ikns.nullspace.map import still_mask
 from ikns.recording.files import read
@@ -229,7 +230,19 @@ def test_progress_ends_at_the_number_of_frames() -> None:
             max_hand_speed=1e-6,
             progress=lambda *call: calls.append(call),
         )
-    assert calls[-1][1:] == (20, 20)
+    name = Path(exploration.source).name
+    assert [call for call in calls if call[0] == name][-1][1:] == (20, 20)
+
+
+def test_steps_are_reported_in_the_order_in_which_they_are_estimated() -> None:
+    run = small_person.protocol()
+    recordings = run.static.recording, [run.points.recording]
+    told: list[str] = []
+    calibrate(*recordings, progress=lambda step, *_: told.append(step))
+    begun = [
+        step for step, before in zip(told, ["", *told], strict=False) if step != before
+    ]
+    assert begun == [step for step, _ in calibration_steps(*recordings)]
 
 
 def test_natural_reaching_of_a_real_person_runs_through_and_is_reported(

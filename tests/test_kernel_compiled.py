@@ -1,6 +1,7 @@
 """Machine code is kept for exactly the sources that it was made from."""
 
 import ast
+import functools
 import importlib
 import shutil
 import subprocess
@@ -80,36 +81,97 @@ def test_numba_is_asked_to_keep_code_where_the_user_wants_it(copy, monkeypatch):
 
 def calls(node: ast.AST) -> set[str]:
     return {
-        call.func.id
-        for call in ast.walk(node)
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
+        ast.unparse(call.func) for call in ast.walk(node) if isinstance(call, ast.Call)
     }
+
+
+@functools.cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@functools.cache
+def kernels_of(path: Path) -> tuple[set[str], set[str], list[ast.FunctionDef]]:
+    """Names of kernels without a wrapper for Python, and of all; other functions."""
+    bare, kernels, plain = set(), set(), []
+    for node in tree_of(path).body:
+        if isinstance(node, ast.FunctionDef):
+            marks = {d.id for d in node.decorator_list if isinstance(d, ast.Name)}
+            if not marks & {"compiled", "inner"}:
+                plain.append(node)
+                continue
+            kernels.add(node.name)
+            if "inner" in marks or node.name.startswith("_"):
+                bare.add(node.name)
+    return bare, kernels, plain
+
+
+@functools.cache
+def imported(path: Path) -> dict[str, tuple[Path, str]]:
+    """Names taken from kernel files: the file, and the name there."""
+    found, modules = {}, {}
+    if "ikns._kernels" not in path.read_text(encoding="utf-8"):
+        return found
+    tree = tree_of(path)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module is not None:
+            if node.module.startswith("ikns._kernels"):
+                place = KERNELS.joinpath(*node.module.split(".")[2:])
+                for alias in node.names:
+                    name = alias.asname or alias.name
+                    modules[name] = (place / alias.name).with_suffix(".py")
+                    found[name] = place.with_suffix(".py"), alias.name
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            file = modules.get(node.value.id)
+            if file is not None and file.is_file():
+                found[ast.unparse(node)] = file, node.attr
+    return found
 
 
 @pytest.mark.parametrize("path", sorted(KERNELS.rglob("*.py")), ids=lambda p: p.stem)
 def test_python_never_calls_a_kernel_without_a_wrapper(path):
     # It would end the process without a word.
-    private, plain = set(), []
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.FunctionDef):
-            marks = {d.id for d in node.decorator_list if isinstance(d, ast.Name)}
-            if "compiled" not in marks:
-                plain.append(node)
-            elif node.name.startswith("_"):
-                private.add(node.name)
-    assert not any(calls(node) & private for node in plain)
+    bare, _, plain = kernels_of(path)
+    taken = {
+        name
+        for name, (file, there) in imported(path).items()
+        if file.is_file() and there in kernels_of(file)[0]
+    }
+    bare = bare | taken
+    assert not any(calls(node) & bare for node in plain)
 
 
 def test_no_other_module_imports_a_kernel_without_a_wrapper():
     root = KERNELS.parents[1]
+    bare = {path: kernels_of(path)[0] for path in KERNELS.rglob("*.py")}
     for path in (
         p for d in ("ikns", "tests", "benchmarks") for p in root.glob(f"{d}/**/*.py")
     ):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.module is not None:
-                names = {alias.name for alias in node.names}
-                if node.module.startswith("ikns._kernels"):
-                    assert not any(name.startswith("_") for name in names), path
+        if KERNELS in path.parents:
+            continue
+        for file, name in imported(path).values():
+            assert name not in bare.get(file, ()), path
+
+
+def test_kernels_that_only_kernels_call_have_no_wrapper():
+    # A wrapper that unpacks a tuple of forty arrays takes longer than the kernel.
+    root = KERNELS.parents[1]
+    used = set()
+    for path in (
+        p for d in ("ikns", "tests", "benchmarks") for p in root.glob(f"{d}/**/*.py")
+    ):
+        names = dict(imported(path))
+        if KERNELS in path.parents:
+            _, own, plain = kernels_of(path)
+            names |= {name: (path, name) for name in own}
+            called = set().union(*(calls(node) for node in plain))
+            used |= {names[name] for name in called & set(names)}
+        else:
+            used |= set(names.values())
+    for path in KERNELS.rglob("*.py"):
+        bare, kernels, _ = kernels_of(path)
+        assert {name for file, name in used if file == path} >= kernels - bare, path
 
 
 def test_a_constant_is_no_reason_to_compile_again():

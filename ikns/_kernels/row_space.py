@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 #: Rounding of a double.
@@ -107,7 +107,7 @@ def _reflected_axis(
             row[j] -= dot * work[s, j]
 
 
-@compiled
+@inner
 def orthogonalize(rows: Array, rtol: float, squares: Array) -> int:
     """Rotate the rows (k, n) of a matrix until orthogonal; return its rank.
 

@@ -16,6 +16,7 @@ from ikns.calibration.exploration_fit import BodyReport, fit_explorations
 from ikns.calibration.judged_motion import require_usable
 from ikns.calibration.scaled_body import scaled_body
 from ikns.calibration.scaling import ScalingReport, scale
+from ikns.calibration.steps import FITTING, JUDGING, SCALING, silent
 from ikns.errors import InvalidInput, naming
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
@@ -48,7 +49,10 @@ def measured_body(
     """Scale the body, judge and track the recordings; see :func:`ikns.calibrate`.
 
     `known` says that the generic body is the person's, whose markers alone are fitted.
+    The steps that are reported are those of :mod:`ikns.calibration.steps`.
     """
+    say = progress or silent
+    say(SCALING, 0, 1)
     body = Skeleton.load() if generic is None else generic
     if static is None:
         if generic is None:
@@ -68,20 +72,20 @@ def measured_body(
             )
         missing = _left_out(static, scaling, marker_set, explorations, chain)
     recordings = (*explorations, *natural)
-    warned = [
-        sentence
-        for recording in recordings
-        for sentence in require_usable(
+    warned: list[str] = []
+    for k, recording in enumerate(recordings):
+        say(JUDGING, k, len(recordings))
+        warned += require_usable(
             skeleton,
             recording,
             chain=chain,
             static=static,
             measured=static is not None,
         )
-    ]
     tracked = _tracked(skeleton, recordings, chain, progress)
     fitted = None
     if static is not None:
+        say(FITTING, 0, 1)
         skeleton, fitted = fit_explorations(
             body,
             skeleton,

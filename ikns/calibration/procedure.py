@@ -25,6 +25,7 @@ from ikns.calibration.report import (
     points_report,
     static_report,
 )
+from ikns.calibration.steps import LEARNING, METHODS, silent
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion.excursion import other_hand_moves
@@ -102,7 +103,8 @@ def calibrate(
     other_methods : bool
         Whether to learn the readouts of the methods proximal and intent, too.
     progress : callable, optional
-        Called with (step, done, total).
+        Called with (step, done, total); the steps are those of
+        :func:`ikns.calibration.steps.calibration_steps`.
 
     Returns
     -------
@@ -147,6 +149,8 @@ def calibrate(
         min_static=min_static,
         progress=progress,
     )
+    say = progress or silent
+    say(LEARNING, 0, 1)
     skeleton, motions = measured.skeleton, measured.explorations
     gates = [
         still_mask(motion, chain, max_hand_speed=max_hand_speed, min_duration=min_rest)
@@ -174,6 +178,7 @@ def calibrate(
     readouts: dict[str, Readout] = {}
     methods: dict[str, Any] = {"without": {}, "warnings": []}
     if other_methods:
+        say(METHODS, 0, 1)
         with naming(", ".join(recording.source for recording in natural) or names):
             readouts, methods = learn_readouts(
                 skeleton,
@@ -209,6 +214,7 @@ def calibrate(
         summary = method_summary(subject, natural=measured.natural, own=True)
         methods["summary"] = summary
         methods["warnings"] += filter(None, [no_range_learned(summary)])
+        say(METHODS, 1, 1)
     return subject
 
 

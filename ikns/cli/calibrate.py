@@ -28,6 +28,7 @@ from ikns.cli.options import (
 )
 from ikns.cli.output import notes, progress, show
 from ikns.cli.reading import Read, check_inputs, reads_markers
+from ikns.cli.steps_left import one_bar
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
@@ -256,19 +257,24 @@ def calibrate(
         natural = [*(natural or []), *movement]
     assert exploration is not None
     check_inputs([static, *exploration, *(natural or [])])
+    from ikns.calibration.steps import calibration_steps
     from ikns.motion.unseen import warn_unseen
 
     explorations = [read(path, start=from_, end=to) for path in exploration]
-    with progress() as report:
+    estimates: dict[str, Any] = {}
+    with progress(estimates=estimates) as report:
+        still = None if static is None else read(static)
+        moving = [read(path) for path in natural or []]
+        steps = calibration_steps(still, explorations, moving)
         person = ikns.calibrate(
-            None if static is None else read(static),
+            still,
             explorations,
-            natural=[read(path) for path in natural or []],
+            natural=moving,
             # Also when points were skipped live: clusters that stay empty are left out.
             n_points=points,
             radius=radius,
             outside=outside,
-            progress=report,
+            progress=one_bar("calibrating", steps, report, estimates),
             **common,
         )
     for frames in explorations:
@@ -347,18 +353,22 @@ def _rewear(
 ) -> None:
     """Fit a subject to new places of its markers, and write another folder."""
     from ikns.calibration.rewear import rewear
+    from ikns.calibration.steps import body_steps
     from ikns.calibration.subject import FILES
 
     check_output_folder(out, FILES, force=force, inputs=[folder])
     known = ikns.Subject.load(folder)
-    with progress() as report:
+    estimates: dict[str, Any] = {}
+    with progress(estimates=estimates) as report:
+        still, moving = read(static), [read(path) for path in natural]
+        steps = body_steps(still, moving)
         person = rewear(
             known,
-            read(static),
-            [read(path) for path in natural],
+            still,
+            moving,
             marker_set=marker_set,
             min_static=min_static,
-            progress=report,
+            progress=one_bar("calibrating", steps, report, estimates),
         )
     person.save(out, force=force)
     show(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -32,6 +33,7 @@ from ikns.cli.options import (
 from ikns.cli.output import notes, progress, show, table
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.reading import Read, check_inputs, reads_markers
+from ikns.cli.steps_left import one_bar
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
@@ -46,6 +48,8 @@ _PAPER_ONLY = (
     "chain, compared with the Jacobian over the same; {method} uses no "
     "such direction, so only crosstalk is that of its c."
 )
+#: Steps after the tracking; their costs are CPU s of the 40 points of four comparisons.
+_POINTS, _COMBINED, _CROSSTALK = "points", "comparisons", "crosstalk"
 Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
 
@@ -112,6 +116,7 @@ def compare(
     check_inputs([recording, reaches], subject)
 
     from ikns.calibration.simulated import is_simulated
+    from ikns.calibration.steps import tracking_steps
 
     calibrated = ikns.Subject.load(subject)
     own = calibrated.chain
@@ -120,29 +125,36 @@ def compare(
     given = [(recording, read(recording, start=from_, end=to))]
     if reaches is not None:
         given.append((reaches, read(reaches)))
-    tracked, judged = _tracked(calibrated, given)
-    motion, reaching = tracked[0], tracked[-1]
     gate = calibrated.gate
     first: Literal["pose", "position"] = "position" if task == "position" else "pose"
-    rows, warned = comparison_rows(
-        calibrated, motion, source=str(recording), task=first
-    )
     options: dict[str, Any] = {"resamples": intervals, "seed": seed}
-    found, left_out = _combinations(
-        calibrated,
-        motion,
-        source=str(recording),
-        tasks=("pose", "position") if task == "both" else (first,),
-        counterpart=chain == "both",
-        named=named,
-        coordinates=coordinates,
-        options=options | gate,
-    )
-    warned += left_out + judged
-    with naming(str(reaches or recording)):
-        across = _crosstalk(
-            calibrated, readout, reaching, None if reaches else warned, **options
+    estimates: dict[str, Any] = {}
+    with progress(estimates=estimates) as report:
+        steps = tracking_steps([frames for _, frames in given], judged=True)
+        steps += [(_POINTS, 0.3), (_COMBINED, 1.2), (_CROSSTALK, 0.1)]
+        told = one_bar("comparing", steps, report, estimates)
+        tracked, judged = _tracked(calibrated, given, told)
+        motion, reaching = tracked[0], tracked[-1]
+        told(_POINTS, 0, 1)
+        rows, warned = comparison_rows(
+            calibrated, motion, source=str(recording), task=first
         )
+        found, left_out = _combinations(
+            calibrated,
+            motion,
+            source=str(recording),
+            tasks=("pose", "position") if task == "both" else (first,),
+            counterpart=chain == "both",
+            named=named,
+            coordinates=coordinates,
+            options=options | gate | {"progress": partial(told, _COMBINED)},
+        )
+        warned += left_out + judged
+        told(_CROSSTALK, 0, 1)
+        with naming(str(reaches or recording)):
+            across = _crosstalk(
+                calibrated, readout, reaching, None if reaches else warned, **options
+            )
     if method != "paper":
         warned.append(_PAPER_ONLY.format(method=method))
     simulated = is_simulated(
@@ -223,23 +235,24 @@ def _crosstalk(
 
 
 def _tracked(
-    subject: ikns.Subject, given: list[tuple[Path, ikns.Recording]]
+    subject: ikns.Subject,
+    given: list[tuple[Path, ikns.Recording]],
+    report: Callable[[str, int, int], None],
 ) -> tuple[list[ikns.Motion], list[str]]:
     """Judge and track recordings, and say what they lack."""
     from ikns.calibration.judged_motion import judged_motion
 
     motions, warned = [], []
-    with progress() as report:
-        for path, frames in given:
-            motion, lacks = judged_motion(
-                subject.skeleton,
-                frames,
-                chain=subject.chain,
-                measured=subject.measured,
-                progress=partial(report, path.name),
-            )
-            motions.append(motion)
-            warned += lacks
+    for _, frames in given:
+        motion, lacks = judged_motion(
+            subject.skeleton,
+            frames,
+            chain=subject.chain,
+            measured=subject.measured,
+            progress=partial(report, Path(frames.source).name),
+        )
+        motions.append(motion)
+        warned += lacks
     return motions, warned
 
 

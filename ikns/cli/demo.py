@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ikns.cli.compare import comparison_rows, comparison_table
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import json_text, loading, notes, progress, show
+from ikns.cli.steps_left import one_bar
 from ikns.output.file import write_csv, write_text
 from ikns.output.folder import check_output_folder, output_folder
 
@@ -58,20 +59,22 @@ def demo(
         sys.stderr.write(_ANNOUNCED)
     loading()
 
-    from ikns.experiments.demo import demo_summary, run_demo
+    from ikns.experiments.demo import DEMO_STEPS, DRAWING, demo_summary, run_demo
     from ikns.view.demo_report import write_demo_report
     from ikns.view.scene import recording_scene, scene_html
 
     started = time.perf_counter()
-    with output_folder(out) as folder, progress() as report:
-        found = run_demo(folder, seed=seed, quick=quick, progress=report)
+    estimates: dict[str, Any] = {}
+    with output_folder(out) as folder, progress(estimates=estimates) as report:
+        told = one_bar("demo", DEMO_STEPS, report, estimates)
+        found = run_demo(folder, seed=seed, quick=quick, progress=told)
+        told(DRAWING, 0, 1)
         subject = found.subject
         write_csv(folder / "control.csv", found.control.columns, found.control.rows)
         rows, warned = comparison_rows(subject, subject.motions[0], source="points.c3d")
         summary = demo_summary(found, rows, warned)
         write_demo_report(folder / "report.html", found, summary)
         write_text(folder / "summary.json", json_text(summary))
-        report("drawing", 0, 1)
         scene = recording_scene(
             subject.skeleton,
             subject.null_space_map,
@@ -82,7 +85,7 @@ def demo(
             title=f"Virtual subject {seed} at the PCA points",
         )
         write_text(folder / "view.html", scene_html(scene))
-        report("drawing", 1, 1)
+        told(DRAWING, 1, 1)
     page, person = out / "report.html", summary["person"]
     correlations = summary["r_of_c_and_true_swivel"]
     show(

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from ikns.calibration import calibrate
 from ikns.calibration.simulated import SwivelSamples, swivel_samples
+from ikns.calibration.steps import FITTING, JUDGING, LEARNING, METHODS, SCALING
 from ikns.calibration.subject import Subject
 from ikns.experiments.method_curves import MethodCurves, method_curves
 from ikns.live.control.recorded import ControlTable, control_table
@@ -26,6 +27,21 @@ from ikns.simulation import (
     write_protocol,
 )
 
+#: Step of the command after :func:`run_demo`.
+DRAWING = "drawing"
+#: All steps of `ikns demo` and what they cost, CPU s; see `ikns.calibration.steps`.
+DEMO_STEPS = (
+    ("simulating", 1.2),
+    (SCALING, 0.25),
+    (JUDGING, 0.15),
+    ("points.c3d", 0.16),
+    (FITTING, 0.27),
+    ("points.c3d", 0.16),
+    (LEARNING, 0.1),
+    (METHODS, 0.3),
+    ("free.c3d", 0.2),
+    (DRAWING, 2.9),
+)
 #: Share of the free exploration that teaches the natural posture.
 _NATURAL = 1 / 3
 
@@ -84,7 +100,7 @@ def run_demo(
     quick : bool
         3 s a point instead of 5 s.
     progress : callable
-        Called with (step, done, total).
+        Called with (step, done, total) of :data:`DEMO_STEPS`.
     """
     progress("simulating", 0, 1)
     protocol = simulate_protocol(virtual_subject(seed), seed=seed, quick=quick)

@@ -15,7 +15,7 @@ from ikns._kernels.body.normal_equations import linearize
 from ikns._kernels.body.step import integrate
 from ikns._kernels.body.tree import joint_axes
 from ikns._kernels.body.tree_cholesky import factor, solve
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 #: The step after one with the true Hessian is about its square times the rate at which
@@ -24,14 +24,14 @@ from ikns.arrays import Array, Indices
 _NEWTON = 0.03
 
 
-@compiled
+@inner
 def copy(source: Array, into: Array) -> None:
     """Copy an array (n,) into another."""
     for i in range(len(into)):
         into[i] = source[i]
 
 
-@compiled
+@inner
 def errors_at(problem: MarkerProblem, s: Scratch, q: Array) -> tuple[float, float]:
     """Write joints, markers and errors at `q` into `s`; return their squared sums.
 
@@ -55,7 +55,7 @@ def errors_at(problem: MarkerProblem, s: Scratch, q: Array) -> tuple[float, floa
     )
 
 
-@compiled
+@inner
 def descend(
     problem: MarkerProblem, n_seen: int, pull: float, s: Scratch
 ) -> tuple[float, int, bool]:
@@ -136,7 +136,7 @@ def descend(
             converged = converged and damping > 1e-3
 
 
-@compiled
+@inner
 def linearize_at(problem: MarkerProblem, s: Scratch, pull: float) -> None:
     """Write gradient, Hessian and curvature where the errors were taken last.
 

@@ -13,7 +13,7 @@ import numpy as np
 from ikns._kernels.body.marker_gate import MarkerGate
 from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.uncertainty import Segments
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 
@@ -81,7 +81,7 @@ def pack_constants(constants: FrameConstants) -> tuple[Indices, Array]:
     )
 
 
-@compiled
+@inner
 def unpack_constants(whole: Indices, real: Array) -> FrameConstants:
     """Unpack them."""
     E, F, K, L = whole[0], whole[1], whole[2], whole[3]

@@ -16,7 +16,7 @@ from ikns._kernels.body.descent import copy, errors_at
 from ikns._kernels.body.marker_gate import MarkerGate, fits, gate_figures
 from ikns._kernels.body.marker_ik import far_cost, solve_frame
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices, Mask
 
 #: Suspicious: so many times the usual root mean square error, which is of this size at
@@ -107,7 +107,7 @@ def solve_frames(
         _remember(problem, memory, passed[i], q[i], patience)
 
 
-@compiled
+@inner
 def follow_frame(
     problem: MarkerProblem,
     s: Scratch,

@@ -16,11 +16,11 @@ from __future__ import annotations
 import numpy as np
 
 from ikns._kernels.body.tree import Tree
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import inner
 from ikns.arrays import Array, Indices
 
 
-@compiled
+@inner
 def turn_clusters(
     turn_joint: Indices,
     marker_turn: Indices,
@@ -59,7 +59,7 @@ def turn_clusters(
                 turned[m, 2] = position[m, 2]
 
 
-@compiled
+@inner
 def release_clusters(
     tree: Tree,
     path: Indices,

@@ -30,7 +30,7 @@ from ikns._kernels.body.intent_signal import (
     UPPER,
 )
 from ikns._kernels.body.paths import Paths, follow_path
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array
 
 
@@ -71,7 +71,7 @@ def intent_gradient(
         gradient[paths.joint[k, 1]] += total / width
 
 
-@compiled
+@inner
 def swivel_gradient(
     numbers: Array,
     upper_arm: Array,
@@ -133,7 +133,7 @@ def swivel_gradient(
         by_axis[a] = -one[a] * (1.0 if a == 2 else m)
 
 
-@compiled
+@inner
 def natural_gradient(
     numbers: Array, leverage: Array, wrist: Array, gradient: Array
 ) -> None:

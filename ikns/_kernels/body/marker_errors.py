@@ -7,11 +7,11 @@ import numpy as np
 from ikns._kernels.body.free_turn import turn_clusters
 from ikns._kernels.body.step import displacement
 from ikns._kernels.body.tree import Tree, place_joints
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import inner
 from ikns.arrays import Array, Indices
 
 
-@compiled
+@inner
 def take_markers(
     given: Array, seen: Array, weight: Array, target: Array
 ) -> tuple[int, bool]:
@@ -33,7 +33,7 @@ def take_markers(
     return n_seen, infinite
 
 
-@compiled
+@inner
 def marker_errors(
     tree: Tree,
     joint: Indices,
@@ -93,7 +93,7 @@ def marker_errors(
     return weighted, plain
 
 
-@compiled
+@inner
 def penalties(
     tree: Tree,
     angle: Indices,
@@ -118,7 +118,7 @@ def penalties(
     return cost
 
 
-@compiled
+@inner
 def add_penalties(
     path: Indices,
     depth: Indices,

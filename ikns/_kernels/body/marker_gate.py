@@ -13,7 +13,7 @@ import numpy as np
 
 from ikns._kernels.body.descent import errors_at
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import inner
 from ikns.arrays import Array, Indices, Mask
 
 #: Entries of figures by group: the thorax, then the limbs.
@@ -30,7 +30,7 @@ class MarkerGate(NamedTuple):
     limits: Array  # (3,) residual, worst residual, intermarker error, m
 
 
-@compiled
+@inner
 def gate_figures(
     problem: MarkerProblem,
     s: Scratch,
@@ -69,7 +69,7 @@ def gate_figures(
             intermarker[g] = max(intermarker[g], error)
 
 
-@compiled
+@inner
 def fits(
     gate: MarkerGate, residual: float, worst: Array, intermarker: Array, passed: Mask
 ) -> bool:

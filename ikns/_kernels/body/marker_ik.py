@@ -19,7 +19,7 @@ from ikns._kernels.body.marker_errors import take_markers
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
 from ikns._kernels.body.rigid import rigid_pose
 from ikns._kernels.body.tree import FREE_FLYER
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 #: Iterations of a frame with an infinite marker, which is a fault and not a gap.
@@ -37,7 +37,7 @@ def _finite(q: Array) -> bool:
     return total == 0
 
 
-@compiled
+@inner
 def solve_frame(
     problem: MarkerProblem,
     s: Scratch,
@@ -94,7 +94,7 @@ def solve_frame(
     return best_residual, INFINITE if infinite else best_iterations, best_converged
 
 
-@compiled
+@inner
 def far_cost(problem: MarkerProblem, q: Array) -> float:
     """Return the cost of joints beyond their limits, m^2; 0 unless they are far."""
     cost = _beyond(problem, q, -1)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ikns._kernels.body.normal_equations import MOMENTS
 from ikns._kernels.body.tree import Tree
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 
@@ -125,7 +125,7 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
     )
 
 
-@compiled
+@inner
 def unpack(whole: Indices, real: Array) -> MarkerProblem:
     """Unpack a problem."""
     J, n, M, S, nq, D = whole[0], whole[1], whole[2], whole[3], whole[4], whole[5]
@@ -195,7 +195,7 @@ def scratch_size(problem: MarkerProblem) -> int:
     )
 
 
-@compiled
+@inner
 def cut(problem: MarkerProblem, work: Array) -> Scratch:
     """Divide memory of :func:`scratch_size` reals into arrays."""
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ikns._kernels.body.tree import PRISMATIC
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 
@@ -32,7 +32,7 @@ class Paths(NamedTuple):
     translation: Array  # (K + E, 3) m
 
 
-@compiled
+@inner
 def follow_path(
     paths: Paths, e: int, angles: Array, R: Array, p: Array, axes: Array
 ) -> None:
@@ -62,7 +62,7 @@ def follow_path(
     _carry(paths, len(paths.joint) + e, R, p)
 
 
-@compiled
+@inner
 def path_jacobian(
     paths: Paths, e: int, p: Array, axes: Array, rows: int, jacobian: Array
 ) -> None:

@@ -12,14 +12,14 @@ import math
 import numpy as np
 
 from ikns._kernels.body.paths import Paths, follow_path, path_jacobian
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 #: Most steps.
 _STEPS = 50
 
 
-@compiled
+@inner
 def reach_pose(
     paths: Paths,
     columns: Indices,

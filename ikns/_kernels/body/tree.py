@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 REVOLUTE, PRISMATIC, FREE_FLYER = 0, 1, 2
@@ -39,7 +39,7 @@ def place_joints(tree: Tree, q: Array, rotation: Array, translation: Array) -> N
         place_joint(tree, j, q, rotation, translation)
 
 
-@compiled
+@inner
 def place_joint(
     tree: Tree, j: int, q: Array, rotation: Array, translation: Array
 ) -> None:

@@ -34,7 +34,7 @@ from ikns._kernels.body.marker_errors import penalties
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
 from ikns._kernels.body.tree import FREE_FLYER
 from ikns._kernels.body.tree_cholesky import factor, solve
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
 
 #: Noise of a marker of weight 1, m: what the pull towards the pose before assumes too.
@@ -70,7 +70,7 @@ def new_marker_memory(n_markers: int) -> Array:
     return memory
 
 
-@compiled
+@inner
 def note_markers(
     problem: MarkerProblem,
     s: Scratch,
@@ -111,7 +111,7 @@ def note_markers(
     return hidden
 
 
-@compiled
+@inner
 def factor_information(
     problem: MarkerProblem,
     s: Scratch,
@@ -161,7 +161,7 @@ def factor_information(
     return factor(s.factored, problem.path, problem.depth)
 
 
-@compiled
+@inner
 def deviation(
     problem: MarkerProblem,
     s: Scratch,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns._kernels.voronoi.diagram import (
     GRADIENT,
     METHOD,
@@ -49,7 +49,7 @@ def _smooth_coefficients(
     return alpha / (alpha + square), square / (alpha + square) / nearness
 
 
-@compiled
+@inner
 def write_answer(
     numbers: Array,
     indices: Indices,

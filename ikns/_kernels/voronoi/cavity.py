@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns._kernels.voronoi.diagram import (
     CAVITY,
     CIRCUMCENTER,
@@ -46,7 +46,7 @@ from ikns.arrays import Array, Indices
 _NOTHING = 1e-300
 
 
-@compiled
+@inner
 def power_to(numbers: Array, center: int, x: Triple) -> float:
     """Power of the circumsphere packed at a place."""
     at = place(center)
@@ -83,7 +83,7 @@ def _exact_power(numbers: Array, center: int, x: Triple, rest: Triple) -> float:
     )
 
 
-@compiled
+@inner
 def kept_length(length: float, behind: float, ahead: float) -> float:
     """Kept length of a Voronoi edge, from the powers of its ends.
 
@@ -94,7 +94,7 @@ def kept_length(length: float, behind: float, ahead: float) -> float:
     )
 
 
-@compiled
+@inner
 def check_all_spheres(
     numbers: Array, indices: Indices, x: Triple, rest: Triple, work: Array
 ) -> tuple[int, int]:
@@ -166,7 +166,7 @@ def _walk(
     return -1, 0.0
 
 
-@compiled
+@inner
 def find_cavity(
     numbers: Array, indices: Indices, x: Triple, rest: Triple, start: int, work: Array
 ) -> tuple[int, int]:
@@ -220,7 +220,7 @@ def find_cavity(
     return count, sites
 
 
-@compiled
+@inner
 def clear_cavity(indices: Indices, tetrahedra: int, sites: int, work: Array) -> None:
     """Leave the scratch memory as it was found."""
     rows, powers = indices[TETRAHEDRON], indices[POWER]

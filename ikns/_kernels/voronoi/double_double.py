@@ -6,12 +6,12 @@ A floating-point technique for extending the available precision (1971).
 
 from __future__ import annotations
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import inner
 
 Triple = tuple[float, float, float]
 
 
-@compiled
+@inner
 def difference(a: float, b: float) -> tuple[float, float]:
     """Return a - b as a float, and what that float rounds off."""
     value = a - b
@@ -19,7 +19,7 @@ def difference(a: float, b: float) -> tuple[float, float]:
     return value, (a - (value - back)) - (b + back)
 
 
-@compiled
+@inner
 def product(a: float, b: float) -> tuple[float, float]:
     """Return a * b as a float, and what that float rounds off."""
     value = a * b
@@ -31,7 +31,7 @@ def product(a: float, b: float) -> tuple[float, float]:
     return value, ((p * r - value) + p * s + q * r) + q * s
 
 
-@compiled
+@inner
 def double_double_dot(a: Triple, a_rest: Triple, b: Triple, b_rest: Triple) -> float:
     """Scalar product, to about 1e-30 of its largest term."""
     total, low = 0.0, 0.0

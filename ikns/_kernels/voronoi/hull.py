@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns._kernels.voronoi.diagram import (
     CENTER,
     DEPTH,
@@ -28,7 +28,7 @@ CANCELED = 1e-3
 _FAR = 1e9
 
 
-@compiled
+@inner
 def depth_behind(numbers: Array, plane: int, x: Triple) -> float:
     """How far a point lies behind the plane packed at a place."""
     at = place(plane)
@@ -39,7 +39,7 @@ def depth_behind(numbers: Array, plane: int, x: Triple) -> float:
     )
 
 
-@compiled
+@inner
 def exact_depth(numbers: Array, plane: int, x: Triple, rest: Triple) -> float:
     """How far a double-double point lies behind a plane, to 1e-30."""
     n = numbers[plane : plane + 9]
@@ -54,7 +54,7 @@ def exact_depth(numbers: Array, plane: int, x: Triple, rest: Triple) -> float:
     )
 
 
-@compiled
+@inner
 def hull_depths(
     numbers: Array, indices: Indices, x: Triple, rest: Triple, work: Array
 ) -> tuple[float, float]:
@@ -83,7 +83,7 @@ def hull_depths(
     return least, part
 
 
-@compiled
+@inner
 def scaled(numbers: Array, x: Triple) -> Triple:
     """Scale a query, m, and bring it near; NaN where it overflows."""
     scale = numbers[SCALE]

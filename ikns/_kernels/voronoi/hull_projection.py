@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns._kernels.voronoi.diagram import HULL, HULL_SITES, SITE, place
 from ikns._kernels.voronoi.double_double import Triple
 from ikns.arrays import Array, Indices
@@ -76,7 +76,7 @@ def _candidate(
     return a
 
 
-@compiled
+@inner
 def nearest_on_hull(numbers: Array, indices: Indices, x: Triple) -> Triple:
     """Project a query outside the hull onto it."""
     least = np.inf

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import inner
 from ikns._kernels.voronoi.diagram import (
     ANGLE,
     CAVITY,
@@ -41,7 +41,7 @@ from ikns._kernels.voronoi.diagram import (
 from ikns.arrays import Array, Indices
 
 
-@compiled
+@inner
 def add_faces(numbers: Array, indices: Indices, tetrahedra: int, work: Array) -> None:
     """Add up V, or F times 12 |p|, of the sites around a cavity of so many tetrahedra.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple
 
 from ikns.analysis.compare.from_motion import compare_motion
@@ -30,6 +30,7 @@ def compare_combinations(
     chains: Sequence[ChainLike] = (),
     tasks: Sequence[Literal["pose", "position"]] = ("pose", "position"),
     coordinates: Sequence[str] = ("internal",),
+    progress: Callable[[int, int], None] = lambda done, total: None,
     **options: Any,
 ) -> Combinations:
     """Repeat :func:`ikns.analysis.compare.compare_motion` in every combination.
@@ -41,6 +42,8 @@ def compare_combinations(
     chains : sequence of str
         Chains to analyze, of the same hands. Default: that of the map.
     tasks, coordinates : sequence of str
+    progress : callable
+        Called with (combinations done, combinations in total).
     **options
         Of :func:`compare_motion`.
 
@@ -53,7 +56,10 @@ def compare_combinations(
     """
     found: dict[tuple[str, str, str], NullSpaceComparison] = {}
     left_out: dict[str, str] = {}
-    for analyzed in chains or (chain,):
+    each = len(tasks) * len(coordinates)
+    total = each * len(chains or (chain,))
+    for k, analyzed in enumerate(chains or (chain,)):
+        progress(k * each, total)
         try:
             for task in tasks:
                 for name in coordinates:
@@ -67,6 +73,7 @@ def compare_combinations(
                         coordinates=name,
                         **options,
                     )
+                    progress(len(found) + each * len(left_out), total)
         except NotEnoughData as error:
             if as_chain(analyzed) == as_chain(chain):
                 raise

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +31,13 @@ class Domain:
 
 def domain(points: Array) -> Domain:
     """Prepare points (N, 3), m, that span space and are all different."""
+    return _domain(np.ascontiguousarray(points).tobytes())
+
+
+@lru_cache(maxsize=4)
+def _domain(places: bytes) -> Domain:
+    """Do so once: the maps of a subject share their points."""
+    points = np.frombuffer(places).reshape(-1, 3)
     size = float(np.ptp(points, axis=0).max())
     # A power of two scales exactly.
     scale = 2.0 ** min(1000, -round(math.log2(size)))
