@@ -92,6 +92,9 @@ def timed(arguments: list[str], code: int, version: Path, cache: str) -> Process
         "NUMBA_CACHE_DIR": cache,
         "OMP_NUM_THREADS": "1",
     }
+    # A user's Python keeps the modules that it has compiled; so does this one, whatever
+    # it was told.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     before, began = os.times(), time.perf_counter()
     done = subprocess.run(
         # -P: the folder that this runs in may hold another version.
@@ -155,8 +158,8 @@ def main() -> None:
                     found.setdefault((step, k), []).append(took)
     print(
         f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python "
-        f"{platform.python_version()}, numba {numba.__version__}, seed {options.seed}; "
-        f"simulated, {len(protocol.points.recording.time)} frames; median of {rounds}"
+        f"{platform.python_version()}, numba {numba.__version__}, seed {options.seed}, "
+        f"load {os.getloadavg()[2]:.0f}; simulated, {len(protocol.points.recording.time)} frames; median of {rounds}"
     )
     names = ["before", "now"][-len(versions) :]
     heads = [f"{name}, {unit}" for name in names for unit in ("s", "CPU s")]

@@ -3,6 +3,7 @@
 The person is simulated once (tests/small_person.py).
 """
 
+import gc
 import json
 import re
 import subprocess
@@ -127,6 +128,12 @@ def test_every_public_name_exists() -> None:
 def test_a_function_is_found_though_its_module_has_the_same_name() -> None:
     code = "from ikns.live.warm_up import warm_up\nimport ikns\nikns.warm_up.__call__"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_command_called_from_python_leaves_its_garbage_collector_alone() -> None:
+    before = gc.get_threshold(), gc.get_freeze_count()
+    assert main(["--version"]) == 0
+    assert (gc.get_threshold(), gc.get_freeze_count()) == before
 
 
 def test_the_version_is_that_of_the_project(capsys: pytest.CaptureFixture[str]) -> None:
