@@ -159,7 +159,8 @@ def main() -> None:
     print(
         f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python "
         f"{platform.python_version()}, numba {numba.__version__}, seed {options.seed}, "
-        f"load {os.getloadavg()[2]:.0f}; simulated, {len(protocol.points.recording.time)} frames; median of {rounds}"
+        f"load {os.getloadavg()[2]:.0f}; simulated, "
+        f"{len(protocol.points.recording.time)} frames; median of {rounds}"
     )
     names = ["before", "now"][-len(versions) :]
     heads = [f"{name}, {unit}" for name in names for unit in ("s", "CPU s")]
