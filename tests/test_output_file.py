@@ -1,12 +1,16 @@
 """Output files: whole or not at all, and never over another unasked."""
 
+import csv
 import errno
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ikns.errors import InvalidInput
 from ikns.output import file as module
@@ -17,6 +21,23 @@ def test_a_table_has_nine_digits_and_empty_cells(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     write_csv(path, ["a", "b"], [[1 / 3, float("nan")], [2.0, -1.0]])
     assert path.read_text() == "a,b\n0.333333333,\n2,-1\n"
+
+
+@given(
+    table=st.integers(1, 3).flatmap(
+        lambda n: st.lists(st.lists(st.floats(), min_size=n, max_size=n), min_size=1)
+    )
+)
+def test_every_cell_is_read_back_to_nine_digits(
+    tmp_path_factory: pytest.TempPathFactory, table: list[list[float]]
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "read-back.csv"
+    write_csv(path, [f"column {k}" for k in range(len(table[0]))], np.array(table))
+    with path.open(newline="") as file:
+        _, *rows = csv.reader(file)
+    found = [[float(cell or "nan") for cell in row] for row in rows]
+    # The ninth digit may be off by half, 5e-9 of the first.
+    np.testing.assert_allclose(found, table, rtol=5e-9, atol=5e-324)
 
 
 def test_a_write_that_fails_leaves_nothing(tmp_path: Path) -> None:

@@ -125,8 +125,11 @@ def write_csv(
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    for row in rows:
-        writer.writerow(["" if v != v else f"{v:.9g}" for v in row])
+    # One format for a row takes half the time of one for each cell.
+    cells = ",".join(["%.9g"] * len(columns))
+    for row in rows.tolist() if hasattr(rows, "tolist") else rows:
+        # As csv writes it, with quotes where a line would be empty.
+        text.write(((cells % tuple(row)).replace("nan", "") or '""') + "\n")
     write_text(path, text.getvalue(), force=force)
 
 
