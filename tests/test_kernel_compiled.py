@@ -9,10 +9,16 @@ import sys
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 
 from ikns._kernels import compiled as module
+from ikns._kernels.body.frame_sequence import solve_frames
+from ikns._kernels.body.label_changes import label_owners
+from ikns.body.skeleton import Skeleton
 from ikns.live.warm_up import compiled_before, warm_up
+from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.marker_ik.label_changes import label_changes
 
 KERNELS = Path(module.__file__).parent
 
@@ -189,6 +195,23 @@ def test_a_constant_is_no_reason_to_compile_again():
         for kernel in vars(importlib.import_module(name)).values():
             for signature in getattr(kernel, "signatures", ()):
                 assert "Literal" not in str(signature), kernel
+
+
+def test_an_array_that_is_read_only_is_no_reason_to_compile_again():
+    skeleton = Skeleton.load()
+    markers = skeleton.markers_in_world(skeleton.neutral())
+    solver = MarkerIK(skeleton)
+    q = solver.solve(markers).q
+    before = set(solve_frames.signatures), set(label_owners.signatures)
+    for array in (markers, q):
+        array.flags.writeable = False
+    solver.solve(markers, q)
+    label_changes(np.zeros(1), np.broadcast_to(markers, (1, *markers.shape)))
+    time = np.zeros(1)
+    time.flags.writeable = False
+    label_changes(time, markers[None])
+    assert set(solve_frames.signatures) == before[0]
+    assert len(set(label_owners.signatures) - before[1]) <= 1
 
 
 def test_importing_the_package_does_not_load_numba():

@@ -127,15 +127,20 @@ class KernelSolver:
         solve_frames(
             *self.packed,
             self.gate,
-            markers,
+            _writable(markers),
             *span,
-            start,
+            _writable(start),
             scratch,
             patience,
             known,
             self.work,
             *frames,
         )
+
+
+def _writable(array: Array) -> Array:
+    """Return an array for which the kernel is compiled: it is again for others."""
+    return array if array.flags.writeable else array.copy()
 
 
 def tree_paths(tree: Tree) -> tuple[Indices, Indices]:
