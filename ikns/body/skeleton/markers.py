@@ -96,7 +96,9 @@ class Markers:
                 )
             own = self.joint == carrier
             by_size[own, :, s] = along[own] @ rotation.T
-        by_place = np.stack([data.oMi[int(j)].rotation for j in self.joint])
+        by_place = np.empty((len(self.joint), 3, 3))
+        for joint, rows, _ in self._carried:
+            by_place[rows] = data.oMi[joint].rotation
         return by_size, by_place
 
     def by_tilt(self, q: Array, tilts: Sequence[tuple[str, int]]) -> Array:
