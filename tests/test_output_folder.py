@@ -100,7 +100,7 @@ def test_a_disk_that_cannot_keep_the_new_folder_leaves_the_old_one(
     with output_folder(tmp_path / "new") as part:
         fill(part, "first")
     monkeypatch.setattr("ikns.output.file.os.fsync", refuse)
-    with pytest.raises(FileError, match="new: cannot be written: Input/output"):
+    with pytest.raises(FileError, match="new: cannot be written: input/output"):
         with output_folder(tmp_path / "new") as part:
             fill(part, "second")
     assert (tmp_path / "new" / "a.txt").read_text() == "first"
