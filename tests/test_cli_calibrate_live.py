@@ -279,7 +279,7 @@ def test_too_few_points_are_reported_and_recordings_stay(
         (["--min-static", "9"], "--static-seconds"),
         (["--min-still", "nan"], "for --min-still, found nan"),
         (["--marker-set", "lost"], "lost"),
-        (["--marker-set", "ue_adl"], "expected markers"),
+        (["--marker-set", "ue_adl"], "use --marker-set oxford24"),
         (["--side", "both", "--clavicle"], "--clavicle"),
     ],
 )
