@@ -32,8 +32,9 @@ _MOST_FAILED = 0.1
 #: What skin and modeling leave between a marker and the body, m.
 _SKIN_SD = 0.02
 #: Skin turns where the residual is at most this share of what it is with a cluster
-#: fixed to the bone, and less by this much, m. In eight tasks of UE_ADL six people have
-#: 0.48 to 0.78 of it, the one whose skin follows best 0.83 to 0.92.
+#: fixed to the bone, and less by this much, m. In eight trials of UE_ADL, with sets of
+#: their own and all weights 1, six people have 0.48 to 0.78 of it, the one whose skin
+#: follows best 0.83 to 0.92.
 _LEFT_BY_SKIN, _SKIN_TURNS = 0.85, 0.003
 #: Frames on which exchanges are tried, and the share of the cost that one may leave.
 _TRIED, _LEFT = 3, 0.3
