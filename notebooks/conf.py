@@ -32,6 +32,7 @@ myst_heading_anchors = 4
 
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
+toc_object_entries = False  # each page has a table of its names
 numpydoc_show_class_members = False
 numpydoc_validation_checks: set[str] = set()
 
