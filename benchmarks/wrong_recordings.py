@@ -4,7 +4,7 @@ Every pair of markers of a set that lie at different places carries each other's
 everywhere (static trial and recording), or in 30 or 5 % of the recording's frames. It
 counts when a joint turns by more than 10 deg for it, median over the frames concerned;
 it is told when the judge finds anything. `oxford24` is worn by a simulated person,
-`ue_adl` by real ones. False alarms are counted on clean real recordings of all people.
+`ue_adl` by seven real ones, of whom each pair gets one, drawn by the seed. False alarms are counted on clean real recordings of all people.
 """
 
 import argparse
@@ -18,8 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ikns import MarkerIK, MarkerSet, Skeleton, read
+from ikns.calibration.judge.finding import Finding, refused
 from ikns.calibration.judge.recordings import check_recordings
-from ikns.calibration.scaling import judge_static
+from ikns.calibration.scaling import StaticJudgment, judge_static
+from ikns.recording.part import between
 from ikns.recording.recording import Recording
 from ikns.simulation import simulate_protocol, virtual_subject
 
@@ -69,10 +71,13 @@ def simulated(seed: int) -> Person:
     )
 
 
-def real(folder: Path, name: str, task: str) -> Person:
-    """Read a person of UE_ADL."""
+def real(folder: Path, name: str, task: str, seconds: float) -> Person:
+    """Read a person of UE_ADL: the static trial, and the middle of a recording."""
     static = read(folder / name / f"{name}_static.csv")
-    return clean(name, "ue_adl", static, read(folder / name / f"{name}{task}.csv"))
+    whole = read(folder / name / f"{name}{task}.csv")
+    half = min(seconds, whole.time[-1] - whole.time[0]) / 2
+    middle = (whole.time[0] + whole.time[-1]) / 2
+    return clean(name, "ue_adl", static, between(whole, middle - half, middle + half))
 
 
 def exchanged(recording: Recording, a: str, b: str, rows: slice) -> Recording:
@@ -103,48 +108,63 @@ def pairs_of(person: Person) -> list[tuple[str, str]]:
     ]
 
 
-def judge(person: Person, a: str, b: str, share: float, rng) -> dict:
-    """Exchange two markers, and ask the judge."""
+def judge(
+    person: Person, a: str, b: str, share: float, rng: np.random.Generator, *, name: bool
+) -> dict:
+    """Exchange two markers, and ask the judge.
+
+    Without `name` the judge does not look for the exchange that mends a static trial
+    if it finds the trial unlikely anyway: that the pair is named is not known then.
+    """
     n = len(person.recording.time)
     count = max(1, round(share * n))
     first = int(rng.integers(n - count + 1))
     rows = slice(first, first + count)
-    static = person.static
-    if share == 1.0:
-        static = exchanged(static, a, b, slice(None))
     recording = exchanged(person.recording, a, b, rows)
+    skeleton: Skeleton | None = person.skeleton
     start = time.process_time()
-    found = check_recordings(
-        [recording],
-        static=static if share == 1.0 else None,
-        skeleton=None if share == 1.0 else person.skeleton,
-        marker_set=person.marker_set,
-        min_static=0.1,  # people of UE_ADL stand still for 0.2 to 3.9 s
-    )
+    found: list[Finding] = []
+    if share == 1.0:
+        static = exchanged(person.static, a, b, rows=slice(None))
+        judged = static_judgment(person, static, repair=name)
+        if not name and not judged.findings:
+            judged = static_judgment(person, static, repair=True)
+        found, skeleton = judged.findings, judged.skeleton
+    told = [f for f in found if f.severity != "note"]
+    if skeleton is not None and not refused(found) and (name or not told):
+        found = [*found, *check_recordings([recording], skeleton=skeleton).findings]
     spent = time.process_time() - start
-    told = [f for f in found.findings if f.severity != "note"]
-    named = any({a, b} <= set(f.markers) for f in told if f.kind == "exchanged")
+    told = [f for f in found if f.severity != "note"]
     return {
         "pair": (a, b),
+        "person": person.name,
         "told": bool(told),
-        "named": named,
-        "refused": not found.usable,
-        "turned_deg": _turned(person, static, recording, rows, share),
+        "named": any({a, b} <= set(f.markers) for f in told if f.kind == "exchanged"),
+        "refused": bool(refused(found)),
+        "turned_deg": _turned(person, skeleton, recording, rows),
         "seconds": spent,
     }
 
 
+def static_judgment(
+    person: Person, static: Recording, *, repair: bool
+) -> StaticJudgment:
+    """Judge a static trial, however short."""
+    return judge_static(
+        Skeleton.load(),
+        static,
+        marker_set=person.marker_set,
+        min_duration=0.1,
+        repair=repair,
+    )
+
+
 def _turned(
-    person: Person, static: Recording, recording: Recording, rows: slice, share: float
+    person: Person, skeleton: Skeleton | None, recording: Recording, rows: slice
 ) -> float:
     """How far the worst joint turns, deg; NaN where there is no body to fit."""
-    skeleton: Skeleton | None = person.skeleton
-    if share == 1.0:
-        skeleton = judge_static(
-            Skeleton.load(), static, marker_set=person.marker_set, min_duration=0.1
-        ).skeleton
-        if skeleton is None:
-            return float("nan")
+    if skeleton is None:
+        return float("nan")
     # As solved, before tracking itself leaves out frames that do not fit.
     q = MarkerIK(skeleton).track(recording).q[:, -person.angles.shape[1] :]
     off = np.abs(q - person.angles)[rows]
@@ -152,6 +172,31 @@ def _turned(
     if not seen.any():  # the clean recording does not show these frames either
         return 0.0
     return float(np.degrees(np.nanmedian(off[:, seen], axis=0).max()))
+
+
+def judge_all(
+    people: list[Person], mode: str, options: argparse.Namespace
+) -> dict | None:
+    """Judge all pairs of a set, or as many as were asked for, in random order.
+
+    Each pair of one of the people, drawn by the seed.
+    """
+    rng = np.random.default_rng([options.seed, list(MODES).index(mode)])
+    own = [set(pairs_of(person)) for person in people]
+    pairs = sorted(set.union(*own))
+    wanted = 1 if options.quick else options.pairs or len(pairs)
+    cases: list[dict] = []
+    started = time.process_time()
+    for k in rng.permutation(len(pairs))[:wanted].tolist():
+        if time.process_time() - started > options.cpu:
+            break
+        fitting = [i for i in range(len(people)) if pairs[k] in own[i]]
+        drawn = people[fitting[int(rng.integers(len(fitting)))]]
+        cases.append(judge(drawn, *pairs[k], MODES[mode], rng, name=options.named))
+    if not cases:
+        return None
+    summary = _summary(people, mode, cases, of=len(pairs))
+    return summary | {"named_known": options.named}
 
 
 def false_alarms(folder: Path, people: list[str], *, quick: bool) -> list[dict]:
@@ -203,10 +248,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=BESIDE)
     parser.add_argument("--pairs", type=int, help="random pairs a set; default: all")
+    parser.add_argument(
+        "--named",
+        action="store_true",
+        help="also ask which pair it is where a static trial is wrong (six times slower)",
+    )
     parser.add_argument("--set", choices=["oxford24", "ue_adl"], help="only this set")
     parser.add_argument("--mode", choices=list(MODES), help="only this one")
-    parser.add_argument("--person", nargs="+", default=["ADL005"], help="of ue_adl")
+    parser.add_argument("--person", nargs="+", help="of ue_adl; default: all")
     parser.add_argument("--task", default="CR1")
+    parser.add_argument("--seconds", type=float, default=3.0, help="of each recording")
+    parser.add_argument(
+        "--cpu", type=float, default=np.inf, help="seconds a row; stops there"
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--quick", action="store_true", help="few pairs, few recordings"
@@ -214,76 +268,87 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     folder = options.data / "ue_adl"
-    count = 1 if options.quick else options.pairs
-    rng = np.random.default_rng(options.seed)
-    people = []
+    names = sorted(path.name for path in folder.glob("ADL*"))
+    sets: list[list[Person]] = []
     if options.set != "ue_adl":
-        people.append(simulated(options.seed))
-    if options.set != "oxford24" and folder.is_dir():
-        people += [real(folder, name, options.task) for name in options.person]
+        sets.append([simulated(options.seed)])
+    if options.set != "oxford24" and names:
+        chosen = names[-1:] if options.quick else options.person or names
+        task, seconds = options.task, options.seconds
+        sets.append([real(folder, name, task, seconds) for name in chosen])
     result: dict = {"exchanges": [], "clean": [], "twenty_of_60_s": {}}
-    for person in people:
-        pairs = pairs_of(person)
-        if count and count < len(pairs):
-            pairs = [pairs[i] for i in sorted(rng.permutation(len(pairs))[:count])]
-        for mode, share in MODES.items():
-            if options.mode in (None, mode):
-                cases = [judge(person, a, b, share, rng) for a, b in pairs]
-                result["exchanges"].append(_summary(person, mode, cases))
-        if person.marker_set in result["twenty_of_60_s"]:
-            continue
-        result["twenty_of_60_s"][person.marker_set] = speed(
-            person, count=2 if options.quick else 20, seconds=60.0
-        ) * (10 if options.quick else 1)
-    if folder.is_dir() and options.mode is None:
-        names = sorted(path.name for path in folder.glob("ADL*"))
+    for people in sets:
+        for mode in MODES:
+            if options.mode in (None, mode) and (
+                row := judge_all(people, mode, options)
+            ):
+                result["exchanges"].append(row)
+                if not options.json:
+                    _print_row(row, first=len(result["exchanges"]) == 1)
+        if options.mode is None:
+            result["twenty_of_60_s"][people[0].marker_set] = speed(
+                people[0], count=2 if options.quick else 20, seconds=60.0
+            ) * (10 if options.quick else 1)
+    if options.mode is None:
         result["clean"] = false_alarms(
             folder, names[: 1 if options.quick else None], quick=options.quick
         )
     if options.json:
         print(json.dumps(result))
         return
-    _print(result, options.seed)
+    _print(result)
     if not folder.is_dir():
         print(f"\nNo real recordings in {folder}: only simulated ones were judged.")
 
 
-def _summary(person: Person, mode: str, cases: list[dict]) -> dict:
+def _summary(people: list[Person], mode: str, cases: list[dict], of: int) -> dict:
     # Without a body there is nothing to turn: it counts, and is told.
     wrong = [c for c in cases if not c["turned_deg"] <= np.degrees(WRONG)]
+    names = {c["person"] for c in cases}
     return {
-        "person": person.name,
-        "marker_set": person.marker_set,
+        "people": people[0].name if len(people) == 1 else f"{len(names)} people",
+        "marker_set": people[0].marker_set,
         "mode": mode,
         "pairs": len(cases),
+        "of": of,
         "wrong": len(wrong),
         "told": sum(c["told"] for c in wrong),
         "named": sum(c["named"] for c in wrong),
         "refused": sum(c["refused"] for c in wrong),
         "silent": [
-            [*c["pair"], round(c["turned_deg"])] for c in wrong if not c["told"]
+            [*c["pair"], c["person"], round(c["turned_deg"])]
+            for c in wrong
+            if not c["told"]
         ],
         "seconds": float(np.mean([c["seconds"] for c in cases])),
     }
 
 
-def _print(result: dict, seed: int) -> None:
-    print(f"numpy {np.__version__}, Python {platform.python_version()}, seed {seed}\n")
-    print(
-        "| set | person | exchanged | pairs | turn a joint > 10 deg | told | of these "
-        "the pair named | refused | CPU s each |"
-    )
-    print("|---|---|---|---|---|---|---|---|---|")
-    for row in result["exchanges"]:
-        share = row["told"] / row["wrong"] if row["wrong"] else 1.0
+def _print_row(row: dict, *, first: bool) -> None:
+    if first:
+        print(f"numpy {np.__version__}, Python {platform.python_version()}\n")
         print(
-            f"| {row['marker_set']} | {row['person']} | {row['mode']} | {row['pairs']} "
-            f"| {row['wrong']} | {row['told']} ({share:.1%}) | {row['named']} "
-            f"| {row['refused']} | {row['seconds']:.2f} |"
+            "| set | person | exchanged | pairs | turn a joint > 10 deg | told | of "
+            "these the pair named | CPU s each |"
         )
+        print("|---|---|---|---|---|---|---|---|")
+    share = row["told"] / row["wrong"] if row["wrong"] else 1.0
+    asked = row["named_known"] or row["mode"] != "everywhere"
+    print(
+        f"| {row['marker_set']} | {row['people']} | {row['mode']} | {row['pairs']} of "
+        f"{row['of']} | {row['wrong']} | {row['told']} ({share:.1%}) "
+        f"| {row['named'] if asked else 'not asked'} | {row['seconds']:.2f} |",
+        flush=True,
+    )
+
+
+def _print(result: dict) -> None:
     for row in result["exchanges"]:
-        for a, b, turned in row["silent"]:
-            print(f"not told: {row['marker_set']} {row['mode']}: {a} {b}, {turned} deg")
+        for a, b, person, turned in row["silent"]:
+            print(
+                f"not told: {row['marker_set']} {row['mode']}: {a} {b} of {person}, "
+                f"{turned} deg"
+            )
     alarms = sum(len(row["alarms"]) for row in result["clean"])
     files = sum(row["recordings"] for row in result["clean"])
     print(f"\nFalse alarms on {files} clean real recordings: {alarms}")

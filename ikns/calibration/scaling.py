@@ -155,11 +155,13 @@ def judge_static(
     marker_set: str | Path | MarkerSet = "oxford24",
     min_duration: float = 1.0,
     known: bool = False,
+    repair: bool = True,
 ) -> StaticJudgment:
     """Judge a static trial, and fit a skeleton to it where that makes sense.
 
     Arguments are those of :func:`scale`, which raises what is refused here. The same
     errors as there are raised for a trial that is too short or lacks a segment.
+    Without `repair` names are not exchanged to see what fits: far faster.
     """
     where = static.source
     worn = (
@@ -188,7 +190,7 @@ def judge_static(
     # The judge knows people, not this one: a known body must not look exchanged only
     # because its markers are put elsewhere than usual.
     fit = fit_sizes(reference, target)
-    findings += judge_posture(where, reference, target, fit)
+    findings += judge_posture(where, reference, target, fit, repair=repair)
     if known:
         fit = fit_sizes(reference, target, known=True)
     skeleton, report = _fitted(reference, target, fit, duration)

@@ -98,7 +98,12 @@ def body_size(where: str, markers: Array, body: Skeleton) -> list[Finding]:
 
 
 def judge_posture(
-    where: str, reference: Skeleton, target: Array, fit: SizeFit
+    where: str,
+    reference: Skeleton,
+    target: Array,
+    fit: SizeFit,
+    *,
+    repair: bool = True,
 ) -> list[Finding]:
     """Judge what the fit to a static trial had to assume.
 
@@ -112,11 +117,15 @@ def judge_posture(
         Mean marker positions, m; NaN where never seen.
     fit : SizeFit
         What :func:`ikns.calibration.size_fit.fit_sizes` found.
+    repair : bool
+        Whether to look for the exchange of names that explains it, which takes ten
+        times as long as the fit.
     """
     found = assumed(reference, target, fit)
-    repair = find_repair(reference, target, found) if found.suspect else None
-    if repair is not None:
-        return [_exchanged(where, reference.marker_set.labels, repair, found)]
+    tried = repair and found.suspect
+    mended = find_repair(reference, target, found) if tried else None
+    if mended is not None:
+        return [_exchanged(where, reference.marker_set.labels, mended, found)]
     findings = _lengths(where, found, fit)
     if not fit.converged:
         findings.append(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns.arrays import Array
+from ikns.arrays import Array, Indices
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.distances import quantile
 from ikns.calibration.judge.finding import Finding, say_markers
 from ikns.calibration.judge.pose_cost import PoseCost
 from ikns.calibration.judge.sides import mirror_image, other_side, sides_exchanged
+from ikns.calibration.judge.slips import judge_slips
 from ikns.calibration.turning_skin import turning_labels, with_free_turn
 from ikns.motion.marker_ik import MarkerIK, turned_markers
 from ikns.motion.motion import Motion
@@ -40,13 +41,19 @@ _LEFT_BY_SKIN, _SKIN_TURNS = 0.85, 0.003
 _TRIED, _LEFT = 3, 0.3
 
 
-def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Finding]:
-    """Judge how a skeleton follows its markers (T, M, 3), m; NaN where not seen."""
+def judge_tracking(
+    where: str, skeleton: Skeleton, time: Array, markers: Array
+) -> list[Finding]:
+    """Judge how a skeleton follows its markers (T, M, 3), m; NaN where not seen.
+
+    At times (T,), s.
+    """
     worn = skeleton.marker_set
-    some = _glances(markers)
+    rows = _glances(markers)
+    some = markers[rows]
     if not len(some):
         return []
-    motion, residual, off = _follow(skeleton, some)
+    motion, placed, residual, off = _follow(skeleton, some)
     with np.errstate(invalid="ignore"):
         # Also of frames whose markers are not believed: they are in question here.
         angles = motion.q[:, -len(skeleton.joint_names) :]
@@ -71,6 +78,7 @@ def judge_tracking(where: str, skeleton: Skeleton, markers: Array) -> list[Findi
         ]
     findings = _residual(where, worn.labels, residual, off)
     findings += _turning_skin(where, skeleton, some, residual)
+    findings += judge_slips(where, skeleton, time[rows], motion.q, placed, some)
     if share.max() > _SHARE:
         worst = int(share.argmax())
         findings.append(
@@ -105,14 +113,14 @@ def followed(skeleton: Skeleton, markers: Array) -> tuple[float, Array]:
     The weighted root mean square in the median frame, and the median of each marker
     (M,), that of one of less weight less.
     """
-    _, residual, off = _follow(skeleton, _glances(markers))
+    _, _, residual, off = _follow(skeleton, markers[_glances(markers)])
     return residual, off
 
 
-def _glances(markers: Array) -> Array:
-    """Frames, evenly spaced, with three markers or more."""
-    enough = np.isfinite(markers).all(axis=2).sum(axis=1) >= 3
-    return markers[enough][:: max(1, int(enough.sum()) // _GLANCES)]
+def _glances(markers: Array) -> Indices:
+    """Numbers of frames, evenly spaced, with three markers or more."""
+    enough = np.flatnonzero(np.isfinite(markers).all(axis=2).sum(axis=1) >= 3)
+    return enough[:: max(1, len(enough) // _GLANCES)]
 
 
 def _turning_skin(
@@ -124,7 +132,7 @@ def _turning_skin(
     if not labels:
         return []
     freed = skeleton.with_markers(with_free_turn(worn, labels))
-    left = _follow(freed, markers)[1]
+    left = _follow(freed, markers)[2]
     if left > _LEFT_BY_SKIN * residual or residual - left < _SKIN_TURNS:
         return []
     return [
@@ -141,11 +149,11 @@ def _turning_skin(
     ]
 
 
-def _follow(skeleton: Skeleton, markers: Array) -> tuple[Motion, float, Array]:
+def _follow(skeleton: Skeleton, markers: Array) -> tuple[Motion, Array, float, Array]:
     """Track frames that are apart from each other.
 
-    Returns the motion, the median frame's distance of all markers from the body, and
-    each marker's (M,), m.
+    Returns the motion, where it has the markers (T, M, 3), the median frame's distance
+    of all markers from the body, and each marker's (M,), m.
     """
     worn = skeleton.marker_set
     seconds = np.arange(len(markers), dtype=np.float64)
@@ -163,7 +171,7 @@ def _follow(skeleton: Skeleton, markers: Array) -> tuple[Motion, float, Array]:
     residual = float(np.median(np.sqrt(squares / weighed)))
     # What may give way more does not count more than it is weighed.
     off = np.nan_to_num(quantile(apart, 0.5)) * np.minimum(1.0, np.sqrt(weight))
-    return motion, residual, off
+    return motion, placed, residual, off
 
 
 def _mirrored(
@@ -173,8 +181,8 @@ def _mirrored(
     if residual <= MOST_RESIDUAL:
         return None
     limit = min(MOST_RESIDUAL, residual / 2)
-    image = _follow(skeleton, markers * [-1.0, 1.0, 1.0])[1]
-    swapped = _follow(skeleton, markers[:, other_side(skeleton.marker_set.labels)])[1]
+    image = _follow(skeleton, markers * [-1.0, 1.0, 1.0])[2]
+    swapped = _follow(skeleton, markers[:, other_side(skeleton.marker_set.labels)])[2]
     if min(image, swapped) >= limit:
         return None
     then = "then a posture fits"

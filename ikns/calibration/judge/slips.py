@@ -1,0 +1,147 @@
+"""Markers of a segment that slip together during a recording: a band that slides.
+
+Their distances stay the same, and the body follows for a part of the way, so that no
+residual is large. But at one posture they lie elsewhere after it than before: the mean
+distance of a segment's markers from the body is a smooth function of posture, with a
+step at that moment. What turns with the joint, as a band about a forearm, and what
+slipped before the recording began cannot be told from the person.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ikns.arrays import Array
+from ikns.body.chains import SIDES
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.finding import Finding
+from ikns.numerics.rigid import quaternion_matrix
+
+#: Least step of a segment's mean distance from the body, m, for markers of weight 1;
+#: what is weighed more gives way less. A slip of 20 mm makes a step of 5 to 18. Clean
+#: recordings have up to 7 mm (benchmarks/silent_faults.py).
+_STEP = 0.010
+#: The step must be so many of its own standard deviations.
+_SURE = 5.0
+#: Least frames looked at, and on each side of the step.
+_FEWEST, _BESIDE = 30, 6
+#: Joints that turn by less than this say nothing about the skin, rad; and those of the
+#: wrist take up a slip themselves.
+_TURNS, _LEFT_OUT = np.radians(1.0), "wrist"
+#: Squared length of what a step has that posture does not explain, frames: a step at
+#: which the posture changes for good is not told.
+_OWN_PART = 1.0
+
+
+class Slip(NamedTuple):
+    """A step of a segment's markers."""
+
+    link: str
+    frame: int  # the first one after it, among those looked at
+    step: float  # m
+
+
+def find_slips(
+    skeleton: Skeleton, q: Array, placed: Array, markers: Array
+) -> list[Slip]:
+    """Find the segments of the arms whose markers slipped together, the worst first.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    q : (T, nq) array
+        Poses of some frames.
+    placed, markers : (T, M, 3) array
+        Where the poses have the markers, and where they were seen, m.
+    """
+    found: list[Slip] = []
+    for side in SIDES:
+        names = skeleton.joint_names
+        own = [
+            i
+            for i, name in enumerate(names)
+            if name.startswith(side) and _LEFT_OUT not in name
+        ]
+        angles = q[:, -len(names) :][:, own]
+        for link in (f"{side}_upper_arm", f"{side}_forearm", f"{side}_hand"):
+            worn = [
+                m
+                for m, marker in enumerate(skeleton.marker_set.markers)
+                if marker.link == link and marker.weight > 0
+            ]
+            if worn:
+                apart = _apart(skeleton, link, q, placed[:, worn], markers[:, worn])
+                weight = max(skeleton.marker_set.markers[m].weight for m in worn)
+                limit = _STEP / np.sqrt(max(1.0, weight))
+                if (step := _step(angles, apart, limit)) is not None:
+                    found.append(Slip(link, *step))
+    return sorted(found, key=lambda slip: -slip.step)
+
+
+def judge_slips(
+    where: str,
+    skeleton: Skeleton,
+    time: Array,
+    q: Array,
+    placed: Array,
+    markers: Array,
+) -> list[Finding]:
+    """Say which segment's markers slipped; arguments as above, times (T,) s."""
+    slips = find_slips(skeleton, q, placed, markers)
+    # The body moves with what slipped, and takes others along: the worst is named.
+    return [
+        Finding(
+            "slipped",
+            "warn",
+            where,
+            f"the markers of the {link.replace('_', ' ')} moved together by "
+            f"{1000 * step:.0f} mm or more, at about {time[frame]:.1f} s",
+            f"use the part before it, for example with --to {time[frame - 1]:.2f}, and "
+            "calibrate again for the rest",
+            tuple(m.label for m in skeleton.marker_set.markers if m.link == link),
+        )
+        for link, frame, step in slips[:1]
+    ]
+
+
+def _apart(
+    skeleton: Skeleton, link: str, q: Array, placed: Array, markers: Array
+) -> Array:
+    """Mean of markers from where a pose has them, in their link, (T, 3) m; NaN."""
+    apart = np.full((len(q), 3), np.nan)
+    shift = markers - placed
+    for t in np.flatnonzero(np.isfinite(shift).all(axis=(1, 2))).tolist():
+        turned = quaternion_matrix(q[t, 3:7]) @ skeleton.link_in_thorax(q[t], link)[1]
+        apart[t] = shift[t].mean(axis=0) @ turned
+    return apart
+
+
+def _step(angles: Array, apart: Array, limit: float) -> tuple[int, float] | None:
+    """Find the step of apart (T, 3) m that posture (T, J) rad does not explain."""
+    seen = np.flatnonzero(np.isfinite(apart).all(axis=1) & np.isfinite(angles).all(1))
+    n = len(seen)
+    if n < _FEWEST:
+        return None
+    angles, apart = angles[seen], apart[seen]
+    turning = angles.std(axis=0) > _TURNS
+    posture = np.column_stack([np.ones(n), angles[:, turning]])
+    basis = np.linalg.qr(posture)[0]
+    # A row a step: 0 before it and 1 from there on; less what posture explains.
+    after = (np.arange(n) >= np.arange(_BESIDE, n + 1 - _BESIDE)[:, None]) * 1.0
+    after -= after @ basis @ basis.T
+    rest = apart - basis @ (basis.T @ apart)
+    size = np.sum(after**2, axis=1)
+    own = size > _OWN_PART
+    if not own.any():
+        return None
+    step = np.where(own[:, None], after @ rest, 0.0) / size[:, None]
+    gain = np.sum(step**2, axis=1) * size
+    best = int(gain.argmax())
+    length = float(np.linalg.norm(step[best]))
+    freedom = 3 * (n - basis.shape[1] - 1)
+    deviation = np.sqrt((np.sum(rest**2) - gain[best]) / freedom / size[best])
+    if length <= max(limit, _SURE * float(deviation)):
+        return None
+    return int(seen[best + _BESIDE]), length
