@@ -4,12 +4,14 @@ Every pair of markers of a set that lie at different places carries each other's
 everywhere (static trial and recording), or in 30 or 5 % of the recording's frames. It
 counts when a joint turns by more than 10 deg for it, median over the frames concerned;
 it is told when the judge finds anything. `oxford24` is worn by a simulated person,
-`ue_adl` by seven real ones, of whom each pair gets one, drawn by the seed. False alarms are counted on clean real recordings of all people.
+`ue_adl` by seven real ones, of whom each pair gets one, drawn by the seed. False alarms
+are counted on clean real recordings of all people.
 """
 
 import argparse
 import json
 import platform
+import sys
 import time
 from itertools import combinations
 from pathlib import Path
@@ -109,7 +111,13 @@ def pairs_of(person: Person) -> list[tuple[str, str]]:
 
 
 def judge(
-    person: Person, a: str, b: str, share: float, rng: np.random.Generator, *, name: bool
+    person: Person,
+    a: str,
+    b: str,
+    share: float,
+    rng: np.random.Generator,
+    *,
+    name: bool,
 ) -> dict:
     """Exchange two markers, and ask the judge.
 
@@ -193,6 +201,9 @@ def judge_all(
         fitting = [i for i in range(len(people)) if pairs[k] in own[i]]
         drawn = people[fitting[int(rng.integers(len(fitting)))]]
         cases.append(judge(drawn, *pairs[k], MODES[mode], rng, name=options.named))
+        if options.progress and len(cases) % 50 == 0:
+            so_far = _summary(people, mode, cases, of=len(pairs))
+            sys.stderr.write(json.dumps(so_far) + "\n")
     if not cases:
         return None
     summary = _summary(people, mode, cases, of=len(pairs))
@@ -251,7 +262,7 @@ def main() -> None:
     parser.add_argument(
         "--named",
         action="store_true",
-        help="also ask which pair it is where a static trial is wrong (six times slower)",
+        help="ask which pair a wrong static trial has (six times slower)",
     )
     parser.add_argument("--set", choices=["oxford24", "ue_adl"], help="only this set")
     parser.add_argument("--mode", choices=list(MODES), help="only this one")
@@ -261,6 +272,7 @@ def main() -> None:
     parser.add_argument(
         "--cpu", type=float, default=np.inf, help="seconds a row; stops there"
     )
+    parser.add_argument("--progress", action="store_true", help="on stderr")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--quick", action="store_true", help="few pairs, few recordings"

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import FileError, InvalidInput, RecordingWarning
 from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
 
@@ -181,6 +181,18 @@ def test_points_without_a_label_are_dropped(tmp_path):
     path = tmp_path / "trial.c3d"
     path.write_bytes(c3d_bytes(labels=["A", "B"]))
     assert read(path).labels == ("A", "B")
+
+
+def test_a_second_frame_rate_in_a_file_is_noted(tmp_path):
+    path = tmp_path / "trial.c3d"
+    content = bytearray(c3d_bytes())
+    path.write_bytes(content)
+    assert not read(path).notes
+    struct.pack_into("<f", content, 20, 100.0)  # words 11 and 12 of the header
+    path.write_bytes(content)
+    with pytest.warns(RecordingWarning, match="header says 100 .*RATE 50, which"):
+        recording = read(path)
+    assert recording.rate == pytest.approx(50.0)
 
 
 def test_labels_that_are_not_utf8_are_read_as_latin1(tmp_path):

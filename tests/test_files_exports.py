@@ -250,6 +250,32 @@ def test_events_of_qualisys_are_moments(tmp_path):
         reading(tmp_path, text, ending="tsv", start="Rest")
 
 
+@pytest.mark.parametrize(
+    ("text", "ending", "said", "rate"),
+    [
+        (
+            qualisys(FREQUENCY=50),
+            "tsv",
+            "says 50 frames", ,
+            100,
+        ),
+        (qualisys(FREQUENCY=50, before=False), "tsv", None, 50),
+        (
+            motive().replace("120.000000", "60.0"),
+            "csv",
+            "says 60 frames", ,
+            120,
+        ),
+    ],
+)
+def test_times_count_where_a_header_has_another_rate(
+    tmp_path, text, ending, said, rate
+):
+    notes = (said,) if said else ()
+    recording = reading(tmp_path, text, *notes, ending=ending)
+    assert recording.rate == pytest.approx(rate, rel=1e-3)
+
+
 def test_counts_of_qualisys_that_are_wrong_are_told(tmp_path):
     text = qualisys(NO_OF_FRAMES=9, NO_OF_MARKERS=5)
     notes = ("says 5 markers, found 3 names", "says 9 frames, found 4")

@@ -397,3 +397,67 @@ def test_labels_of_another_set_name_it(data):
     assert better_set(replace(mine, name="ue_adl"), lift.labels) is None
     alien = replace(MarkerSet.load("oxford24"), name="mine")
     assert better_set(alien, lift.labels).name == "ue_adl"
+
+
+@pytest.mark.parametrize("factor", [0.95, 1.03])
+def test_another_scale_of_the_same_body_is_refused(factor):
+    (found,) = check(changed(reaching(), factor * reaching().markers)).findings
+    assert (found.kind, found.severity) == ("scale", "refuse")
+    assert f"{factor:.3f} times" in found.found
+
+
+def test_a_scale_within_the_error_of_cameras_or_other_places_are_none():
+    assert not check(changed(reaching(), 1.005 * reaching().markers)).findings
+    other = check_recordings([reaching(uneven())], skeleton=person())
+    assert "scale" not in [finding.kind for finding in other.findings]
+
+
+def test_another_frame_rate_than_in_the_static_trial_is_told():
+    twice = Recording(
+        reaching().time / 2, reaching().markers, reaching().labels, "fast.c3d"
+    )
+    found = check_recordings([twice, reaching()], static=standing())
+    (told,) = found.findings
+    assert (told.kind, told.severity, told.where) == ("rate", "warn", "fast.c3d")
+    assert "100 frames per second" in told.found
+    assert "50" in told.found
+
+
+def clusters() -> Skeleton:
+    """A body with four markers on every segment and clavicles that are held."""
+    return Skeleton.load(marker_set="ue_adl")
+
+
+def moved_along(link: str, shift: float) -> Skeleton:
+    """That body, with a link's markers moved along it, m."""
+    worn, places = clusters().marker_set, clusters().marker_positions
+    places[[m.link == link for m in worn.markers], 1] -= shift
+    return clusters().with_markers(worn.at(places))
+
+
+@pytest.mark.parametrize("link", ["right_upper_arm", "left_forearm"])
+def test_markers_that_slip_together_are_told(link):
+    body = clusters()
+    markers = np.array(reaching(body).markers)
+    markers[100:] = reaching(moved_along(link, 0.03)).markers[100:]
+    (found,) = check_recordings(
+        [changed(reaching(body), markers)], skeleton=body
+    ).findings
+    assert (found.kind, found.severity) == ("slipped", "warn")
+    assert f"the markers of the {link.replace('_', ' ')} and" in found.found
+    # The body gives way for a part of it.
+    told = float(found.found.split(" mm or more")[0].split()[-1])
+    assert 10 < told <= 30
+    # 66 frames of 4 s are looked at; the step lies between two of them.
+    at = float(found.found.split("at about ")[1].split(" s")[0])
+    assert at == pytest.approx(2.0, abs=0.11)
+
+
+def test_skin_that_moves_with_posture_is_no_slip():
+    # 20 mm along the forearm between elbow stretched and bent.
+    bent = np.array([0.6 * np.sin(2 * t) for t in reaching().time])
+    share = (bent / 1.2 + 0.5)[:, None, None]
+    near, far = (reaching(moved_along("right_forearm", x)) for x in (0.0, 0.02))
+    markers = (1 - share) * near.markers + share * far.markers
+    found = check_recordings([changed(near, markers)], skeleton=clusters()).findings
+    assert "slipped" not in [finding.kind for finding in found]

@@ -8,7 +8,7 @@ from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused
-from ikns.calibration.judge.subjects import other_subject
+from ikns.calibration.judge.subjects import other_session
 from ikns.errors import MarkerMismatch, naming
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.marker_ik.rejection import rejection_sentence
@@ -88,7 +88,7 @@ def require_usable(
     """
     findings = known_findings(skeleton, recording, chain=chain, measured=measured)
     if static is not None:
-        findings += other_subject(static, recording, skeleton.marker_set)
+        findings += other_session(static, recording, skeleton.marker_set)
     if faults := refused(findings):
         raise MarkerMismatch(faults[0].sentence)
     return [finding.sentence for finding in findings if finding.severity == "warn"]

@@ -16,7 +16,7 @@ from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
 from ikns.calibration.judge.labels import judge_labels
 from ikns.calibration.judge.static import STILL_MARKERS, marker_displacement
-from ikns.calibration.judge.subjects import other_subject
+from ikns.calibration.judge.subjects import other_session
 from ikns.calibration.scaling import judge_static
 from ikns.calibration.static_trial import too_short
 from ikns.errors import InvalidInput, MarkerMismatch, naming
@@ -138,7 +138,7 @@ def check_recordings(
             judged.append((recording.source, f"recording without {worn.name}"))
             continue
         if static is not None:
-            findings += other_subject(static, recording, worn)
+            findings += other_session(static, recording, worn)
         elif skeleton is None and _still(recording, worn):
             found = judge_static(body, recording, marker_set=worn, min_duration=0.0)
             findings += [*found.findings, *too_short(recording, min_static)]

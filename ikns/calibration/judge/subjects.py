@@ -1,10 +1,43 @@
-"""Whose recordings these are, by the subject that stands before a label."""
+"""Whether two recordings are of one person and session, by what their files say."""
 
 from __future__ import annotations
 
 from ikns.body.marker_set import MarkerSet
 from ikns.calibration.judge.finding import Finding
 from ikns.recording.recording import Recording
+
+#: Frame rates that differ by less are the same.
+_SAME_RATE = 0.01
+
+
+def other_session(
+    static: Recording, recording: Recording, worn: MarkerSet
+) -> list[Finding]:
+    """Say that subjects or frame rates of two recordings differ."""
+    return other_subject(static, recording, worn) + other_rate(static, recording)
+
+
+def other_rate(static: Recording, recording: Recording) -> list[Finding]:
+    """Say that two recordings have different frame rates.
+
+    Markers alone do not show a wrong one: people reach at a quarter to four times the
+    usual speed. But cameras keep their rate during a session.
+    """
+    if min(len(static.time), len(recording.time)) < 2:
+        return []
+    if abs(recording.rate / static.rate - 1) <= _SAME_RATE:
+        return []
+    return [
+        Finding(
+            "rate",
+            "warn",
+            recording.source,
+            f"{recording.rate:.4g} frames per second, but the static trial "
+            f"{static.source} has {static.rate:.4g}",
+            "if the cameras had one rate, correct it in the file: all speeds depend "
+            "on it",
+        )
+    ]
 
 
 def other_subject(

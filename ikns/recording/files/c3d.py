@@ -33,6 +33,8 @@ _NOT_POSITIONS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS
 
 #: Largest count that a 16-bit word holds; longer recordings use other parameters.
 _WORD = 0xFFFF
+#: Rates that differ by less are the same.
+_SAME_RATE = 0.01
 
 
 def read_c3d(path: Path) -> Recording:
@@ -68,7 +70,26 @@ def read_c3d(path: Path) -> Recording:
         markers[points[..., 3] < 0] = np.nan
     first = _long(layout, "TRIAL:ACTUAL_START_FIELD") or max(layout.header[2], 1)
     time = (first - 1 + np.arange(len(points))) / rate
-    return to_recording(path, time, markers, [labels[i] for i in columns], unit=unit)
+    notes = _rate_notes(layout, rate)
+    named = [labels[i] for i in columns]
+    return to_recording(path, time, markers, named, unit=unit, notes=notes)
+
+
+def _rate_notes(layout: C3dLayout, rate: float) -> list[str]:
+    """Say what else in the file speaks against its frame rate (frames per s)."""
+    notes = []
+    if layout.rate > 0 and abs(layout.rate / rate - 1) > _SAME_RATE:
+        notes.append(
+            f"its header says {layout.rate:.4g} frames per second, POINT:RATE "
+            f"{rate:.4g}, which counts."
+        )
+    cameras = layout.number("TRIAL:CAMERA_RATE", 0)
+    if 0 < cameras * (1 + _SAME_RATE) < rate:
+        notes.append(
+            f"its cameras took {cameras:.4g} frames per second, fewer than the "
+            f"{rate:.4g} of POINT:RATE, which count."
+        )
+    return notes
 
 
 def _bare(label: str) -> str:

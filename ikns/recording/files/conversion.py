@@ -6,6 +6,7 @@ same for every format.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Sequence
@@ -98,6 +99,40 @@ def checked_rate(path: Path, rate: float) -> float:
             f"frames per second, found {rate:g}."
         )
     return float(rate)
+
+
+def frame_times(
+    frame: Array, printed: Array, rate: float, notes: list[str], *, zero: int = 1
+) -> Array:
+    """Return the time of each frame, s; note where header and times disagree.
+
+    Exact times where the printed ones, of few digits, agree to half a frame.
+
+    Parameters
+    ----------
+    frame, printed : (T,) array
+        Frame numbers and times as in the file; times may be NaN.
+    rate : float
+        Of the header, frames per s.
+    notes : list of str
+        Gets the note.
+    zero : int
+        Number of the frame at 0 s, where no times are printed.
+    """
+    steps = (frame - frame[0]) / rate
+    if np.isnan(printed).all():
+        return np.asarray((frame[0] - zero) / rate + steps)
+    exact = printed[0] + steps
+    if np.abs(printed - exact).max() < 0.5 / rate:
+        return np.asarray(exact)
+    with np.errstate(divide="ignore", invalid="ignore"):  # numbers that repeat
+        spacing = float(np.median(np.diff(printed) / np.diff(frame)))
+    if abs(spacing * rate - 1) > 0.01:
+        notes.append(
+            f"its header says {rate:.4g} frames per second, its times "
+            f"{1 / spacing if spacing else math.inf:.4g}; the times count."
+        )
+    return printed
 
 
 def is_unlabeled(label: str) -> bool:

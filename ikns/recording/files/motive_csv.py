@@ -11,12 +11,10 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-import numpy as np
-
-from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import (
     checked_rate,
+    frame_times,
     is_unlabeled,
     meters_per,
     shown,
@@ -78,7 +76,9 @@ def read_motive_csv(path: Path, lines: list[str]) -> Recording:
     ]
     table = number_table(path, frames, len(wanted), delimiter=",")
     markers = table[:, 2:].reshape(len(table), len(columns), 3) * meters
-    time = _time(table[:, 0], table[:, 1], rate)
+    time = table[:, 1]
+    if len(time):
+        time = frame_times(table[:, 0], time, rate, notes, zero=0)
     return to_recording(path, time, markers, labels, unit=unit, notes=notes)
 
 
@@ -138,19 +138,6 @@ def _refuse_local(path: Path, header: dict[str, str]) -> None:
             f"{path}: expected positions in the Coordinate Space Global, found "
             f"{shown(header['Coordinate Space'])}; export it again."
         )
-
-
-def _time(frame: Array, printed: Array, rate: float) -> Array:
-    """Return exact times where the printed ones, of few digits, agree to half a frame.
-
-    A part of a take keeps its times.
-    """
-    if not len(frame):
-        return printed
-    exact = printed[0] + (frame - frame[0]) / rate
-    if np.isnan(printed).all():
-        return frame / rate
-    return exact if np.abs(printed - exact).max() < 0.5 / rate else printed
 
 
 def _is_frame(line: str) -> bool:

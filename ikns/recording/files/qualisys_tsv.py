@@ -15,6 +15,7 @@ import numpy as np
 from ikns.errors import FileError
 from ikns.recording.files.conversion import (
     checked_rate,
+    frame_times,
     is_unlabeled,
     meters_per,
     shown,
@@ -67,9 +68,11 @@ def read_qualisys_tsv(path: Path) -> Recording:
     named = [i for i, label in enumerate(labels) if not is_unlabeled(label)]
     markers = table[:, before:].reshape(len(rows), len(labels), 3)[:, named]
     frame = table[:, 0] if before else np.arange(1.0, 1 + len(rows), dtype=np.float64)
+    timed = before and np.isfinite(table[:, 1]).all()
+    printed = table[:, 1] if timed else np.full(len(rows), np.nan)
     return to_recording(
         path,
-        (frame - 1) / rate,
+        frame_times(frame, printed, rate, notes) if len(rows) else printed,
         markers * meters_per(path, "mm"),
         [labels[i] for i in named],
         unit="mm",

@@ -16,6 +16,7 @@ from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.recording.files.conversion import (
     checked_rate,
+    frame_times,
     is_unlabeled,
     meters_per,
     shown,
@@ -147,19 +148,7 @@ def _time(
         found = 1 / float(np.median(np.diff(printed)))
         notes.append(f"its header says 0 frames per second, its times {found:.4g}.")
         return printed
-    steps = (frame - frame[0]) / rate
-    if np.isnan(printed).all():
-        return (frame[0] - 1) / rate + steps
-    exact = printed[0] + steps
-    if np.abs(printed - exact).max() < 0.5 / rate:
-        return exact
-    spacing = float(np.median(np.diff(printed) / np.diff(frame)))
-    if abs(spacing * rate - 1) > 0.01:
-        notes.append(
-            f"its header says {rate:.4g} frames per second, its times "
-            f"{1 / spacing if spacing else math.inf:.4g}; the times count."
-        )
-    return printed
+    return frame_times(frame, printed, rate, notes)
 
 
 def _starts_with_number(line: str) -> bool:

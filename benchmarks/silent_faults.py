@@ -1,0 +1,173 @@
+"""What does the check of recordings not notice? Real people's, spoiled one by one.
+
+Clean recordings of UE_ADL with clusters of four markers on every segment; each fault
+keeps the distances within segments, so that only the person's body can tell:
+
+- a cluster slides along its segment, or a band turns about the forearm by as much, in
+  the middle of the recording or between static trial and recording;
+- the static trial is another person's, or in a volume calibrated 2 or 5 % too large;
+- the frame rate is wrong in one file, or in both.
+
+Told is what the judge warns of or refuses with any sentence; without a fault it must
+say nothing. The segments and the wrist's and elbow's centers are the landmarks' of the
+static trial, no part of the toolkit's body.
+"""
+
+import argparse
+import json
+import platform
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.recordings import check_recordings
+from ikns.calibration.judge.subjects import other_session
+from ikns.calibration.scaling import scale
+from ikns.recording.files import read
+from ikns.recording.recording import Recording
+
+BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
+CLUSTERS = {"upper arm": "UAR", "forearm": "LAR", "hand": "HAN"}
+
+
+def place(recording: Recording, *names: str) -> np.ndarray:
+    """Mean place of markers over a static trial, (3,) m."""
+    columns = [_column(recording, name) for name in names]
+    return np.asarray(np.nanmean(recording.markers[:, columns], axis=(0, 1)))
+
+
+def _column(recording: Recording, name: str) -> int:
+    return [label.rpartition(":")[2] for label in recording.labels].index(name)
+
+
+def slipped(
+    static: Recording,
+    recording: Recording,
+    side: str,
+    segment: str,
+    *,
+    slide: float = 0.0,
+    turn: float = 0.0,
+    start: float = 0.5,
+) -> Recording:
+    """Move a cluster along its segment, or about it along the skin, m.
+
+    From a share `start` of the recording on.
+    """
+    elbow = place(static, f"{side}LEP", f"{side}MEP")
+    wrist = place(static, f"{side}SPR", f"{side}SPU")
+    ends = {
+        "upper arm": (place(static, f"{side}GTH"), elbow),
+        "forearm": (elbow, wrist),
+        "hand": (wrist, 2 * wrist - elbow),
+    }[segment]
+    names = [f"{side}{CLUSTERS[segment]}{k}" for k in (1, 2, 3, 4)]
+    own = [_column(recording, name) for name in names]
+    calm = np.array([place(static, name) for name in names])
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    out = calm.mean(axis=0) - ends[0]
+    out -= (out @ along) * along
+    about = Rotation.from_rotvec(turn / np.linalg.norm(out) * along)
+    moved = about.apply(calm - ends[0]) + ends[0] + slide * along - calm
+    markers = np.array(recording.markers)
+    late = markers[round(start * len(markers)) :]
+    late[:, own] += np.einsum("tij,kj->tki", _turns(calm, late[:, own]), moved)
+    return Recording(recording.time, markers, recording.labels, recording.source)
+
+
+def _turns(calm: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """How markers (T, K, 3) are turned against (K, 3), (T, 3, 3); NaN where unseen."""
+    known = np.isfinite(seen).all(axis=(1, 2))
+    turns = np.full((len(seen), 3, 3), np.nan)
+    here = seen[known] - seen[known].mean(axis=1, keepdims=True)
+    u, _, v = np.linalg.svd(np.einsum("tki,kj->tij", here, calm - calm.mean(axis=0)))
+    u[:, :, 2] *= np.linalg.det(u @ v)[:, None]
+    turns[known] = u @ v
+    return turns
+
+
+def told(recording: Recording, skeleton: Skeleton) -> bool:
+    """Whether the judge says anything of a recording of this person."""
+    found = check_recordings([recording], skeleton=skeleton)
+    return any(finding.severity != "note" for finding in found.findings)
+
+
+def trials_of(folder: Path, name: str, *, quick: bool) -> list[tuple[str, Recording]]:
+    """Read the first repeat of each task and arm, with its side."""
+    tasks = "F" if quick else "FADC"
+    return [
+        (side, read(folder / name / f"{name}{task}{side}1.csv"))
+        for task, side in product(tasks, "R" if quick else "RL")
+    ]
+
+
+def at_rate(recording: Recording, factor: float) -> Recording:
+    """Write another frame rate, `factor` times the true one."""
+    return Recording(
+        recording.time / factor,
+        recording.markers,
+        recording.labels,
+        recording.source,
+    )
+
+
+def main() -> None:
+    """Print one table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=BESIDE)
+    parser.add_argument("--quick", action="store_true", help="two people, one trial")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    folder = options.data / "ue_adl"
+    names = sorted(path.name for path in folder.glob("ADL*"))
+    names = names[:2] if options.quick else names
+    statics = {name: read(folder / name / f"{name}_static.csv") for name in names}
+    bodies = {
+        name: scale(Skeleton.load(), static, marker_set="ue_adl", min_duration=0.15)[0]
+        for name, static in statics.items()
+    }
+    trials = {name: trials_of(folder, name, quick=options.quick) for name in names}
+    every = [(name, side, trial) for name, own in trials.items() for side, trial in own]
+    rows: dict[str, list[bool]] = {}
+    sizes = (0.02,) if options.quick else (0.02, 0.03)
+
+    def add(row: str, trial: Recording, skeleton: Skeleton) -> None:
+        rows.setdefault(row, []).append(told(trial, skeleton))
+
+    for name, side, trial in every:
+        body, static = bodies[name], statics[name]
+        add("no fault", trial, body)
+        for when, start in (("in the middle", 0.5), ("before", 0.0)):
+            for segment, size in product(CLUSTERS, sizes):
+                wrong = slipped(static, trial, side, segment, slide=size, start=start)
+                add(f"{segment} slides {1000 * size:.0f} mm {when}", wrong, body)
+            wrong = slipped(static, trial, side, "forearm", turn=0.02, start=start)
+            add(f"forearm turns 20 mm {when}", wrong, body)
+        for factor in (1.02, 1.05):
+            larger = Recording(
+                trial.time, factor * trial.markers, trial.labels, trial.source
+            )
+            add(f"volume {100 * (factor - 1):.0f} % larger", larger, body)
+        worn = body.marker_set
+        rows.setdefault("frame rate twice the static trial's", []).append(
+            bool(other_session(static, at_rate(trial, 2.0), worn))
+        )
+        add("frame rate twice the true one in both", at_rate(trial, 2.0), body)
+    for name, own in trials.items():
+        for other in names:
+            if other != name:
+                add("static trial of another", own[-1][1], bodies[other])
+    if options.json:
+        print(json.dumps({row: [sum(hit), len(hit)] for row, hit in rows.items()}))
+        return
+    print(f"numpy {np.__version__}, Python {platform.python_version()}, real people\n")
+    print("| fault | told |\n|---|---|")
+    for row, hit in rows.items():
+        print(f"| {row} | {sum(hit)} of {len(hit)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
