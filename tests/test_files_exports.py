@@ -256,14 +256,14 @@ def test_events_of_qualisys_are_moments(tmp_path):
         (
             qualisys(FREQUENCY=50),
             "tsv",
-            "says 50 frames", ,
+            "says 50 frames",
             100,
         ),
         (qualisys(FREQUENCY=50, before=False), "tsv", None, 50),
         (
             motive().replace("120.000000", "60.0"),
             "csv",
-            "says 60 frames", ,
+            "says 60 frames",
             120,
         ),
     ],
