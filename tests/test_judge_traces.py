@@ -13,6 +13,7 @@ from ikns.calibration.judge.distances import (
 )
 from ikns.calibration.judge.finding import say_frames
 from ikns.calibration.judge.jumps import find_jumps
+from ikns.calibration.judge.quality import judge_quality, marker_noise
 from ikns.calibration.judge.steps import find_steps
 from ikns.calibration.judge.traces import frozen, stand_ins, straight
 from ikns.calibration.judge.unit import wrong_unit
@@ -256,3 +257,33 @@ def test_a_marker_that_is_knocked_is_told_and_skin_that_gives_way_is_not(
     # The difference of two medians of ten frames: noise of 0.8 mm, in the largest of
     # five up to five times that; and what the skin does in 0.1 s, 5 mm.
     assert abs(found[0][2] - by) < 0.009
+
+
+def kinds(markers: np.ndarray) -> list[str]:
+    labels = [f"M{i}" for i in range(markers.shape[1])]
+    time = np.arange(len(markers)) / RATE
+    return [found.kind for found in judge_quality("a.c3d", labels, time, markers)]
+
+
+@given(seed=st.integers(0, 10**6), noise=st.floats(1e-4, 0.02))
+@settings(max_examples=20)
+def test_noise_is_measured_beside_movement(seed, noise):
+    rng = np.random.default_rng(seed)
+    clean = swinging(seed).mean(axis=1, keepdims=True)  # 0.4 mm are left of its noise
+    markers = clean + rng.normal(0, noise, (FRAMES, 1, 3))
+    # 0.3 m at 1 Hz bends by 1.2 mm between frames at most, 0.33 mm of noise; a median
+    # of 354 absolute values scatters by 1.2 / sqrt(354), overlapping ones by 1.5 times.
+    (found,) = marker_noise(markers)
+    assert abs(found - np.hypot(noise, 4e-4)) < 4 * 0.1 * found + 4e-4
+
+
+def test_noise_digits_and_gaps_are_told():
+    clean = swinging(1)
+    assert kinds(clean) == []
+    assert kinds(clean.round(3)) == []  # whole millimeters
+    assert kinds(clean.round(2)) == ["coarse"]
+    rng = np.random.default_rng(2)
+    assert kinds(clean + rng.normal(0, 0.01, clean.shape)) == ["noise"]
+    clean[rng.random(clean.shape[:2]) < 0.5] = np.nan
+    assert kinds(clean) == ["gaps"]
+    assert kinds(np.full((20, 3, 3), np.nan)) == []

@@ -119,6 +119,9 @@ def _judge(
         return findings
     good = measured[~spoiled]
     distant, exchanges = _judge_distances(where, worn, good, pairs, apart)
+    if any(finding.kind == "noise" for finding in findings):
+        # Noise lets distances vary; that names are wrong is not the reason.
+        distant = [finding for finding in distant if finding.kind != "marker moved"]
     findings += distant
     if not exchanges and len(pairs):
         every = pair_distances(measured, pairs)
@@ -169,10 +172,10 @@ def _size_beside(
     step = max(1, len(markers) // 60)
     first, second = np.moveaxis(markers[::step][:, pairs[apart > _SHORTEST]], 2, 0)
     ratio = np.linalg.norm(first - second, axis=2) / apart[apart > _SHORTEST]
-    usual = quantile(ratio, 0.5)
-    ratio = ratio[np.isfinite(ratio)]
-    wrong = wrong_unit(float(np.median(ratio))) if ratio.size else None
+    seen = ratio[np.isfinite(ratio)]
+    wrong = wrong_unit(float(np.median(seen))) if seen.size else None
     if wrong is None:
+        usual = quantile(ratio, 0.5)
         return _scaled(where, usual[np.isfinite(usual)])
     return [
         Finding(

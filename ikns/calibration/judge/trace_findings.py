@@ -9,6 +9,7 @@ import numpy as np
 from ikns.arrays import Array, Mask
 from ikns.calibration.judge.finding import Finding, Severity, say_frames, say_markers
 from ikns.calibration.judge.jumps import find_jumps
+from ikns.calibration.judge.quality import judge_quality
 from ikns.calibration.judge.traces import frozen, stand_ins, straight
 
 #: From this share of the frames on, a recording is not used rather than cut.
@@ -31,6 +32,7 @@ def judge_traces(
     bad = stand_ins(markers)
     findings = _not_seen(where, labels, markers, bad)
     markers = np.where(bad[..., None], np.nan, markers)
+    findings += judge_quality(where, labels, time, markers)
     still, filled = frozen(time, markers), straight(time, markers)
     findings += [
         _made(where, labels[column], found[:, column], kind)
