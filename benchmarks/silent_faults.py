@@ -114,6 +114,16 @@ def at_rate(recording: Recording, factor: float) -> Recording:
     )
 
 
+def hand_speed(recording: Recording, side: str) -> float:
+    """95th percentile of a hand's speed while it moves, m/s, over 50 ms."""
+    own = [_column(recording, f"{side}HAN{k}") for k in (1, 2, 3, 4)]
+    middle = recording.markers[:, own].mean(axis=1)
+    lag = max(1, round(0.05 * recording.rate))
+    away = np.linalg.norm(middle[lag:] - middle[:-lag], axis=1)
+    speed = away * recording.rate / lag
+    return float(np.nanquantile(speed[speed > 0.05], 0.95))
+
+
 def main() -> None:
     """Print one table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -160,13 +170,18 @@ def main() -> None:
         for other in names:
             if other != name:
                 add("static trial of another", own[-1][1], bodies[other])
+    speeds = [hand_speed(trial, side) for _, side, trial in every]
     if options.json:
         print(json.dumps({row: [sum(hit), len(hit)] for row, hit in rows.items()}))
         return
     print(f"numpy {np.__version__}, Python {platform.python_version()}, real people\n")
     print("| fault | told |\n|---|---|")
     for row, hit in rows.items():
-        print(f"| {row} | {sum(hit)} of {len(hit)} |", flush=True)
+        print(f"| {row} | {sum(hit)} of {len(hit)} |")
+    print(
+        f"\nSpeed of the hand, 95th percentile of each clean trial: {min(speeds):.2f} "
+        f"to {max(speeds):.2f} m/s"
+    )
 
 
 if __name__ == "__main__":
