@@ -33,7 +33,7 @@ from ikns.calibration.judge.steps import judge_steps
 from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.judge.traces import repeated
 from ikns.calibration.judge.tracking import judge_tracking
-from ikns.calibration.judge.unit import wrong_unit
+from ikns.calibration.judge.unit import size_beside
 from ikns.motion.marker_ik.visibility import segment_pairs
 from ikns.recording.recording import Recording
 
@@ -47,12 +47,6 @@ _OTHERS, _OTHERS_CHANGE = 0.35, 0.008
 _GLANCES = 60
 #: Share of the frames that may repeat the one before.
 _REPEATS = 0.02
-#: Shorter distances say nothing about a size, m.
-_SHORTEST = 0.01
-#: Another scale: the median ratio of at least so many distances within segments to
-#: those of the static trial differs from one by this share, and by more than half of
-#: them scatter. 168 clean recordings of seven people have up to 0.0024.
-_SCALED, _FEWEST_RATIOS = 0.015, 10
 
 
 def judge_exploration(
@@ -108,7 +102,7 @@ def _judge(
     if skeleton is None or apart is None:
         size = body_size(where, markers, generic.with_nominal_markers(worn))
     else:
-        size = _size_beside(where, markers, pairs, apart)
+        size = size_beside(where, markers, pairs, apart)
     if size:
         return size
     findings, spoiled, measured = judge_traces(
@@ -163,54 +157,6 @@ def _pairs(worn: MarkerSet) -> Indices:
         (i, j) for i, j in combinations(range(len(links)), 2) if links[i] == links[j]
     ]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
-
-
-def _size_beside(
-    where: str, markers: Array, pairs: Indices, apart: Array
-) -> list[Finding]:
-    """Compare distances within segments (N,) with those on the person, m."""
-    step = max(1, len(markers) // 60)
-    first, second = np.moveaxis(markers[::step][:, pairs[apart > _SHORTEST]], 2, 0)
-    ratio = np.linalg.norm(first - second, axis=2) / apart[apart > _SHORTEST]
-    seen = ratio[np.isfinite(ratio)]
-    wrong = wrong_unit(float(np.median(seen))) if seen.size else None
-    if wrong is None:
-        usual = quantile(ratio, 0.5)
-        return _scaled(where, usual[np.isfinite(usual)])
-    return [
-        Finding(
-            "unit",
-            "refuse",
-            where,
-            f"the body is {wrong[0]:.3g} times as large as in the static trial",
-            f"probably {wrong[1]}: correct the unit in one of the files"
-            if wrong[1]
-            else "expected the same person in the same unit",
-        )
-    ]
-
-
-def _scaled(where: str, ratio: Array) -> list[Finding]:
-    """Say that distances (N,) are all so many times those of the static trial."""
-    if len(ratio) < _FEWEST_RATIOS:
-        return []
-    logs = np.log(ratio)
-    middle = float(np.median(logs))
-    # Quantiles of 1/4: markers of one segment may have moved on the skin.
-    scatter = float(np.subtract(*np.quantile(logs, [0.75, 0.25])))
-    if abs(middle) <= _SCALED or scatter > abs(middle):
-        return []
-    return [
-        Finding(
-            "scale",
-            "refuse",
-            where,
-            f"all distances within segments are {np.exp(middle):.3f} times those of "
-            "the static trial",
-            "use the static trial of this person, recorded with the same calibration "
-            "of the cameras",
-        )
-    ]
 
 
 def _judge_distances(
