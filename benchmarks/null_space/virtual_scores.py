@@ -54,7 +54,11 @@ LIVE = ("paper", "intent")
 
 @dataclass(frozen=True)
 class Trials:
-    """What one person recorded; `meant` (T,) is the truth of `wishes`."""
+    """What one person recorded; `meant` (T,) is the truth of `wishes`.
+
+    ``postures`` are the true joint angles (T, 7) of each recording, by its name, and
+    ``calm`` the rests between which ordinary movement went.
+    """
 
     person: Virtual
     static: Recording
@@ -65,13 +69,17 @@ class Trials:
     reaches: Recording
     ends: list[tuple[int, int]]
     turns: dict[str, tuple[Recording, Array]]
+    postures: dict[str, Array]
+    calm: Rests
 
 
 def recorded(seed: int) -> Trials:
     """Draw and record a person."""
     person, rng = draw_virtual(seed), np.random.default_rng([34, seed])
+    postures: dict[str, Array] = {}
 
     def record(name: str, q: Array) -> Recording:
+        postures[name] = q
         markers, labels = worn(person, q, rng)
         clock = np.arange(len(q)) / RATE
         return Recording(clock, markers, tuple(labels), f"{name}, simulated")
@@ -104,6 +112,8 @@ def recorded(seed: int) -> Trials:
         record("reaches", reaches),
         ends,
         turns,
+        postures,
+        calm,
     )
 
 
