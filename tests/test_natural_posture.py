@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV
 
 from ikns.errors import InvalidInput
+from ikns.nullspace.local_posture import REACH
 from ikns.nullspace.natural_posture import (
     NaturalPosture,
     natural_posture_people,
@@ -37,7 +39,7 @@ def test_it_is_a_ridge_toward_the_people_that_ship():
     phi = quadratic_terms(wrist)
     # Scikit-learn's ridge has a free intercept too; its penalty is N times ours.
     other = Ridge(alpha=0.03 * len(s)).fit(phi[:, 1:], s - phi @ people)
-    own = NaturalPosture(guard=False).fit(wrist, s)
+    own = NaturalPosture(guard=False, local_penalty=None).fit(wrist, s)
     at, _ = movement(2, n=50)
     expected = quadratic_terms(at) @ people + other.predict(quadratic_terms(at)[:, 1:])
     assert np.allclose(own.swivel(at), expected, rtol=0, atol=1e-10)
@@ -64,6 +66,46 @@ def test_far_away_it_is_other_people_and_one_s_offset(seed):
     assert not own.taught(away).any()
     # A quadratic grows by the square of the way, and so does the leverage.
     assert (from_people < 0.2 * np.abs(bare.swivel(away) - s.mean()).max() + 1).all()
+
+
+def far_apart(seed):
+    """Wrists at 5 cm or more from each other, so that each has a bump of its own."""
+    rng = np.random.default_rng(seed)
+    grid = np.array(list(np.ndindex(4, 4, 3)))[rng.permutation(48)[:40]]
+    wrist = LOW + 0.07 * grid + rng.uniform(0, 0.02, (40, 3))
+    return wrist, rng.normal(scale=0.1, size=40)
+
+
+@given(st.integers(0, 100), st.floats(1e-4, 0.1))
+@settings(max_examples=10, deadline=None)
+def test_places_are_remembered_by_kernel_ridge(seed, penalty):
+    wrist, s = far_apart(seed)
+    smooth, own = (
+        NaturalPosture(local_penalty=p).fit(wrist, s) for p in (None, penalty)
+    )
+    at = np.vstack([wrist, far_apart(seed + 1)[0]])
+
+    def kernel(a):
+        r = np.clip(np.linalg.norm(a[:, None] - wrist, axis=2) / REACH, 0, 1)
+        return (1 - r) ** 4 * (4 * r + 1)
+
+    # Scikit-learn's penalty is of the sum, ours of the mean.
+    ridge = KernelRidge(alpha=penalty * len(s), kernel="precomputed")
+    bare = NaturalPosture(local_penalty=None, guard=False).fit(wrist, s)
+    ridge.fit(kernel(wrist), s - bare.swivel(wrist))
+    expected = smooth.swivel(at) + ridge.predict(kernel(at))
+    # Normal equations square the condition of K, some 1e3 here.
+    assert np.allclose(own.swivel(at), expected, rtol=0, atol=1e-7)
+
+
+def test_a_place_that_was_never_near_is_not_touched():
+    wrist, s = far_apart(1)
+    smooth, own = (NaturalPosture(local_penalty=p).fit(wrist, s) for p in (None, 0.002))
+    away = wrist[:, None] + 10 * REACH * np.eye(3)
+    away = away[(np.linalg.norm(away[..., None, :] - wrist, axis=-1) > REACH).all(-1)]
+    assert len(away) > 50
+    assert np.array_equal(own.swivel(away), smooth.swivel(away))
+    assert np.abs(own.swivel(wrist) - smooth.swivel(wrist)).max() > 0.02
 
 
 def test_where_it_was_taught_the_guard_changes_nothing():
@@ -115,6 +157,8 @@ def test_wrong_parameters_and_arrays_are_refused():
     wrist, s = movement(6, n=20)
     with pytest.raises(InvalidInput, match="penalty above 0"):
         NaturalPosture(penalty=0.0).fit(wrist, s)
+    with pytest.raises(InvalidInput, match="penalty above 0"):
+        NaturalPosture(local_penalty=-1.0).fit(wrist, s)
     own = NaturalPosture().fit(wrist, s)
     with pytest.raises(InvalidInput, match="wrist centers of shape"):
         own.swivel(wrist[:, :2])
@@ -122,5 +166,10 @@ def test_wrong_parameters_and_arrays_are_refused():
     for bad in ((arrays[0][:5], *arrays[1:]), (arrays[0] * np.nan, *arrays[1:])):
         with pytest.raises(InvalidInput, match="expected"):
             NaturalPosture.from_arrays(*bad, taught_leverage=1.0)
+    for places, heights in (([[0, 0, 0]], []), ([0, 0, 0], [1]), ([[0, 0]], [1])):
+        with pytest.raises(InvalidInput, match="places .* and their heights"):
+            NaturalPosture.from_arrays(
+                *arrays, taught_leverage=1.0, places=places, heights=heights
+            )
     with pytest.raises(InvalidInput, match="leverage above 0"):
         NaturalPosture.from_arrays(*arrays, taught_leverage=0.0)

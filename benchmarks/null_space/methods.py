@@ -8,6 +8,7 @@ Nobody swivelled on purpose there: what explores is the self-motion in closed fo
 
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -152,12 +153,17 @@ def people_alone(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
 
 
 def intent(
-    arm: Arm, trials: list[ArmTrial], people: Array, *, guard: bool = True
+    arm: Arm, trials: list[ArmTrial], people: Array, **parameters: Any
 ) -> Signal:
     """Hinge swivel less the natural posture."""
     wrist, swivel, _ = own_movement(trials)
-    natural = NaturalPosture(guard=guard).fit(wrist, swivel, people=people)
+    natural = NaturalPosture(**parameters).fit(wrist, swivel, people=people)
     return _beyond(arm, natural)
+
+
+def intent_without_places(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
+    """Remember nothing of particular places."""
+    return intent(arm, trials, people, local_penalty=None)
 
 
 def intent_unguarded(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
@@ -172,5 +178,6 @@ METHODS: dict[str, Method] = {
     "hinge swivel": hinge,
     "people alone": people_alone,
     "intent": intent,
+    "intent, no places": intent_without_places,
     "intent, no guard": intent_unguarded,
 }

@@ -255,7 +255,7 @@ def of_person(seed: int, names: list[str]) -> dict[str, dict[str, float]]:
     rows = {}
     for name in names:
         c = signal(found, name)
-        row = _wished(c(wishes), trials.meant)
+        row = wished(c(wishes), trials.meant)
         read = c(reaches)
         row["reach"] = float(
             np.nanmean([abs(read[b] - read[a]) for a, b in trials.ends])
@@ -279,14 +279,15 @@ def of_person(seed: int, names: list[str]) -> dict[str, dict[str, float]]:
         for seconds in SECONDS:
             c = signal(found, "intent", seconds)
             read = c(reaches)
-            rows["intent"][f"rms_{seconds}"] = _wished(c(wishes), trials.meant)["rms"]
+            rows["intent"][f"rms_{seconds}"] = wished(c(wishes), trials.meant)["rms"]
             rows["intent"][f"reach_{seconds}"] = float(
                 np.nanmean([abs(read[b] - read[a]) for a, b in trials.ends])
             )
     return rows
 
 
-def _wished(c: Array, meant: Array) -> dict[str, float]:
+def wished(c: Array, meant: Array) -> dict[str, float]:
+    """Error, gain and offset of c over what was meant."""
     known = np.isfinite(c) & np.isfinite(meant)
     gain, offset = np.polyfit(meant[known], c[known], 1)
     return {

@@ -1,7 +1,8 @@
 """Where the elbow would be at this place of the wrist if the person meant nothing.
 
 A quadratic in the wrist center, learned from ordinary movement and drawn toward what
-other people do. What departs from it is what a person means (posture is not intent).
+other people do, and what this person does at particular places beyond it. What departs
+from it is what a person means (posture is not intent).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike
 from ikns.arrays import Array, Mask
 from ikns.errors import FileError, InvalidInput
 from ikns.nullspace.estimator_base import EstimatorBase
+from ikns.nullspace.local_posture import fit_local, nearness
 from ikns.nullspace.map.checks import checked_rows
 
 #: Middle of the work space, m, and the unit of length, m: the quadratic terms are then
@@ -112,6 +114,9 @@ class NaturalPosture(EstimatorBase):
     better than an extrapolated quadratic. Directions that the penalty decides do not
     count.
 
+    What the quadratic leaves at places that were visited is remembered as well
+    (:mod:`ikns.nullspace.local_posture`): people come back to them in the same posture.
+
     :meth:`of_people` is the population's, without any data of the person.
 
     Parameters
@@ -121,6 +126,8 @@ class NaturalPosture(EstimatorBase):
         outweigh it where they went.
     guard : bool
         Whether the person's own part fades outside what was taught.
+    local_penalty : float, optional
+        Weight against remembering places, above 0; None remembers none.
 
     Attributes
     ----------
@@ -134,6 +141,10 @@ class NaturalPosture(EstimatorBase):
         Matrix of the leverage, and of the normal equations.
     taught_leverage_ : float
         h99.
+    places_ : (M, D) array
+        Wrist centers around which something is remembered, m.
+    heights_ : (M,) array
+        How much, rad; see :func:`ikns.nullspace.local_posture.fit_local`.
     coverage_ : dict
         What was taught: ``frames``, ``low_m`` and ``high_m`` (1st and 99th percentile
         of each coordinate), ``residual_rad`` (root mean square).
@@ -151,9 +162,16 @@ class NaturalPosture(EstimatorBase):
 
     _fitted, _vectors = "coefficients_", False
 
-    def __init__(self, *, penalty: float = 0.03, guard: bool = True) -> None:
+    def __init__(
+        self,
+        *,
+        penalty: float = 0.03,
+        guard: bool = True,
+        local_penalty: float | None = 0.002,
+    ) -> None:
         self.penalty = penalty
         self.guard = guard
+        self.local_penalty = local_penalty
 
     @classmethod
     def of_people(cls, **parameters: Any) -> Self:
@@ -179,6 +197,8 @@ class NaturalPosture(EstimatorBase):
         *,
         taught_leverage: float,
         offset: float = 0.0,
+        places: ArrayLike = (),
+        heights: ArrayLike = (),
         coverage: dict[str, Any] | None = None,
         **parameters: Any,
     ) -> Self:
@@ -196,13 +216,22 @@ class NaturalPosture(EstimatorBase):
         made.leverage_ = np.array(leverage, dtype=np.float64)
         made.taught_leverage_, made.offset_ = float(taught_leverage), float(offset)
         made.coverage_ = dict(coverage or {"frames": 0})
+        made.heights_ = np.array(heights, dtype=np.float64)
+        found = np.array(places, dtype=np.float64)
+        made.places_ = found if found.size else np.empty((0, 3))
+        if made.places_.shape != (made.heights_.size, 3) or made.heights_.ndim != 1:
+            raise InvalidInput(
+                "expected places (M, 3) and their heights (M,), found "
+                f"{made.places_.shape} and {made.heights_.shape}."
+            )
         arrays = (made.coefficients_, made.people_, made.leverage_)
         if [array.shape for array in arrays] != [(10,), (10,), (10, 10)]:
             raise InvalidInput(
                 "expected 10 coefficients, those of other people and a leverage "
                 f"(10, 10), found {', '.join(str(a.shape) for a in arrays)}."
             )
-        numbers = np.concatenate([*map(np.ravel, arrays), [made.offset_]])
+        more = (made.places_, made.heights_, [made.offset_])
+        numbers = np.concatenate([*map(np.ravel, arrays), *map(np.ravel, more)])
         if not np.isfinite([*numbers, made.taught_leverage_]).all():
             raise InvalidInput("expected a natural posture of finite numbers.")
         if not made.taught_leverage_ > 0:
@@ -229,8 +258,10 @@ class NaturalPosture(EstimatorBase):
             When the penalty is not above 0, or samples are not finite or do not match.
         """
         w, s = self._validated(X, y, y_numeric=True, dtype=np.float64)
-        if not 0 < self.penalty < np.inf:
-            raise InvalidInput(f"expected a penalty above 0, found {self.penalty}.")
+        near = self.local_penalty
+        for penalty in (self.penalty, 1.0 if near is None else near):
+            if not 0 < penalty < np.inf:
+                raise InvalidInput(f"expected a penalty above 0, found {penalty}.")
         s = np.asarray(s, dtype=np.float64)
         phi = quadratic_terms(w)
         others = _people(phi.shape[1], people)
@@ -239,12 +270,17 @@ class NaturalPosture(EstimatorBase):
         own = self.leverage_ @ phi.T @ beyond / len(w)
         self.people_, self.coefficients_ = others, others + own
         self.offset_ = float((phi @ own).mean())
+        left = beyond - phi @ own
+        self.places_, self.heights_ = (
+            (w[:0], s[:0]) if near is None else fit_local(w, left, near)
+        )
+        left = left - nearness(w, self.places_) @ self.heights_
         low, high = np.quantile(w, [0.01, 0.99], axis=0)
         self.coverage_: dict[str, Any] = {
             "frames": len(w),
             "low_m": low.tolist(),
             "high_m": high.tolist(),
-            "residual_rad": float(np.sqrt(np.mean((beyond - phi @ own) ** 2))),
+            "residual_rad": float(np.sqrt(np.mean(left**2))),
         }
         return self
 
@@ -257,7 +293,8 @@ class NaturalPosture(EstimatorBase):
         if self.guard:
             beyond = np.maximum(self._leverage(phi) / self.taught_leverage_, 1.0)
             own = self.offset_ + (own - self.offset_) / beyond
-        return np.asarray(phi @ self.people_ + own)
+        near = nearness(rows, self.places_) @ self.heights_
+        return np.asarray(phi @ self.people_ + own + near)
 
     def predict(self, X: ArrayLike) -> Array:
         """Return :meth:`swivel` at wrist centers (N, 3), all of them finite, (N,)."""

@@ -25,6 +25,8 @@ from ikns._kernels.body.intent_signal import (
     OFFSET,
     OWN,
     PEOPLE,
+    REACH,
+    SIZE,
     TAUGHT,
     UNIT,
     UPPER,
@@ -164,7 +166,19 @@ def natural_gradient(
     gradient[1] = slope[2] + 2 * slope[5] * x2 + slope[7] * x1 + slope[9] * x3
     gradient[2] = slope[3] + 2 * slope[6] * x3 + slope[8] * x1 + slope[9] * x2
     for a in range(3):
-        gradient[a] *= (m if a == 2 else 1.0) / unit
+        gradient[a] /= unit
+    square = numbers[REACH] ** 2
+    for k in range(SIZE, len(numbers), 4):
+        dx, dy = wrist[0] - numbers[k], wrist[1] - numbers[k + 1]
+        dz = wrist[2] * m - numbers[k + 2]
+        far = (dx * dx + dy * dy + dz * dz) / square
+        if far < 1.0:
+            # k'(r) / r = -20 (1 - r)^3 has no singularity at the place itself.
+            steep = -20 * (1 - math.sqrt(far)) ** 3 * numbers[k + 3] / square
+            gradient[0] += steep * dx
+            gradient[1] += steep * dy
+            gradient[2] += steep * dz
+    gradient[2] *= m
 
 
 @compiled

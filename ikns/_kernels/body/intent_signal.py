@@ -4,7 +4,7 @@
 
 with the hinge swivel s (:mod:`ikns.nullspace.hinge_swivel`) and the natural posture
 s_nat at the wrist center w (:mod:`ikns.nullspace.natural_posture`), whose constants are
-handed in.
+handed in. What is remembered of particular places is added up one by one.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ LOWER, UPPER = 23, 24  # a and b, rad
 MIRROR = 25  # -1 for a left arm, else 1
 MIDDLE, UNIT = 26, 29  # of the quadratic terms, 3 and 1, m
 FORWARD, DOWN = 30, 33  # where the swivel's reference starts, and it there, 3 each
-SIZE = 36
+REACH = 36  # of a bump around a place, m
+SIZE = 37  # places and heights follow, m and rad, 4 for each
 
 
 @compiled
@@ -47,7 +48,7 @@ def intent_signal(
     ----------
     paths : Paths
         From the thorax to the upper arm and to the hand's link.
-    numbers : (SIZE,) array
+    numbers : (SIZE + 4 M,) array
         See the layout above.
     leverage : (10, 10) array
     angles : (1, J) array
@@ -79,10 +80,25 @@ def intent_signal(
     beyond = h / numbers[TAUGHT]
     if numbers[GUARD] > 0 and beyond > 1.0:
         own = numbers[OFFSET] + (own - numbers[OFFSET]) / beyond
-    rest = s - people - own
+    z = numbers[MIRROR] * position[0, 1, 2]
+    near = _near(numbers, position[0, 1, 0], position[0, 1, 1], z)
+    rest = s - people - own - near
     rest -= 2 * math.pi * math.floor((rest + math.pi) / (2 * math.pi))
     width = numbers[UPPER] - numbers[LOWER]
     return (rest - numbers[LOWER]) / width, beyond <= 1.0
+
+
+@compiled
+def _near(numbers: Array, x: float, y: float, z: float) -> float:
+    """Return the sum of the bumps of :mod:`ikns.nullspace.local_posture`, rad."""
+    total, square = 0.0, numbers[REACH] ** 2
+    for k in range(SIZE, len(numbers), 4):
+        far = (x - numbers[k]) ** 2 + (y - numbers[k + 1]) ** 2
+        far += (z - numbers[k + 2]) ** 2
+        if far < square:
+            r = math.sqrt(far / square)
+            total += numbers[k + 3] * (1 - r) ** 4 * (1 + 4 * r)
+    return total
 
 
 @compiled

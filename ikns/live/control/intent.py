@@ -10,6 +10,7 @@ from ikns.body.chains import chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.nullspace.hinge_swivel import DOWN, FORWARD
+from ikns.nullspace.local_posture import REACH
 from ikns.nullspace.natural_posture import MIDDLE, UNIT
 from ikns.nullspace.readout import IntentMap, Readout
 
@@ -36,7 +37,8 @@ def intent_numbers(skeleton: Skeleton, readout: Readout) -> IntentNumbers:
     (side,) = chain_sides(readout.chain)
     paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))
     natural = learned.natural_
-    numbers = np.empty(kernel.SIZE)
+    remembered = np.column_stack([natural.places_, natural.heights_])
+    numbers = np.empty(kernel.SIZE + remembered.size)
     for start, values in (
         (kernel.OWN, natural.coefficients_ - natural.people_),
         (kernel.PEOPLE, natural.people_),
@@ -46,6 +48,8 @@ def intent_numbers(skeleton: Skeleton, readout: Readout) -> IntentNumbers:
         (kernel.MIRROR, [-1.0 if side == "left" else 1.0]),
         (kernel.MIDDLE, [*MIDDLE, UNIT]),
         (kernel.FORWARD, [*FORWARD, *DOWN]),
+        (kernel.REACH, [REACH]),
+        (kernel.SIZE, remembered.ravel()),
     ):
         numbers[start : start + len(values)] = values
     return IntentNumbers(paths, numbers, np.array(natural.leverage_, order="C"))

@@ -131,6 +131,8 @@ def _intent_table(learned: IntentMap) -> dict[str, Any]:
             "taught_leverage": natural.taught_leverage_,
             "guard": natural.guard,
             "penalty": natural.penalty,
+            "places_m": natural.places_.tolist(),
+            "heights_rad": natural.heights_.tolist(),
             "coverage": natural.coverage_,
         },
         "centers_m": learned.centers_.tolist(),
@@ -148,6 +150,9 @@ def _intent_map(table: dict[str, Any]) -> IntentMap:
         held["leverage"],
         offset=held["offset_rad"],
         taught_leverage=held["taught_leverage"],
+        # Folders of before have none.
+        places=held.get("places_m", ()),
+        heights=held.get("heights_rad", ()),
         coverage=held["coverage"],
         penalty=held["penalty"],
         guard=held["guard"],
