@@ -36,6 +36,7 @@ LADDER: dict[str, tuple[str, str, bool]] = {
     "as shipped": ("tracked", "tracked", False),
     "nothing remembered of places": ("tracked", "tracked, smooth", False),
     "(a) true joint angles": ("true", "true", False),
+    "(a) true joint angles, nothing remembered": ("true", "true, smooth", False),
     "(c) true ends": ("tracked", "tracked", True),
     "(d) no scatter from rest to rest in what teaches": ("true", "no scatter", False),
     "(e) no rough field in what teaches": ("true", "no rough field", False),
@@ -54,20 +55,21 @@ def print_virtual(people: list[Person]) -> None:
     print(f"\n{len(people)} virtual people (simulated), medians.\n")
     print(
         "| c with | rms (90 %) | gain | offset | median size of it | within 0.03 "
-        "| reach |"
+        "| reach | reach again |"
     )
-    print("|---" * 7 + "|")
+    print("|---" * 8 + "|")
     for words, (seen, natural, ends) in LADDER.items():
         rows = [scored(one, seen, natural, true_ends=ends) for one in people]
-        rms, gain, offset, reach = (
+        rms, gain, offset, reach, again = (
             np.array([row[key] for row in rows])
-            for key in ("rms", "gain", "offset", "reach")
+            for key in ("rms", "gain", "offset", "reach", "again")
         )
         print(
             f"| {words} | {np.median(rms):.3f} ({np.quantile(rms, 0.9):.3f}) "
             f"| {np.median(gain):.3f} | {np.median(offset):+.3f} "
             f"| {np.median(np.abs(offset)):.3f} "
-            f"| {np.mean(np.abs(offset) <= 0.03):.0%} | {np.median(reach):.3f} |"
+            f"| {np.mean(np.abs(offset) <= 0.03):.0%} | {np.median(reach):.3f} "
+            f"| {np.median(again):.3f} |"
         )
 
 

@@ -100,7 +100,7 @@ def test_places_are_remembered_by_kernel_ridge(seed, penalty):
 
 def test_a_place_that_was_never_near_is_not_touched():
     wrist, s = far_apart(1)
-    smooth, own = (NaturalPosture(local_penalty=p).fit(wrist, s) for p in (None, 0.002))
+    smooth, own = (NaturalPosture(local_penalty=p).fit(wrist, s) for p in (None, 0.01))
     away = wrist[:, None] + 10 * REACH * np.eye(3)
     away = away[(np.linalg.norm(away[..., None, :] - wrist, axis=-1) > REACH).all(-1)]
     assert len(away) > 50

@@ -95,6 +95,8 @@ def test_a_posture_that_is_off_everywhere_is_shifted_by_what_is_known_of_it():
         held.leverage_,
         taught_leverage=held.taught_leverage_,
         offset=held.offset_,
+        places=held.places_,
+        heights=held.heights_,
         coverage=held.coverage_,
     )
     known = IntentMap.from_arrays(

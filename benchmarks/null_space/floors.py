@@ -17,7 +17,7 @@ Array = np.ndarray
 #: Places within this are one place, m.
 NEAR = 0.03
 #: As the package's: penalties of the quadratic and of what is remembered of places.
-PENALTY, LOCAL = 0.03, 0.002
+PENALTY, LOCAL = 0.03, 0.01
 
 
 def rests_of(arm: Arm) -> list[tuple[ArmTrial, Array, Array, Array]]:

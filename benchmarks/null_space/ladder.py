@@ -18,6 +18,8 @@ from null_space.virtual_scores import CHAIN, calibrated, recorded, wished
 Array = np.ndarray
 #: Ordinary movement that is learned from, s, besides that between the held places.
 SECONDS = 22
+#: Rests that are visited in it.
+AGAIN = 16
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,6 +41,7 @@ class Person:
 
     `moved` are the frames of ordinary movement between the held places, and of 22 s
     more, by how they were made; `held`, `group` and `time` are those of held places.
+    `again` are true reaches between places of the ordinary movement, in another order.
     """
 
     virtual: Virtual
@@ -50,6 +53,8 @@ class Person:
     meant: Array
     reaches: dict[str, Seen]
     ends: list[tuple[int, int]]
+    again: Seen
+    again_ends: list[tuple[int, int]]
 
 
 def true(person: Virtual, q: Array) -> Seen:
@@ -112,7 +117,24 @@ def shown(seed: int) -> Person:
             "true": true(one, trials.postures["reaches"]),
         },
         trials.ends,
+        *once_more(one, trials.calm),
     )
+
+
+def once_more(person: Virtual, calm: Rests) -> tuple[Seen, list[tuple[int, int]]]:
+    """Reaches between rests of the ordinary movement, hands as there; first and last.
+
+    The order differs, and so does the scatter from rest to rest.
+    """
+    rng = np.random.default_rng([35, person.seed])
+    rows = slice(0, AGAIN)
+    off = rng.normal(scale=person.rest, size=AGAIN)
+    at = Rests(calm.wrist[rows], calm.distal[rows], off)
+    order = rng.permutation(AGAIN)
+    q, stops = reaching(person, at, order, 0.4)
+    rests = [np.flatnonzero(stops == k) for k in order]
+    ends = [(int(a[-1]), int(b[0])) for a, b in zip(rests[:-1], rests[1:], strict=True)]
+    return true(person, q), ends
 
 
 def joined(*parts: Seen) -> Seen:
@@ -161,6 +183,14 @@ def scored(
             NaturalPosture.of_people(), np.zeros((len(rows), 3)), *ends.T
         ).ends_
     c = (person.wishes[seen].swivel - of(person.wishes[seen]) - a) / (b - a)
-    reach = (person.reaches[seen].swivel - of(person.reaches[seen])) / (b - a)
-    change = [abs(reach[last] - reach[first]) for first, last in person.ends]
-    return wished(c, person.meant) | {"reach": float(np.nanmean(change))}
+
+    def change(at: Seen, ends: list[tuple[int, int]]) -> float:
+        read = (at.swivel - of(at)) / (b - a)
+        return float(
+            np.nanmean([abs(read[last] - read[first]) for first, last in ends])
+        )
+
+    return wished(c, person.meant) | {
+        "reach": change(person.reaches[seen], person.ends),
+        "again": change(person.again, person.again_ends),
+    }

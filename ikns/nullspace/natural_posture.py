@@ -167,7 +167,7 @@ class NaturalPosture(EstimatorBase):
         *,
         penalty: float = 0.03,
         guard: bool = True,
-        local_penalty: float | None = 0.002,
+        local_penalty: float | None = 0.01,
     ) -> None:
         self.penalty = penalty
         self.guard = guard
