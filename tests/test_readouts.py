@@ -23,7 +23,7 @@ from ikns.motion.motion import Motion
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.nullspace.map.smooth import SmoothField
 from ikns.nullspace.natural_posture import NaturalPosture
-from ikns.nullspace.readout import METHODS, IntentMap, readout_samples
+from ikns.nullspace.readout import METHODS, IntentMap, Readout, readout_samples
 from ikns.nullspace.readout.coordinates import (
     elbow_height_gradient,
     mean_orientation,
@@ -69,6 +69,25 @@ def test_intent_is_the_planted_share_of_the_range(seed, low, high):
     held = NaturalPosture.of_people().swivel(at) + meant
     c = intent.control_signal(held[:, None], at)
     assert np.allclose(c, np.linspace(0, 1, 5), atol=1e-9)
+
+
+def test_a_file_keeps_what_is_remembered_and_those_of_before_had_none():
+    wrist, swivel, groups = planted(2)
+    rng = np.random.default_rng(2)
+    moved = rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), (300, 3))
+    natural = NaturalPosture.of_people().swivel(moved) + 0.1 * np.sin(20 * moved[:, 0])
+    made = IntentMap(8).fit(
+        wrist, swivel, groups=groups, natural_X=moved, natural_y=natural
+    )
+    assert np.abs(made.natural_.heights_).max() > 0.01
+    table = Readout("intent", "right_arm", made).table()
+    again = Readout.from_table(table).map
+    assert np.array_equal(again.natural_.swivel(moved), made.natural_.swivel(moved))
+    for name in ("places_m", "heights_rad"):
+        del table["natural_posture"][name]
+    before = Readout.from_table(table).map.natural_
+    smooth = NaturalPosture(local_penalty=None).fit(moved, natural)
+    assert np.allclose(before.swivel(moved), smooth.swivel(moved), atol=1e-12)
 
 
 def test_a_full_turn_is_no_change():
