@@ -46,7 +46,7 @@ LADDER: dict[str, tuple[str, str, bool]] = {
     "best quadratic of the wrist, true ends": ("true", "wrist", True),
     "natural posture known, tracked": ("tracked", "wrist and hand", False),
     "natural posture known, true angles and ends": ("true", "wrist and hand", True),
-    "rough field known too": ("true", "all of it", True),
+    "all known but the scatter from rest to rest": ("true", "all of it", True),
 }
 
 

@@ -271,9 +271,10 @@ class NaturalPosture(EstimatorBase):
         self.people_, self.coefficients_ = others, others + own
         self.offset_ = float((phi @ own).mean())
         left = beyond - phi @ own
-        self.places_, self.heights_ = (
-            (w[:0], s[:0]) if near is None else fit_local(w, left, near)
-        )
+        places, heights = w[:0], s[:0]
+        if near is not None:
+            places, heights = fit_local(w, left, near)
+        self.places_, self.heights_ = places, heights
         left = left - nearness(w, self.places_) @ self.heights_
         low, high = np.quantile(w, [0.01, 0.99], axis=0)
         self.coverage_: dict[str, Any] = {
