@@ -28,7 +28,8 @@ def old(files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_control_says_what_a_subject_has(files, old, tmp_path, capsys):
-    for folder, known in ((files / "person", 3), (old, 1)):
+    advice = "; its calibration recommends intent"
+    for folder, known, more in ((files / "person", 3, advice), (old, 1, "")):
         argv = ["control", "--subject", str(folder), str(files / "free.c3d")]
         out = tmp_path / f"{folder.name}.csv"
         assert main([*argv, "--out", str(out), "--json"]) == 0
@@ -36,7 +37,7 @@ def test_control_says_what_a_subject_has(files, old, tmp_path, capsys):
         assert json.loads(capsys.readouterr().out)["methods"] == names
         assert main([*argv, "--out", str(out), "--force"]) == 0
         text = " ".join(capsys.readouterr().out.split())
-        assert f"this subject has {', '.join(names)}." in text
+        assert f"this subject has {', '.join(names)}{more}." in text
 
 
 @pytest.mark.parametrize("command", ["control", "compare", "view"])

@@ -49,7 +49,7 @@ def judge_quality(
                 names,
             )
         )
-    seen = np.isfinite(markers).all(axis=2)
+    seen = np.all(np.isfinite(markers), axis=2)
     worn = seen.any(axis=0)
     missing = 1 - float(seen[:, worn].mean()) if worn.any() else 0.0
     if missing > _MISSING:
