@@ -12,6 +12,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -56,6 +57,10 @@ def recordings(
             marker_set="ue_adl",
             min_duration=0.3,
         )
+        # The plain solver knows no free turns; tests/test_free_turn.py has them.
+        worn = skeleton.marker_set
+        rigid = tuple(replace(marker, free_turn=False) for marker in worn.markers)
+        skeleton = skeleton.with_markers(replace(worn, markers=rigid))
         for task, side in product(TASKS, "LR"):
             trial = folder / f"{name}{task}{side}1.csv"
             yield trial.stem, skeleton, read(trial)
@@ -111,9 +116,10 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="every 200th frame")
     parser.add_argument("--data", type=Path, default=BESIDE)
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--every", type=int, default=1, help="of so many frames one")
     options = parser.parse_args()
     data = options.data if options.data.is_dir() else None
-    every, seeds = (200, 1) if options.quick else (1, options.seeds)
+    every, seeds = (200, 1) if options.quick else (options.every, options.seeds)
     print(
         f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, "
         f"Python {platform.python_version()}, numpy {np.__version__}, "

@@ -12,16 +12,23 @@ from hypothesis import strategies as st
 from marker_ik_oracle import PlainMarkerIK
 from scipy.spatial.transform import Rotation
 
-from ikns._kernels.body.normal_equations import MOMENTS, linearize
+from ikns._kernels.body.articulated import (
+    INERTIA,
+    MOMENTS,
+    ROW,
+    factor,
+    slope,
+    solve,
+    write_inertia,
+)
 from ikns._kernels.body.rigid import rigid_pose
+from ikns._kernels.body.sine_cosine import sine_cosine
 from ikns._kernels.body.step import displacement, integrate
 from ikns._kernels.body.tree import joint_axes, place_joints
-from ikns._kernels.body.tree_cholesky import factor, solve
 from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.model import joint_tree
 from ikns.calibration.scaling import scale
 from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
-from ikns.motion.marker_ik.kernel import tree_paths
 from ikns.motion.marker_ik.pose import SolvedFrames
 from ikns.numerics.rigid import rigid_transform
 from ikns.recording.files import read
@@ -49,43 +56,55 @@ def branched_model(seed):
     return model
 
 
-def linearized(model, q, joint, position, weight, target):
-    """Gradient, Gauss-Newton Hessian and curvature as full matrices."""
+def newton(model, q, joint, position, weight, target, share, extra, free, b):
+    """The gradient, and H^-1 b and the joints' twists at these rates, or None."""
     tree, turned = joint_tree(model)
-    path, depth = tree_paths(tree)
     J, n = len(tree.kind), model.nv
     rotation, translation = np.empty((J, 3, 3)), np.empty((J, 3))
-    axes = np.empty((n, 6))
+    axes, wrench, gradient = np.empty((n, 6)), np.empty((J, 6)), np.empty(n)
+    A, rows, twist = np.empty((J, INERTIA)), np.empty((n, ROW)), np.empty((J, 6))
     place_joints(tree, q, rotation, translation)
     joint_axes(tree, rotation, translation, axes)
     local = np.einsum("mji,mj->mi", turned[joint], position)
     x = np.einsum("mij,mj->mi", rotation[joint], local) + translation[joint]
-    gradient, hessian, curvature = (
-        np.empty(n),
-        np.zeros(path.shape),
-        np.zeros(path.shape),
-    )
-    linearize(
-        tree, path, depth, axes, joint, weight, x, x - target,
-        np.empty((J, MOMENTS)), np.empty((n, 9)), gradient, hessian, curvature,
-    )  # fmt: skip
-    full = np.zeros((2, n, n))
-    for d in range(n):
-        for a in range(depth[d] + 1):
-            i = path[d, a]
-            full[:, d, i] = full[:, i, d] = hessian[d, a], curvature[d, a]
-    return gradient, *full
+    r = x - target
+    slope(tree, joint, axes, weight, x, r, wrench, gradient)
+    write_inertia(joint, weight, x, r, share, np.empty((J, MOMENTS)), A)
+    if not factor(tree, axes, wrench, share, free, extra, A, rows):
+        return gradient, None, None
+    found = b.copy()
+    solve(tree, rows, twist, found)
+    return gradient, found, twist
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_slopes_are_those_of_finite_differences(seed):
-    model, rng = branched_model(seed), np.random.default_rng(seed)
-    data = model.createData()
+def any_frame(model, seed):
+    """Markers anywhere on any joints, and where they were seen."""
+    rng = np.random.default_rng(seed)
     joint = rng.integers(0, model.njoints - 1, 12)
     position, weight = rng.normal(0, 0.2, (12, 3)), rng.uniform(0, 2, 12)
     weight[3] = 0.0
     target = rng.normal(0, 0.5, (12, 3))
     q = pin.integrate(model, pin.neutral(model), rng.normal(0, 0.7, model.nv))
+    return q, joint, position, weight, target
+
+
+def marker_jacobian(model, q, joint, position):
+    """Markers (M, 3) and their Jacobian (M, 3, n), by Pinocchio."""
+    data = model.createData()
+    pin.computeJointJacobians(model, data, q)
+    x, jacobian = np.empty((len(joint), 3)), np.empty((len(joint), 3, model.nv))
+    for m, (j, place) in enumerate(zip(joint.tolist(), position, strict=True)):
+        x[m] = data.oMi[j + 1].act(place)
+        twists = pin.getJointJacobian(model, data, j + 1, pin.WORLD)
+        jacobian[m] = twists[:3] + np.cross(twists[3:].T, x[m]).T
+    return x, jacobian
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_newtons_equations_are_those_of_finite_differences(seed):
+    model = branched_model(seed)
+    data, n = model.createData(), model.nv
+    q, joint, position, weight, target = any_frame(model, seed)
 
     def half_cost(step):
         pin.forwardKinematics(model, data, pin.integrate(model, q, step))
@@ -95,15 +114,9 @@ def test_slopes_are_those_of_finite_differences(seed):
         ]
         return 0.5 * weight @ ((np.array(x) - target) ** 2).sum(axis=1)
 
-    gradient, gauss_newton, curvature = linearized(
-        model, q, joint, position, weight, target
-    )
-    h, e = 1e-4, np.eye(model.nv)
-    slope = [(half_cost(h * d) - half_cost(-h * d)) / (2 * h) for d in e]
-    # Central differences: h^2 = 1e-8 times third derivatives of the order of the cost's
-    # scale (10), rounding 1e-15 / h.
-    np.testing.assert_allclose(gradient, slope, atol=1e-6)
-    second = np.empty((model.nv, model.nv))
+    h, e = 1e-4, np.eye(n)
+    slopes = [(half_cost(h * d) - half_cost(-h * d)) / (2 * h) for d in e]
+    second = np.empty((n, n))
     for i, a in enumerate(e):
         for j, b in enumerate(e):
             second[i, j] = (
@@ -112,74 +125,69 @@ def test_slopes_are_those_of_finite_differences(seed):
                 - half_cost(h * (b - a))
                 + half_cost(-h * (a + b))
             ) / (4 * h * h)
-    # As above, rounding 1e-15 / h^2 = 1e-7 times the cost.
-    np.testing.assert_allclose(gauss_newton + curvature, second, atol=1e-5)
-
-
-def test_gauss_newton_is_the_square_of_the_jacobian():
-    skeleton = Skeleton.load()
-    rng = np.random.default_rng(0)
-    q = skeleton.integrate(skeleton.neutral(), rng.normal(0, 0.5, skeleton.nv))
-    positions, jacobian = skeleton.marker_jacobian(q)
-    weight = rng.uniform(0.5, 2, len(positions))
-    error = rng.normal(0, 0.01, positions.shape)
-    tree, (joint, local) = skeleton.tree, skeleton.tree_markers
-    path, depth = tree_paths(tree)
-    J, n = len(tree.kind), skeleton.nv
-    rotation, translation = np.empty((J, 3, 3)), np.empty((J, 3))
-    axes, gradient = np.empty((n, 6)), np.empty(n)
-    hessian, curvature = np.zeros(path.shape), np.zeros(path.shape)
-    place_joints(tree, q, rotation, translation)
-    joint_axes(tree, rotation, translation, axes)
-    x = np.einsum("mij,mj->mi", rotation[joint], local) + translation[joint]
-    # Sums of a few dozen products of order one.
-    np.testing.assert_allclose(x, positions, atol=1e-14)
-    linearize(
-        tree, path, depth, axes, joint, weight, x, error,
-        np.empty((J, MOMENTS)), np.empty((n, 9)), gradient, hessian, curvature,
-    )  # fmt: skip
-    J_weighted = (np.sqrt(weight)[:, None, None] * jacobian).reshape(-1, n)
-    expected = J_weighted.T @ J_weighted
-    for d in range(n):
-        row = path[d, : depth[d] + 1]
-        np.testing.assert_allclose(hessian[d, : len(row)], expected[d, row], atol=1e-13)
-    flat = (weight[:, None] * error).ravel()
-    np.testing.assert_allclose(gradient, jacobian.reshape(-1, n).T @ flat, atol=1e-13)
+    # Far from a minimum the Hessian is indefinite: add so much that it no longer is.
+    extra = np.full(n, 1.0 - min(np.linalg.eigvalsh(second)[0], 0.0))
+    frame = model, q, joint, position, weight, target, 1.0, extra, np.ones(n)
+    inverse = np.empty((n, n))
+    for j, b in enumerate(e):
+        gradient, inverse[:, j], _ = newton(*frame, b)
+    # Central differences: h^2 = 1e-8 times third derivatives of the order of the cost's
+    # scale (10), rounding 1e-15 / h.
+    np.testing.assert_allclose(gradient, slopes, atol=1e-6)
+    # As above, rounding 1e-15 / h^2 = 1e-7 times the cost: 1e-5 for each entry.
+    rest = (second + np.diag(extra)) @ inverse - np.eye(n)
+    assert np.abs(rest).max() < 1e-5 * np.abs(inverse).sum(axis=0).max()
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_tree_cholesky_solves_what_numpy_solves(seed):
-    tree, _ = joint_tree(branched_model(seed))
-    path, depth = tree_paths(tree)
-    rng, n = np.random.default_rng(seed), len(depth)
-    carries = np.zeros((n, n), dtype=bool)
-    for d in range(n):
-        carries[d, path[d, : depth[d] + 1]] = True
-    # L' L with the tree's zeros has them too.
-    L = np.where(carries, rng.normal(size=(n, n)), 0) + 2 * np.eye(n)
-    H = L.T @ L
-    assert not H[~(carries | carries.T)].any()
-    rows = np.zeros(path.shape)
-    for d in range(n):
-        rows[d, : depth[d] + 1] = H[d, path[d, : depth[d] + 1]]
-    b = rng.normal(size=n)
-    x = b.copy()
-    assert factor(rows, path, depth)
-    solve(rows, path, depth, x)
-    # Rounding times the condition number.
+def test_gauss_newtons_equations_are_solved_as_numpy_solves_them(seed):
+    model, rng = branched_model(seed), np.random.default_rng(seed)
+    n = model.nv
+    q, joint, position, weight, target = any_frame(model, seed)
+    x, jacobian = marker_jacobian(model, q, joint, position)
+    extra, b, free = rng.uniform(0.1, 1, n), rng.normal(size=n), np.ones(n)
+    free[rng.integers(n, size=3)] = 0.0
+    gradient, found, twist = newton(
+        model, q, joint, position, weight, target, 0.0, extra, free, b
+    )
+    flat = jacobian.reshape(-1, n)
+    each = np.repeat(weight, 3)
+    # Sums of a few dozen products of order one.
     np.testing.assert_allclose(
-        x, np.linalg.solve(H, b), atol=1e-15 * np.linalg.cond(H) * np.abs(x).max()
+        gradient, flat.T @ (each * (x - target).ravel()), atol=1e-13
+    )
+    own = free > 0
+    H = ((flat.T * each) @ flat + np.diag(extra))[np.ix_(own, own)]
+    expected = np.zeros(n)
+    expected[own] = np.linalg.solve(H, b[own])
+    # Rounding times the condition number.
+    close = 1e-15 * np.linalg.cond(H) * np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, atol=close)
+    moves = twist[joint, :3] + np.cross(twist[joint, 3:], x)
+    np.testing.assert_allclose(moves, jacobian @ expected, atol=10 * close)
+
+
+@pytest.mark.parametrize("bad", [-100.0, np.nan])
+def test_what_is_not_positive_definite_is_refused(bad):
+    model = branched_model(0)
+    frame, n = any_frame(model, 0), model.nv
+    extra, one = np.ones(n), np.ones(n)
+    assert newton(model, *frame, 0.0, extra, one, one)[1] is not None
+    # The markers' part of the diagonal is below 24 m^2 (weights up to 2, within 1 m).
+    extra[5] = bad
+    assert newton(model, *frame, 0.0, extra, one, one)[1] is None
+
+
+@given(st.floats(-1e7, 1e7) | st.floats(-7, 7))
+def test_sine_and_cosine_are_numpys(angle):
+    # One unit in the last place of numbers up to 1, and numpy's own rounding.
+    np.testing.assert_allclose(
+        sine_cosine(angle), (np.sin(angle), np.cos(angle)), rtol=0, atol=3.4e-16
     )
 
 
-@pytest.mark.parametrize("bad", [-1.0, 0.0, np.nan])
-def test_what_is_not_positive_definite_is_refused(bad):
-    tree, _ = joint_tree(branched_model(0))
-    path, depth = tree_paths(tree)
-    rows = np.zeros(path.shape)
-    rows[np.arange(len(depth)), depth] = 1.0
-    rows[5, depth[5]] = bad
-    assert not factor(rows, path, depth)
+def test_sine_and_cosine_of_what_is_no_angle_are_nan():
+    assert np.isnan([sine_cosine(np.nan), sine_cosine(np.inf)]).all()
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 9.9e-3, 1.01e-2, 1.0, 3.1])

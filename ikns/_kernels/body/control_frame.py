@@ -19,7 +19,7 @@ from ikns._kernels.body.frame_constants import (
     IntentNumbers,
     unpack_constants,
 )
-from ikns._kernels.body.frame_sequence import FrameMemory, follow_frame
+from ikns._kernels.body.frame_sequence import cut_memory, follow_frame
 from ikns._kernels.body.intent_gradient import intent_gradient
 from ikns._kernels.body.intent_signal import intent_signal
 from ikns._kernels.body.marker_errors import take_markers
@@ -48,7 +48,7 @@ def control_frame(
     markers: Array,
     dt: float,
     from_scratch: bool,
-    memory: FrameMemory,
+    memory: Array,
     seen_before: Array,
     q: Array,
     work: Array,
@@ -96,12 +96,13 @@ def control_frame(
     constants = unpack_constants(whole_constants, real_constants)
     gate, control_map = constants.gate, constants.control_map
     figures, passed = np.empty((2, 3)), np.empty(2, dtype=np.bool_)
+    known = cut_memory(memory, len(passed))
     residual, iterations, converged = follow_frame(
         problem,
         s,
         gate,
         markers,
-        memory,
+        known,
         from_scratch,
         q,
         figures[0],
@@ -193,7 +194,7 @@ def _read_pose(
     hidden = note_markers(problem, s, dt, believed, segments, seen_before)
     if not posed:
         return NOT_FINITE
-    spread = np.empty((2, len(problem.depth)))
+    spread = np.empty((2, len(problem.free)))
     solvable = factor_information(problem, s, q, segments, seen_before, spread)
     status = _weights(control_map, place, cavity_work, weights)
     for k in range(len(c)):

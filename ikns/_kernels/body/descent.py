@@ -8,15 +8,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from ikns._kernels.body.articulated import (
+    diagonal,
+    factor,
+    slope,
+    solve,
+    write_inertia,
+)
 from ikns._kernels.body.free_turn import release_clusters
 from ikns._kernels.body.marker_errors import add_penalties, marker_errors, penalties
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
-from ikns._kernels.body.normal_equations import linearize
 from ikns._kernels.body.step import integrate
 from ikns._kernels.body.tree import joint_axes
-from ikns._kernels.body.tree_cholesky import factor, solve
-from ikns._kernels.compiled import compiled, inner
-from ikns.arrays import Array, Indices
+from ikns._kernels.compiled import borrowing, inner_borrowing
+from ikns.arrays import Array
 
 #: The step after one with the true Hessian is about its square times the rate at which
 #: the Hessian changes, up to 50 per radian where markers barely determine a joint. So
@@ -24,14 +29,14 @@ from ikns.arrays import Array, Indices
 _NEWTON = 0.03
 
 
-@inner
+@inner_borrowing
 def copy(source: Array, into: Array) -> None:
     """Copy an array (n,) into another."""
     for i in range(len(into)):
         into[i] = source[i]
 
 
-@inner
+@inner_borrowing
 def errors_at(problem: MarkerProblem, s: Scratch, q: Array) -> tuple[float, float]:
     """Write joints, markers and errors at `q` into `s`; return their squared sums.
 
@@ -55,21 +60,25 @@ def errors_at(problem: MarkerProblem, s: Scratch, q: Array) -> tuple[float, floa
     )
 
 
-@inner
+@inner_borrowing
 def descend(
     problem: MarkerProblem, n_seen: int, pull: float, s: Scratch
 ) -> tuple[float, int, bool]:
-    """Levenberg-Marquardt from `s.q`, pulled to `s.start`; the result is in `s.q`."""
-    tolerance = problem.tolerance
+    """Levenberg-Marquardt from `s.q`, pulled to `s.start`; the result is in `s.q`.
+
+    Errors in `s` are those of the result.
+    """
+    tree, carrier, tolerance = problem.tree, problem.marker_carrier, problem.tolerance
     enough = max(tolerance, _NEWTON * np.sqrt(tolerance))
     cost = distance = np.inf
-    damping, iterations = 1e-8, -1
-    definite = true_hessian = converged = False
+    damping, iterations = 0.0, -1
+    definite = true_hessian = True
+    converged = back = False
     copy(s.q, s.trial)
     while True:
         # Written out, as passing `problem` and `s` on would take 5 % longer.
         trial_cost, trial_distance = marker_errors(
-            problem.tree,
+            tree,
             problem.marker_joint,
             problem.marker_turn,
             problem.turn_joint,
@@ -85,7 +94,7 @@ def descend(
             s.turned,
         )
         trial_cost += penalties(
-            problem.tree,
+            tree,
             problem.angle,
             problem.lower,
             problem.upper,
@@ -96,14 +105,16 @@ def descend(
             s.moved,
             s.beyond,
         )
-        iterations += 1
-        if trial_cost <= cost:
+        if not back:
+            iterations += 1
+            if trial_cost > cost:
+                # Once more where it came from, for its errors.
+                back = True
+                copy(s.q, s.trial)
+                continue
             cost, distance = trial_cost, trial_distance
             copy(s.trial, s.q)
-            if iterations > 0:
-                damping = max(damping / 10, 1e-12)
-            if not converged and iterations < problem.max_iterations:
-                linearize_at(problem, s, pull)
+            damping = damping / 10 if damping > 1e-6 else 0.0
             definite = true_hessian = True
         elif true_hessian:
             true_hessian = False
@@ -111,112 +122,69 @@ def descend(
             damping = max(10 * damping, 1e-6)
         if converged or iterations >= problem.max_iterations:
             return np.sqrt(distance / n_seen), iterations, converged
-        solvable = False
-        while not solvable:
-            solvable = _step(
-                problem.path,
-                problem.depth,
+        if not back:
+            joint_axes(tree, s.rotation, s.translation, s.axes)
+            slope(tree, carrier, s.axes, s.weight, s.x, s.error, s.wrench, s.gradient)
+            add_penalties(
+                problem.free,
+                pull,
+                problem.limit,
+                s.moved,
+                s.beyond,
                 s.gradient,
-                s.hessian,
-                s.curvature,
-                1.0 if true_hessian else 0.0,
-                damping,
-                s.factored,
-                s.step,
+                s.extra,
+            )
+        back = solvable = False
+        while not solvable:
+            share = 1.0 if true_hessian else 0.0
+            copy(s.extra, s.damped)
+            if damping > 0:
+                # In proportion to the diagonal (More), so that meters and radians are
+                # treated alike.
+                write_inertia(
+                    carrier, s.weight, s.x, s.error, 0.0, s.moments, s.inertia
+                )
+                diagonal(tree, s.axes, s.moments, s.damped)
+                for d in range(len(s.damped)):
+                    s.damped[d] = s.extra[d] + damping * (s.extra[d] + s.damped[d])
+            write_inertia(carrier, s.weight, s.x, s.error, share, s.moments, s.inertia)
+            release_clusters(
+                tree,
+                s.axes,
+                problem.turn_joint,
+                problem.marker_turn,
+                s.weight,
+                s.x,
+                s.error,
+                share,
+                s.inertia,
+            )
+            solvable = factor(
+                tree,
+                s.axes,
+                s.wrench,
+                share,
+                problem.free,
+                s.damped,
+                s.inertia,
+                s.rows,
             )
             if not solvable and true_hessian:
                 definite = true_hessian = False
             elif not solvable:
                 damping = max(10 * damping, 1e-6)
+        for d in range(len(s.step)):
+            s.step[d] = -s.gradient[d]
+        solve(tree, s.rows, s.twist, s.step)
         largest = _largest(s.step)
-        integrate(problem.tree, s.q, s.step, s.trial)
+        integrate(tree, s.q, s.step, s.trial)
         # Without the true Hessian a small step proves less, unless there is no other.
         converged = largest < (enough if true_hessian else tolerance)
         if definite and not true_hessian:
             converged = converged and damping > 1e-3
 
 
-@inner
-def linearize_at(problem: MarkerProblem, s: Scratch, pull: float) -> None:
-    """Write gradient, Hessian and curvature where the errors were taken last.
-
-    Axes of joints are written too; penalties are those of ``s.moved`` and ``s.beyond``.
-    """
-    joint_axes(problem.tree, s.rotation, s.translation, s.axes)
-    linearize(
-        problem.tree,
-        problem.path,
-        problem.depth,
-        s.axes,
-        problem.marker_carrier,
-        s.weight,
-        s.x,
-        s.error,
-        s.moments,
-        s.forces,
-        s.gradient,
-        s.hessian,
-        s.curvature,
-    )
-    release_clusters(
-        problem.tree,
-        problem.path,
-        problem.depth,
-        s.axes,
-        problem.turn_joint,
-        problem.marker_turn,
-        s.weight,
-        s.x,
-        s.error,
-        s.forces,
-        s.hessian,
-        s.curvature,
-    )
-    add_penalties(
-        problem.path,
-        problem.depth,
-        problem.free,
-        pull,
-        problem.limit,
-        s.moved,
-        s.beyond,
-        s.gradient,
-        s.hessian,
-        s.curvature,
-    )
-
-
-@compiled
-def _step(
-    path: Indices,
-    depth: Indices,
-    gradient: Array,
-    hessian: Array,
-    curvature: Array,
-    share: float,
-    damping: float,
-    factored: Array,
-    step: Array,
-) -> bool:
-    """Write the damped step; False where its matrix is not positive definite.
-
-    `share` of the curvature is used: 1 for the true Hessian, 0 for Gauss-Newton's.
-    """
-    for d in range(len(depth)):
-        last = depth[d]
-        for a in range(last + 1):
-            factored[d, a] = hessian[d, a] + share * curvature[d, a]
-        # Damping in proportion to the diagonal (More), so that meters and radians are
-        # treated alike.
-        factored[d, last] += damping * hessian[d, last] + 1e-14
-        step[d] = -gradient[d]
-    if not factor(factored, path, depth):
-        return False
-    solve(factored, path, depth, step)
-    return True
-
-
-@compiled
+@borrowing
 def _largest(step: Array) -> float:
     """Limit a step to one radian or meter, beyond which the model is not valid."""
     largest = 0.0

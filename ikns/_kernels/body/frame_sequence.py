@@ -13,10 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ikns._kernels.body.descent import copy, errors_at
-from ikns._kernels.body.marker_gate import MarkerGate, fits, gate_figures
+from ikns._kernels.body.marker_gate import (
+    MarkerGate,
+    fits,
+    gate_figures,
+    unpack_gate,
+)
 from ikns._kernels.body.marker_ik import far_cost, solve_frame
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
-from ikns._kernels.compiled import compiled, inner
+from ikns._kernels.compiled import borrowing, compiled, inner_borrowing
 from ikns.arrays import Array, Indices, Mask
 
 #: Suspicious: so many times the usual root mean square error, which is of this size at
@@ -42,19 +47,28 @@ class FrameMemory(NamedTuple):
     start: Array  # (nq,) where the next frame starts
 
 
-def new_memory(nq: int, limbs: int) -> FrameMemory:
-    """Return the memory before a first frame."""
-    numbers = np.zeros(_AGE + limbs)
-    numbers[_COST] = np.nan
-    numbers[_AGE:] = np.inf
-    return FrameMemory(numbers, np.zeros(nq), np.zeros(nq))
+def new_memory(nq: int, limbs: int) -> Array:
+    """Return the memory before a first frame, as one array; it ends with the start."""
+    memory = np.zeros(_AGE + limbs + 2 * nq)
+    memory[_COST] = np.nan
+    memory[_AGE : _AGE + limbs] = np.inf
+    return memory
+
+
+@compiled
+def cut_memory(memory: Array, limbs: int) -> FrameMemory:
+    """Divide it."""
+    good = _AGE + limbs
+    start = (good + len(memory)) // 2
+    return FrameMemory(memory[:good], memory[good:start], memory[start:])
 
 
 @compiled
 def solve_frames(
     whole: Indices,
     real: Array,
-    gate: MarkerGate,
+    whole_gate: Indices,
+    real_gate: Array,
     markers: Array,
     first: int,
     last: int,
@@ -62,7 +76,7 @@ def solve_frames(
     before: Array,
     from_scratch: bool,
     patience: int,
-    memory: FrameMemory,
+    memory: Array,
     work: Array,
     q: Array,
     residual: Array,
@@ -73,11 +87,12 @@ def solve_frames(
     """Solve frames from `first` to before `last`, `way` (1 or -1) one after the other.
 
     `whole` and `real` are a packed
-    :class:`ikns._kernels.body.marker_problem.MarkerProblem`, `markers` (T, M, 3) in the
+    :class:`ikns._kernels.body.marker_problem.MarkerProblem`, the next two a packed
+    :class:`ikns._kernels.body.marker_gate.MarkerGate`, `markers` (T, M, 3) in the
     world, m, NaN where not seen; `before` (nq,) is the pose before the first frame,
     unless it is solved `from_scratch`. Later frames start from the previous one, or
     after frames that do not fit from the last that did, if no more than `patience`
-    frames passed. `work` is scratch of
+    frames passed. `memory` is that of :func:`new_memory`, and `work` scratch of
     :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
 
     Written are the solutions `q` (T, nq), the previous pose where no marker is seen,
@@ -88,26 +103,28 @@ def solve_frames(
     """
     problem = unpack(whole, real)
     s = cut(problem, work)
+    gate = unpack_gate(whole_gate, real_gate)
+    known = cut_memory(memory, passed.shape[1])
     groups = 1 + passed.shape[1]
     worst, intermarker = np.empty(groups), np.empty(groups)
-    copy(before, memory.start)
+    copy(before, known.start)
     for i in range(first, last, way):
         residual[i], iterations[i], converged[i] = follow_frame(
             problem,
             s,
             gate,
             markers[i],
-            memory,
+            known,
             from_scratch and i == first,
             q[i],
             worst,
             intermarker,
             passed[i],
         )
-        _remember(problem, memory, passed[i], q[i], patience)
+        _remember(problem, known, passed[i], q[i], patience)
 
 
-@inner
+@inner_borrowing
 def follow_frame(
     problem: MarkerProblem,
     s: Scratch,
@@ -131,7 +148,7 @@ def follow_frame(
     residual, iterations, converged = solve_frame(
         problem, s, markers, memory.start, from_scratch, loose, q
     )
-    gate_figures(problem, s, gate, markers, q, worst, intermarker)
+    gate_figures(s, gate, markers, worst, intermarker)
     fit = fits(gate, residual, worst, intermarker, passed)
     if not np.isfinite(residual):
         return residual, iterations, converged
@@ -152,7 +169,7 @@ def follow_frame(
         other = again[0] ** 2 + far_cost(problem, q) / n_seen
         if other < better * cost:
             residual, iterations, converged = again
-            gate_figures(problem, s, gate, markers, q, worst, intermarker)
+            gate_figures(s, gate, markers, worst, intermarker)
             fits(gate, residual, worst, intermarker, passed)
             memory.numbers[_WAIT] = 0.0
         else:
@@ -161,7 +178,7 @@ def follow_frame(
     return residual, iterations, converged
 
 
-@compiled
+@borrowing
 def _due(memory: FrameMemory, fit: bool, beyond: float, cost: float) -> bool:
     """Whether a pose is suspicious, and its turn has come to be compared."""
     known = memory.numbers
@@ -181,7 +198,7 @@ def _due(memory: FrameMemory, fit: bool, beyond: float, cost: float) -> bool:
     return True
 
 
-@compiled
+@borrowing
 def _remember(
     problem: MarkerProblem, memory: FrameMemory, passed: Mask, q: Array, patience: int
 ) -> None:

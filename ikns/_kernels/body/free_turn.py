@@ -16,11 +16,11 @@ from __future__ import annotations
 import numpy as np
 
 from ikns._kernels.body.tree import Tree
-from ikns._kernels.compiled import inner
+from ikns._kernels.compiled import inner_borrowing
 from ikns.arrays import Array, Indices
 
 
-@inner
+@inner_borrowing
 def turn_clusters(
     turn_joint: Indices,
     marker_turn: Indices,
@@ -59,33 +59,28 @@ def turn_clusters(
                 turned[m, 2] = position[m, 2]
 
 
-@inner
+@inner_borrowing
 def release_clusters(
     tree: Tree,
-    path: Indices,
-    depth: Indices,
     axes: Array,
     turn_joint: Indices,
     marker_turn: Indices,
     weight: Array,
     x: Array,
     r: Array,
-    row: Array,
-    hessian: Array,
-    curvature: Array,
+    share: float,
+    inertia: Array,
 ) -> None:
-    """Take the clusters' angles out of Gauss-Newton Hessian and curvature, (n, D).
+    """Take the clusters' angles out of A, (J, 21), of the joints before.
 
-    They hold the clusters' markers as carried by the joint before, turned as above;
-    see :mod:`ikns._kernels.body.normal_equations` for the rest. `row` (n, 2 or more) is
-    scratch.
+    That holds the clusters' markers as carried by the joint before, turned as above;
+    see :mod:`ikns._kernels.body.articulated`, also for `share`.
     """
     for k in range(len(turn_joint)):
-        d = tree.first_v[turn_joint[k]]
-        before = tree.dof_parent[d]
-        f0 = f1 = f2 = t0 = t1 = t2 = g0 = g1 = g2 = 0.0
+        d, before = tree.first_v[turn_joint[k]], tree.parent[turn_joint[k]]
         v0, v1, v2 = axes[d, 0], axes[d, 1], axes[d, 2]
         w0, w1, w2 = axes[d, 3], axes[d, 4], axes[d, 5]
+        f0 = f1 = f2 = t0 = t1 = t2 = g0 = g1 = g2 = 0.0
         for m in range(len(weight)):
             w = weight[m]
             if marker_turn[m] != k or w == 0:
@@ -107,14 +102,10 @@ def release_clusters(
         # from a minimum the true curvature may vanish.
         if before < 0 or not own > 0 or not bent > 1e-3 * own:
             continue
-        for a in range(depth[before] + 1):
-            i = path[before, a]
-            row[i, 0] = axes[i, 0] * f0 + axes[i, 1] * f1 + axes[i, 2] * f2
-            row[i, 0] += axes[i, 3] * t0 + axes[i, 4] * t1 + axes[i, 5] * t2
-            row[i, 1] = axes[i, 3] * g0 + axes[i, 4] * g1 + axes[i, 5] * g2
-            for b in range(a + 1):
-                e = path[before, b]
-                gauss_newton = row[i, 0] * row[e, 0] / own
-                true = (row[i, 0] + row[i, 1]) * (row[e, 0] + row[e, 1]) / bent
-                hessian[i, b] -= gauss_newton
-                curvature[i, b] -= true - gauss_newton
+        pivot = own + share * (bent - own)
+        t0, t1, t2 = t0 + share * g0, t1 + share * g1, t2 + share * g2
+        u, i = (f0, f1, f2, t0, t1, t2), 0
+        for a in range(6):
+            for b in range(a, 6):
+                inertia[before, i] -= u[a] * u[b] / pivot
+                i += 1

@@ -7,11 +7,11 @@ import numpy as np
 from ikns._kernels.body.free_turn import turn_clusters
 from ikns._kernels.body.step import displacement
 from ikns._kernels.body.tree import Tree, place_joints
-from ikns._kernels.compiled import inner
+from ikns._kernels.compiled import inner_borrowing
 from ikns.arrays import Array, Indices
 
 
-@inner
+@inner_borrowing
 def take_markers(
     given: Array, seen: Array, weight: Array, target: Array
 ) -> tuple[int, bool]:
@@ -33,7 +33,7 @@ def take_markers(
     return n_seen, infinite
 
 
-@inner
+@inner_borrowing
 def marker_errors(
     tree: Tree,
     joint: Indices,
@@ -93,7 +93,7 @@ def marker_errors(
     return weighted, plain
 
 
-@inner
+@inner_borrowing
 def penalties(
     tree: Tree,
     angle: Indices,
@@ -118,30 +118,23 @@ def penalties(
     return cost
 
 
-@inner
+@inner_borrowing
 def add_penalties(
-    path: Indices,
-    depth: Indices,
     free: Array,
     pull: float,
     limit: float,
     moved: Array,
     beyond: Array,
     gradient: Array,
-    hessian: Array,
-    curvature: Array,
+    extra: Array,
 ) -> None:
-    """Add the penalties to gradient and Hessian, and remove held joints from both."""
-    for d in range(len(depth)):
-        last = depth[d]
+    """Add the penalties to the gradient (n,); write those of the Hessian's diagonal.
+
+    Held joints have no gradient.
+    """
+    for d in range(len(extra)):
         gradient[d] += pull**2 * moved[d] + limit**2 * beyond[d]
         gradient[d] *= free[d]
-        hessian[d, last] += pull**2
+        extra[d] = pull**2
         if beyond[d] != 0:
-            hessian[d, last] += limit**2
-        for a in range(last + 1):
-            both = free[d] * free[path[d, a]]
-            hessian[d, a] *= both
-            curvature[d, a] *= both
-        if free[d] == 0:
-            hessian[d, last] = 1.0
+            extra[d] += limit**2

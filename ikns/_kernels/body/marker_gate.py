@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.descent import errors_at
-from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
-from ikns._kernels.compiled import inner
+from ikns._kernels.body.marker_problem import Scratch
+from ikns._kernels.compiled import compiled, inner_borrowing
 from ikns.arrays import Array, Indices, Mask
 
 #: Entries of figures by group: the thorax, then the limbs.
@@ -30,22 +29,37 @@ class MarkerGate(NamedTuple):
     limits: Array  # (3,) residual, worst residual, intermarker error, m
 
 
-@inner
+def pack_gate(gate: MarkerGate) -> tuple[Indices, Array]:
+    """Pack a gate into integers and reals."""
+    return (
+        np.concatenate([gate.pair.ravel(), gate.pair_group, gate.group]),
+        np.concatenate([gate.limits, gate.apart]),
+    )
+
+
+@compiled
+def unpack_gate(whole: Indices, real: Array) -> MarkerGate:
+    """Unpack it."""
+    n = len(real) - 3
+    return MarkerGate(
+        whole[3 * n :], whole[: 2 * n].reshape(n, 2), real[3:], whole[2 * n : 3 * n],
+        real[:3],
+    )  # fmt: skip
+
+
+@inner_borrowing
 def gate_figures(
-    problem: MarkerProblem,
     s: Scratch,
     gate: MarkerGate,
     markers: Array,
-    q: Array,
     worst: Array,
     intermarker: Array,
 ) -> None:
-    """Write the figures of the current markers at `q` by group, (G,) m.
+    """Write the figures of markers whose errors are in `s` by group, (G,) m.
 
     The worst residual is NaN where no marker of the group is seen, the intermarker
     error 0 where no pair is.
     """
-    errors_at(problem, s, q)
     for g in range(len(worst)):
         worst[g], intermarker[g] = -1.0, 0.0
     for m in range(len(gate.group)):
@@ -69,7 +83,7 @@ def gate_figures(
             intermarker[g] = max(intermarker[g], error)
 
 
-@inner
+@inner_borrowing
 def fits(
     gate: MarkerGate, residual: float, worst: Array, intermarker: Array, passed: Mask
 ) -> bool:

@@ -5,9 +5,9 @@ Minimizes over the configuration q
     sum_m weight_m |x_m(q) - seen_m|^2 + (pull |q - before|)^2 + (limit |beyond|)^2
 
 by Levenberg-Marquardt (More 1978), with the true Hessian where that is positive
-definite: the curvature term is cheap here (see
-:mod:`ikns._kernels.body.normal_equations`), and where markers deviate from the body by
-centimeters Gauss-Newton needs many times as many steps.
+definite: the curvature term is cheap here (see :mod:`ikns._kernels.body.articulated`),
+and where markers deviate from the body by centimeters Gauss-Newton needs many times as
+many steps.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ikns._kernels.body.marker_errors import take_markers
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
 from ikns._kernels.body.rigid import rigid_pose
 from ikns._kernels.body.tree import FREE_FLYER
-from ikns._kernels.compiled import compiled, inner
+from ikns._kernels.compiled import borrowing, inner_borrowing
 from ikns.arrays import Array, Indices
 
 #: Iterations of a frame with an infinite marker, which is a fault and not a gap.
@@ -29,7 +29,7 @@ INFINITE = -1
 FAR = 0.26
 
 
-@compiled
+@borrowing
 def _finite(q: Array) -> bool:
     total = 0.0
     for i in range(len(q)):
@@ -37,7 +37,7 @@ def _finite(q: Array) -> bool:
     return total == 0
 
 
-@inner
+@inner_borrowing
 def solve_frame(
     problem: MarkerProblem,
     s: Scratch,
@@ -49,6 +49,7 @@ def solve_frame(
 ) -> tuple[float, int, bool]:
     """Write the solution of one frame, (nq,); return residual, iterations, converged.
 
+    Errors in `s` are those of the solution, if any marker is seen.
     `loose` pulls less to the previous pose, which may be some time ago.
 
     Round -1 descends from the previous pose. Without one, or where that fails, rounds
@@ -60,6 +61,7 @@ def solve_frame(
     best_residual, best_iterations, best_converged = np.inf, 0, False
     best_cost = np.inf
     if not _finite(before):
+        errors_at(problem, s, q)
         return best_residual, best_iterations, best_converged
     if n_seen == 0:
         return np.nan, INFINITE if infinite else 0, best_converged
@@ -85,23 +87,24 @@ def solve_frame(
             best_iterations, best_converged = iterations, converged
             copy(s.q, q)
         if k < 0 and residual <= problem.lost:
-            break
+            return residual, INFINITE if infinite else iterations, converged
         if 0 <= k < n_starts:
             copy(s.q, s.solved[k])
             errors_at(problem, s, s.q)
             s.residuals[k, 0] = cost
             _sum_by_limb(problem, s, s.q, s.residuals[k])
+    errors_at(problem, s, q)
     return best_residual, INFINITE if infinite else best_iterations, best_converged
 
 
-@inner
+@inner_borrowing
 def far_cost(problem: MarkerProblem, q: Array) -> float:
     """Return the cost of joints beyond their limits, m^2; 0 unless they are far."""
     cost = _beyond(problem, q, -1)
     return cost if cost > (problem.limit * FAR) ** 2 else 0.0
 
 
-@compiled
+@borrowing
 def _beyond(problem: MarkerProblem, q: Array, branch: int) -> float:
     """Return the cost of limits for one limb, or for all with -1, however small."""
     square = 0.0
@@ -114,7 +117,7 @@ def _beyond(problem: MarkerProblem, q: Array, branch: int) -> float:
     return problem.limit**2 * square
 
 
-@compiled
+@borrowing
 def _sum_by_limb(
     problem: MarkerProblem, s: Scratch, q: Array, residuals: Array
 ) -> None:
@@ -128,7 +131,7 @@ def _sum_by_limb(
                 residuals[1 + branch] += s.error[m, a] ** 2
 
 
-@compiled
+@borrowing
 def _join_limbs(branch: Indices, solved: Array, residuals: Array, start: Array) -> None:
     """Write the best solution, with each limb from the solution that fits it best."""
     best = 0

@@ -10,19 +10,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.normal_equations import MOMENTS
+from ikns._kernels.body.articulated import INERTIA, MOMENTS, ROW
 from ikns._kernels.body.tree import Tree
 from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array, Indices
+
+#: Reals of scratch memory for each joint, and for each rate.
+_OF_JOINT, _OF_RATE = 12 + MOMENTS + INERTIA + 12, 6 + ROW + 6
 
 
 class MarkerProblem(NamedTuple):
     """What does not change between frames: n rates, M markers, S starts.
 
-    `path` and `depth` are the degrees of freedom from the root to each one, and how
-    many precede it; see :mod:`ikns._kernels.body.tree_cholesky`. The best start is
-    chosen by limb, from 0 to ``n_branches - 1``. K clusters of markers turn about the
-    axis of a joint by an angle of their own; see :mod:`ikns._kernels.body.free_turn`.
+    The best start is chosen by limb, from 0 to ``n_branches - 1``. K clusters of
+    markers turn about the axis of a joint by an angle of their own; see
+    :mod:`ikns._kernels.body.free_turn`.
     """
 
     tree: Tree
@@ -34,8 +36,6 @@ class MarkerProblem(NamedTuple):
     turn_joint: Indices  # (K,) joint about whose axis the cluster turns
     marker_position: Array  # (M, 3) in the frame of its joint, m
     marker_weight: Array  # (M,) zero for markers that are not used
-    path: Indices  # (n, D)
-    depth: Indices  # (n,)
     free: Array  # (n,) 1 for degrees of freedom to solve for, 0 for held ones
     angle: Indices  # (n,) entry of q that `lower` and `upper` limit, or -1
     lower: Array  # (n,) joint limit, rad or m
@@ -65,11 +65,13 @@ class Scratch(NamedTuple):
     error: Array
     turned: Array
     moments: Array
-    forces: Array
+    inertia: Array
+    wrench: Array
+    twist: Array
+    rows: Array
     gradient: Array
-    hessian: Array
-    curvature: Array
-    factored: Array
+    extra: Array
+    damped: Array
     step: Array
     moved: Array
     beyond: Array
@@ -88,8 +90,8 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
     p, tree = problem, problem.tree
     J, n, M = len(tree.kind), len(p.free), len(p.marker_joint)
     S, nq = p.starts.shape
-    D, K = p.path.shape[1], len(p.turn_joint)
-    header = [J, n, M, S, nq, D, p.n_branches, p.max_iterations, K]
+    K = len(p.turn_joint)
+    header = [J, n, M, S, nq, p.n_branches, p.max_iterations, K]
     whole = [
         np.array(header),
         tree.kind,
@@ -97,8 +99,6 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
         tree.first_q,
         tree.first_v,
         tree.dof_parent,
-        p.path,
-        p.depth,
         p.angle,
         p.marker_joint,
         p.marker_carrier,
@@ -128,11 +128,9 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
 @inner
 def unpack(whole: Indices, real: Array) -> MarkerProblem:
     """Unpack a problem."""
-    J, n, M, S, nq, D = whole[0], whole[1], whole[2], whole[3], whole[4], whole[5]
-    i, K = 9, whole[8]
+    J, n, M, S, nq = whole[0], whole[1], whole[2], whole[3], whole[4]
+    i, K = 8, whole[7]
     tree_at, i = i, i + 4 * J + n
-    path_at, i = i, i + n * D
-    depth_at, i = i, i + n
     angle_at, i = i, i + n
     marker_at, i = i, i + 4 * M
     branch_at, i = i, i + nq
@@ -161,8 +159,6 @@ def unpack(whole: Indices, real: Array) -> MarkerProblem:
         whole[turn_at : turn_at + K],
         _table(real, position_at, M, 3),
         real[weight_at : weight_at + M],
-        whole[path_at : path_at + n * D].reshape(n, D),
-        whole[depth_at : depth_at + n],
         real[dof_at : dof_at + n],
         whole[angle_at : angle_at + n],
         real[dof_at + n : dof_at + 2 * n],
@@ -170,8 +166,8 @@ def unpack(whole: Indices, real: Array) -> MarkerProblem:
         _table(real, starts_at, S, nq),
         whole[marker_at + 3 * M : marker_at + 4 * M],
         whole[branch_at : branch_at + nq],
+        whole[5],
         whole[6],
-        whole[7],
         real[0],
         real[1],
         real[2],
@@ -184,11 +180,10 @@ def scratch_size(problem: MarkerProblem) -> int:
     """Return how many reals a frame's scratch memory has, in the order of `cut`."""
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
     S, nq = problem.starts.shape
-    D = problem.path.shape[1]
     return (
         35
-        + J * (12 + MOMENTS)
-        + n * (19 + 3 * D)
+        + J * _OF_JOINT
+        + n * _OF_RATE
         + 13 * M
         + nq * (4 + S)
         + S * (1 + problem.n_branches)
@@ -200,14 +195,12 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
     """Divide memory of :func:`scratch_size` reals into arrays."""
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
     S, nq = problem.starts.shape
-    D = problem.path.shape[1]
     a = 35
     b = a + J * 12
-    c = b + J * MOMENTS
-    d = c + n * 6
-    e = d + n * 9
-    f = e + n * 4
-    g = f + n * 3 * D
+    c = b + J * (MOMENTS + INERTIA)
+    d = a + J * _OF_JOINT
+    e = d + n * (6 + ROW)
+    g = d + n * _OF_RATE
     h = g + M * 13
     k = h + nq * 4
     m = k + nq * S
@@ -215,21 +208,23 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
         work[0:3],
         work[a : a + 9 * J].reshape(J, 3, 3),
         _table(work, a + 9 * J, J, 3),
-        _table(work, c, n, 6),
+        _table(work, d, n, 6),
         work[g : g + M],
         _table(work, g + M, M, 3),
         _table(work, g + 4 * M, M, 3),
         _table(work, g + 7 * M, M, 3),
         _table(work, g + 10 * M, M, 3),
         _table(work, b, J, MOMENTS),
-        _table(work, d, n, 9),
+        _table(work, b + J * MOMENTS, J, INERTIA),
+        _table(work, c, J, 6),
+        _table(work, c + 6 * J, J, 6),
+        _table(work, d + 6 * n, n, ROW),
         work[e : e + n],
-        _table(work, f, n, D),
-        _table(work, f + n * D, n, D),
-        _table(work, f + 2 * n * D, n, D),
         work[e + n : e + 2 * n],
         work[e + 2 * n : e + 3 * n],
         work[e + 3 * n : e + 4 * n],
+        work[e + 4 * n : e + 5 * n],
+        work[e + 5 * n : e + 6 * n],
         work[h : h + nq],
         work[h + nq : h + 2 * nq],
         work[h + 2 * nq : h + 3 * nq],

@@ -47,7 +47,7 @@ def proximal_frame(
             hidden = True
     if not posed:
         return False
-    spread = np.empty((2, len(problem.depth)))
+    spread = np.empty((2, len(problem.free)))
     solvable = factor_information(problem, s, q, segments, seen_before, spread)
     for a in range(6):
         s.gradient[a] = 0.0

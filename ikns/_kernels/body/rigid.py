@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import borrowing
 from ikns.arrays import Array
 
 
-@compiled
+@borrowing
 def rigid_pose(
     source: Array, target: Array, weight: Array, N: Array, V: Array, pose: Array
 ) -> None:
@@ -71,7 +71,7 @@ def rigid_pose(
     pose[2] = bz - (az + w * tz + x * ty - y * tx)
 
 
-@compiled
+@borrowing
 def _diagonalize(A: Array, V: Array) -> None:
     """Diagonalize a symmetric A (k, k) in place; write its eigenvectors as columns."""
     k = len(A)

@@ -17,14 +17,14 @@ from __future__ import annotations
 import numpy as np
 
 from ikns._kernels.body.tree import FREE_FLYER, Tree
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import borrowing
 from ikns.arrays import Array
 
 #: Below this angle the series are exact to rounding with three terms: t^6 / 10^5.
 _SMALL = 1e-2
 
 
-@compiled
+@borrowing
 def integrate(tree: Tree, q: Array, step: Array, moved: Array) -> None:
     """Write the configuration after `step` (n,) from `q` into `moved`."""
     for j in range(len(tree.kind)):
@@ -35,7 +35,7 @@ def integrate(tree: Tree, q: Array, step: Array, moved: Array) -> None:
             moved[at] = q[at] + step[first]
 
 
-@compiled
+@borrowing
 def displacement(tree: Tree, q0: Array, q: Array, moved: Array) -> None:
     """Write the displacement from `q0` to `q`, (n,)."""
     for j in range(len(tree.kind)):
@@ -46,7 +46,7 @@ def displacement(tree: Tree, q0: Array, q: Array, moved: Array) -> None:
             moved[first] = q[at] - q0[at]
 
 
-@compiled
+@borrowing
 def _integrate_pose(q: Array, at: int, step: Array, i: int, moved: Array) -> None:
     vx, vy, vz = step[i], step[i + 1], step[i + 2]
     wx, wy, wz = step[i + 3], step[i + 4], step[i + 5]
@@ -77,7 +77,7 @@ def _integrate_pose(q: Array, at: int, step: Array, i: int, moved: Array) -> Non
     moved[at + 5], moved[at + 6] = nz / size, nw / size
 
 
-@compiled
+@borrowing
 def _pose_displacement(q0: Array, q: Array, at: int, moved: Array, i: int) -> None:
     x, y, z, w = q0[at + 3], q0[at + 4], q0[at + 5], q0[at + 6]
     u1, u2, u3, u0 = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
@@ -98,7 +98,7 @@ def _pose_displacement(q0: Array, q: Array, at: int, moved: Array, i: int) -> No
     moved[i + 5] = stretch * rz
 
 
-@compiled
+@borrowing
 def _turned(
     x: float, y: float, z: float, w: float, a: float, b: float, c: float
 ) -> tuple[float, float, float]:

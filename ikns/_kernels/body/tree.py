@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.compiled import compiled, inner
+from ikns._kernels.body.sine_cosine import sine_cosine
+from ikns._kernels.compiled import borrowing, inner_borrowing
 from ikns.arrays import Array, Indices
 
 REVOLUTE, PRISMATIC, FREE_FLYER = 0, 1, 2
@@ -32,14 +33,14 @@ class Tree(NamedTuple):
     dof_parent: Indices  # (n,) next degree of freedom towards the root, or -1
 
 
-@compiled
+@borrowing
 def place_joints(tree: Tree, q: Array, rotation: Array, translation: Array) -> None:
     """Write the joints' poses in the world, (J, 3, 3) and (J, 3) m."""
     for j in range(len(tree.kind)):
         place_joint(tree, j, q, rotation, translation)
 
 
-@inner
+@inner_borrowing
 def place_joint(
     tree: Tree, j: int, q: Array, rotation: Array, translation: Array
 ) -> None:
@@ -47,7 +48,7 @@ def place_joint(
     parent, at, kind = tree.parent[j], tree.first_q[j], tree.kind[j]
     c, s, shift = 1.0, 0.0, 0.0
     if kind == REVOLUTE:
-        c, s = np.cos(q[at]), np.sin(q[at])
+        s, c = sine_cosine(q[at])
     elif kind == PRISMATIC:
         shift = q[at]
     # Entries and not slices: counting references to a slice takes longer than this.
@@ -92,7 +93,7 @@ def place_joint(
             )
 
 
-@compiled
+@borrowing
 def joint_axes(tree: Tree, rotation: Array, translation: Array, axes: Array) -> None:
     """Write the twist of each degree of freedom at unit rate, (n, 6), in world axes.
 
@@ -110,7 +111,7 @@ def joint_axes(tree: Tree, rotation: Array, translation: Array, axes: Array) -> 
             _axis(rotation, translation, j, _Z, kind, axes, at)
 
 
-@compiled
+@borrowing
 def _axis(
     rotation: Array, translation: Array, j: int, k: int, kind: int, axes: Array, d: int
 ) -> None:

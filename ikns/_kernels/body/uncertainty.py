@@ -29,12 +29,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.descent import linearize_at
+from ikns._kernels.body.articulated import factor, solve, write_inertia
+from ikns._kernels.body.free_turn import release_clusters
 from ikns._kernels.body.marker_errors import penalties
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
-from ikns._kernels.body.tree import FREE_FLYER
-from ikns._kernels.body.tree_cholesky import factor, solve
-from ikns._kernels.compiled import compiled, inner
+from ikns._kernels.body.tree import joint_axes
+from ikns._kernels.compiled import borrowing, inner, inner_borrowing
 from ikns.arrays import Array, Indices
 
 #: Noise of a marker of weight 1, m: what the pull towards the pose before assumes too.
@@ -70,7 +70,7 @@ def new_marker_memory(n_markers: int) -> Array:
     return memory
 
 
-@inner
+@inner_borrowing
 def note_markers(
     problem: MarkerProblem,
     s: Scratch,
@@ -120,7 +120,7 @@ def factor_information(
     memory: Array,
     spread: Array,
 ) -> bool:
-    """Factor H into `s.factored` after :func:`note_markers`; False where it cannot be.
+    """Factor H into `s.rows` after :func:`note_markers`; False where it cannot be.
 
     Written are the weights of the pull and what the joints may have turned, rad, into
     `spread` (2, n).
@@ -137,14 +137,13 @@ def factor_information(
         s.moved,
         s.beyond,
     )
-    linearize_at(problem, s, 0.0)
     ages = np.zeros((segments.total, 2))
     for m in range(len(memory)):
         k = segments.of_marker[m]
         if k >= 0:
             for a in range(2):
                 ages[k, a] = max(ages[k, a], memory[m, a])
-    for d in range(len(problem.depth)):
+    for d in range(len(s.extra)):
         unseen = frames = 0.0
         for a in range(2):
             k = segments.of_joint[d, a]
@@ -154,14 +153,43 @@ def factor_information(
         n = min(frames, SETTLED) if frames > 0 else SETTLED
         spread[0, d] = problem.pull**2 / n
         spread[1, d] = segments.speed[d] * min(unseen, LONGEST)
-        last = problem.depth[d]
-        for a in range(last + 1):
-            s.factored[d, a] = s.hessian[d, a]
-        s.factored[d, last] += spread[0, d]
-    return factor(s.factored, problem.path, problem.depth)
+        s.extra[d] = spread[0, d]
+        if s.beyond[d] != 0:
+            s.extra[d] += problem.limit**2
+    joint_axes(problem.tree, s.rotation, s.translation, s.axes)
+    write_inertia(
+        problem.marker_carrier,
+        s.weight,
+        s.x,
+        s.error,
+        0.0,
+        s.moments,
+        s.inertia,
+    )
+    release_clusters(
+        problem.tree,
+        s.axes,
+        problem.turn_joint,
+        problem.marker_turn,
+        s.weight,
+        s.x,
+        s.error,
+        0.0,
+        s.inertia,
+    )
+    return factor(
+        problem.tree,
+        s.axes,
+        s.wrench,
+        0.0,
+        problem.free,
+        s.extra,
+        s.inertia,
+        s.rows,
+    )
 
 
-@inner
+@inner_borrowing
 def deviation(
     problem: MarkerProblem,
     s: Scratch,
@@ -179,24 +207,26 @@ def deviation(
     v = s.step
     for d in range(len(v)):
         v[d] = gradient[d] * problem.free[d]
-    solve(s.factored, problem.path, problem.depth, v)
+    solve(problem.tree, s.rows, s.twist, v)
     noise = turned = 0.0
     for d in range(len(v)):
-        v[d] *= problem.free[d]
         noise += v[d] * (gradient[d] - spread[0, d] * v[d])
         turned += (spread[0, d] * v[d] * spread[1, d]) ** 2
     variance = NOISE**2 * max(noise, 0.0) + turned
     if hidden:
-        variance += _misfit(problem, s, v, segments, memory)
+        variance += _misfit(problem, s, segments, memory)
     return math.sqrt(variance)
 
 
-@compiled
+@borrowing
 def _misfit(
-    problem: MarkerProblem, s: Scratch, v: Array, segments: Segments, memory: Array
+    problem: MarkerProblem, s: Scratch, segments: Segments, memory: Array
 ) -> float:
-    """Variance by markers that do not fit: what hidden ones leave, and what changes."""
-    tree, left, changed, longest = problem.tree, 0.0, 0.0, 0.0
+    """Variance by markers that do not fit: what hidden ones leave, and what changes.
+
+    `s.twist` are those of the joints at the rates v.
+    """
+    left = changed = longest = 0.0
     for m in range(len(memory)):
         if problem.marker_weight[m] == 0 or segments.of_marker[m] < 0:
             continue
@@ -204,16 +234,8 @@ def _misfit(
             longest = max(longest, memory[m, _UNSEEN])
             continue
         j, carrier = problem.marker_joint[m], problem.marker_carrier[m]
-        d = tree.first_v[carrier] + (5 if tree.kind[carrier] == FREE_FLYER else 0)
-        t0 = t1 = t2 = w0 = w1 = w2 = 0.0
-        for a in range(problem.depth[d] + 1):
-            i = problem.path[d, a]
-            t0 += v[i] * s.axes[i, 0]
-            t1 += v[i] * s.axes[i, 1]
-            t2 += v[i] * s.axes[i, 2]
-            w0 += v[i] * s.axes[i, 3]
-            w1 += v[i] * s.axes[i, 4]
-            w2 += v[i] * s.axes[i, 5]
+        t0, t1, t2 = s.twist[carrier, 0], s.twist[carrier, 1], s.twist[carrier, 2]
+        w0, w1, w2 = s.twist[carrier, 3], s.twist[carrier, 4], s.twist[carrier, 5]
         u0 = s.weight[m] * (t0 + w1 * s.x[m, 2] - w2 * s.x[m, 1])
         u1 = s.weight[m] * (t1 + w2 * s.x[m, 0] - w0 * s.x[m, 2])
         u2 = s.weight[m] * (t2 + w0 * s.x[m, 1] - w1 * s.x[m, 0])
@@ -225,7 +247,7 @@ def _misfit(
     return left**2 + (min(longest, LONGEST) / CHANGED) ** 2 * changed
 
 
-@compiled
+@borrowing
 def _turned(s: Scratch, j: int, a: int, kept: Array) -> float:
     return (
         s.rotation[j, a, 0] * kept[_LEFT]

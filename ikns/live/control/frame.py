@@ -206,7 +206,7 @@ class FrameSolver:
                     f"expected a finite pose {self._q.shape}, found {given.shape}."
                 )
             self._q[:] = given
-        self._memory.start[:] = self._q
+        self._memory[-len(self._q) :] = self._q
 
     def solve(self, markers: ArrayLike, dt: float = 0.01) -> ControlFrame:
         """Solve the next frame.
@@ -252,7 +252,7 @@ class FrameSolver:
             )
             status = INSIDE_HULL if inside else OUTSIDE_HULL
         self._lost = self._lost and not np.isfinite(residual)
-        self._memory.start[:] = self._q
+        self._memory[-len(self._q) :] = self._q
         limit = self.max_uncertainty
         # A deviation that is NaN is not certain either.
         certain = [

@@ -6,10 +6,10 @@ import threading
 
 import numpy as np
 
-from ikns._kernels.body.frame_sequence import FrameMemory, new_memory, solve_frames
+from ikns._kernels.body.frame_sequence import new_memory, solve_frames
+from ikns._kernels.body.marker_gate import pack_gate
 from ikns._kernels.body.marker_problem import MarkerProblem, pack, scratch_size
-from ikns._kernels.body.tree import Tree
-from ikns.arrays import Array, Indices
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.gate import GateLimits, marker_gate
@@ -20,6 +20,7 @@ from ikns.motion.marker_ik.pose import (
     PRIOR,
     PRIOR_FROM_SCRATCH,
     STEP_TOLERANCE,
+    Pose,
     SolvedFrames,
     starting_poses,
 )
@@ -36,7 +37,6 @@ def marker_problem(
     held = skeleton.columns(skeleton.marker_set.held)
     free = np.ones(skeleton.nv)
     free[np.isin(np.arange(skeleton.nv), held)] = 0.0
-    path, depth = tree_paths(skeleton.tree)
     n_joints = len(skeleton.joint_names)
     angle = np.full(skeleton.nv, -1, dtype=np.int64)
     starts = starting_poses(skeleton)
@@ -54,8 +54,6 @@ def marker_problem(
         turn_joint=turn_joint,
         marker_position=position,
         marker_weight=np.array(weight, dtype=np.float64),
-        path=path,
-        depth=depth,
         free=free,
         angle=angle,
         lower=lower,
@@ -89,20 +87,49 @@ class KernelSolver:
             skeleton, max_iterations=max_iterations, tolerance=tolerance
         )
         self.packed = pack(self.problem)
+        self._packed_gate = pack_gate(self.gate)
         self._neutral = skeleton.neutral()
-        self._of_thread = threading.local()
+        self._of_thread = _OfThread(self)
 
     @property
     def work(self) -> Array:
         """Scratch memory, one array for each thread."""
-        if not hasattr(self._of_thread, "work"):
-            self._of_thread.work = np.empty(scratch_size(self.problem))
-        work: Array = self._of_thread.work
-        return work
+        return self._of_thread.work
 
-    def new_memory(self) -> FrameMemory:
-        """Return the memory before a first frame, for frames one after the other."""
+    def new_memory(self) -> Array:
+        """Return the memory before a first frame, for frames one after the other.
+
+        It ends with the pose from which the next frame starts.
+        """
         return new_memory(len(self._neutral), len(SIDES))
+
+    def solve_one(self, markers: Array, before: Array | None) -> Pose:
+        """Solve one frame of markers (M, 3), as :meth:`solve` does."""
+        own = self._of_thread
+        _, residual, iterations, converged, fits = own.frames
+        own.markers[0] = markers
+        own.memory[:] = own.new_memory
+        own.start[:] = self._neutral if before is None else before
+        q = np.empty((1, len(own.start)))
+        solve_frames(
+            *self.packed,
+            *self._packed_gate,
+            own.markers,
+            0,
+            1,
+            1,
+            own.start,
+            before is None,
+            0,
+            own.memory,
+            own.work,
+            q,
+            residual,
+            iterations,
+            converged,
+            fits,
+        )
+        return Pose(q[0], residual.item(0), iterations.item(0), converged.item(0))
 
     def solve(
         self,
@@ -112,7 +139,7 @@ class KernelSolver:
         frames: SolvedFrames,
         *,
         patience: int = 0,
-        memory: FrameMemory | None = None,
+        memory: Array | None = None,
     ) -> None:
         """Solve the frames of ``range(*span)``; the step is 1 or -1.
 
@@ -126,7 +153,7 @@ class KernelSolver:
         known = self.new_memory() if memory is None else memory
         solve_frames(
             *self.packed,
-            self.gate,
+            *self._packed_gate,
             _writable(markers),
             *span,
             _writable(start),
@@ -143,16 +170,16 @@ def _writable(array: Array) -> Array:
     return array if array.flags.writeable else array.copy()
 
 
-def tree_paths(tree: Tree) -> tuple[Indices, Indices]:
-    """Each degree of freedom's way from the root; see the kernels' `tree_cholesky`."""
-    ways: list[list[int]] = []
-    for d, parent in enumerate(tree.dof_parent.tolist()):
-        ways.append([*(ways[parent] if parent >= 0 else []), d])
-    depth = np.array([len(way) - 1 for way in ways], dtype=np.int64)
-    path = np.full((len(ways), depth.max() + 1), -1, dtype=np.int64)
-    for row, way in zip(path, ways, strict=True):
-        row[: len(way)] = way
-    return path, depth
+class _OfThread(threading.local):
+    """Arrays of one thread: scratch memory, and a frame that is solved by itself."""
+
+    def __init__(self, solver: KernelSolver) -> None:
+        nq = solver.problem.starts.shape[1]
+        self.work = np.empty(scratch_size(solver.problem))
+        self.markers = np.empty((1, len(solver.problem.marker_joint), 3))
+        self.start = np.empty(nq)
+        self.memory, self.new_memory = solver.new_memory(), solver.new_memory()
+        self.frames = SolvedFrames.empty(1, nq)
 
 
 def _side(name: str) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -164,7 +165,7 @@ def label_changes(time: Array, markers: Array) -> tuple[bool, Indices]:
 
 
 def exchanges(
-    gate: MarkerGate, markers: Array, error: Array, rate: float
+    gate: MarkerGate, markers: Array, errors: Callable[[], Array], rate: float
 ) -> list[tuple[Indices, Indices]]:
     """Find the frames in which labels are swapped.
 
@@ -174,8 +175,9 @@ def exchanges(
         Of the skeleton; labels of the static trial alone do not count.
     markers : (T, M, 3) array
         m in the world, NaN where not seen.
-    error : (T,) array
-        Of the poses found, m; NaN where there is none.
+    errors : callable
+        Returns those of the poses found, (T,) m, NaN where there is none; called only
+        if a label ever changed places.
     rate : float
         Frames per s.
 
@@ -188,7 +190,7 @@ def exchanges(
     worn = np.ascontiguousarray(markers[:, columns])
     if not label_changes(np.arange(len(worn)) / rate, worn)[0]:
         return []
-    watch = LabelWatch(len(columns))
+    watch, error = LabelWatch(len(columns)), errors()
     wrong = np.zeros(worn.shape[:2], dtype=bool)
     for i, frame in enumerate(worn):
         wrong[i], late, mended = watch.step(frame, 1 / rate if i else np.nan, error[i])

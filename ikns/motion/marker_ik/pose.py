@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -39,8 +38,7 @@ _STARTS: tuple[dict[str, float], ...] = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Pose:
+class Pose(NamedTuple):
     """One solved frame.
 
     Parameters
@@ -83,15 +81,6 @@ class SolvedFrames(NamedTuple):
             np.empty(n, dtype=np.int64),
             np.empty(n, dtype=np.bool_),
             np.empty((n, len(SIDES)), dtype=np.bool_),
-        )
-
-    def pose(self, i: int) -> Pose:
-        """Return one of them."""
-        return Pose(
-            self.q[i],
-            float(self.residual[i]),
-            int(self.iterations[i]),
-            bool(self.converged[i]),
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -105,7 +105,7 @@ def recorded_reasons(
     """
     number = np.full(frames.fits.shape, -1)
     reasons: dict[str, int] = {}
-    error = frame_errors(gate, markers, frames.residual)
+    error = partial(frame_errors, gate, markers, frames.residual)
     for wrong, columns in exchanges(gate, markers, error, rate):
         labels = tuple(skeleton.marker_set.labels[column] for column in columns)
         k = reasons.setdefault(say_exchanged(labels), len(reasons))

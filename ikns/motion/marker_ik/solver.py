@@ -34,6 +34,7 @@ from ikns.motion.marker_ik.rejection import recorded_reasons
 from ikns.motion.marker_ik.visibility import (
     Visibility,
     require_sight,
+    seen_markers,
     visible_segments,
 )
 from ikns.motion.motion import Motion, all_seen, believed_joints
@@ -111,20 +112,18 @@ class MarkerIK:
         Pose
             Without any visible marker, the pose before; residual NaN, not converged.
         """
-        seen = np.ascontiguousarray(markers, dtype=np.float64)
+        seen = np.asarray(markers, dtype=np.float64)
         if seen.shape != self._markers_shape:
             raise InvalidInput(
                 f"expected markers {self._markers_shape}, found {seen.shape}."
             )
         if q is not None:
-            q = np.ascontiguousarray(q, dtype=np.float64)
+            q = np.asarray(q, dtype=np.float64)
             if q.shape != self._pose_shape:
                 raise InvalidInput(
                     f"expected a pose {self._pose_shape}, found {q.shape}."
                 )
-        frames = SolvedFrames.empty(1, *self._pose_shape)
-        self.solver.solve(seen[None], (0, 1, 1), q, frames)
-        pose = frames.pose(0)
+        pose = self.solver.solve_one(seen, q)
         if pose.iterations < 0:
             raise InvalidInput(
                 "marker positions must be finite or NaN, found infinity."
@@ -193,7 +192,7 @@ class MarkerIK:
                     )
                 require_sight(self.skeleton, visibility, chain)
         # Start where most markers are seen, then go both ways.
-        visible = np.isfinite(markers[:, self._tracked]).all(axis=2).sum(axis=1)
+        visible = seen_markers(markers)[:, self._tracked].sum(axis=1)
         start = int(np.argmax(visible))
         frames = SolvedFrames.empty(n, *self._pose_shape)
         # A single frame has no rate.
@@ -209,13 +208,13 @@ class MarkerIK:
         )
         done = 1
         for begin, end, way in ((start + 1, n, 1), (start - 1, -1, -1)):
-            memory = type(first)(*(part.copy() for part in first))
+            memory = first.copy()
             for at in range(begin, end, way * _CHUNK):
                 stop = min(at + _CHUNK, n) if way == 1 else max(at - _CHUNK, -1)
                 self.solver.solve(
                     markers,
                     (at, stop, way),
-                    memory.start,
+                    memory[-self._pose_shape[0] :],
                     frames,
                     patience=patience,
                     memory=memory,

@@ -73,6 +73,13 @@ def joint_segments(skeleton: Skeleton) -> tuple[Indices, Indices]:
     return of_marker, of_joint
 
 
+def seen_markers(markers: Array) -> Mask:
+    """Say which markers (..., 3) have a position; three times as fast as `all`."""
+    x, y, z = np.moveaxis(markers, -1, 0)
+    with np.errstate(invalid="ignore"):  # infinite positions
+        return np.asarray(np.isfinite(x + y + z))
+
+
 def visible_segments(skeleton: Skeleton, markers: Array) -> Visibility:
     """Say which segments markers (T, M, 3) show, and which joints are known.
 
@@ -86,7 +93,7 @@ def visible_segments(skeleton: Skeleton, markers: Array) -> Visibility:
     A held joint is known by the same rule: its angle is the one at which it is held,
     and unknown while a segment next to it is out of sight.
     """
-    finite = np.asarray(np.isfinite(markers).all(axis=2))
+    finite = seen_markers(markers)
     segments, n = _segments(skeleton), len(markers)
     count = {
         link: finite[:, segment.columns].sum(axis=1)
