@@ -103,11 +103,11 @@ def kernels_of(path: Path) -> tuple[set[str], set[str], list[ast.FunctionDef]]:
     for node in tree_of(path).body:
         if isinstance(node, ast.FunctionDef):
             marks = {d.id for d in node.decorator_list if isinstance(d, ast.Name)}
-            if not marks & {"compiled", "inner"}:
+            if not marks & {"compiled", "borrowing", "inner", "inner_borrowing"}:
                 plain.append(node)
                 continue
             kernels.add(node.name)
-            if "inner" in marks or node.name.startswith("_"):
+            if marks & {"inner", "inner_borrowing"} or node.name.startswith("_"):
                 bare.add(node.name)
     return bare, kernels, plain
 
