@@ -31,7 +31,7 @@ carries the other: there the curvature is the mean of both orders, and c is zero
 from __future__ import annotations
 
 from ikns._kernels.body.tree import FREE_FLYER, Tree
-from ikns._kernels.compiled import borrowing
+from ikns._kernels.compiled import borrowing, inner_borrowing
 from ikns.arrays import Array, Indices
 
 #: m, g (3), S (6: xx yy zz yz zx xy).
@@ -135,7 +135,7 @@ def write_inertia(
         inertia[j, 19] = -moments[j, 7]
 
 
-@borrowing
+@inner_borrowing
 def diagonal(tree: Tree, axes: Array, moments: Array, scale: Array) -> None:
     """Write the diagonal (n,) of Gauss-Newton's matrix.
 

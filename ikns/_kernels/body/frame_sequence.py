@@ -21,7 +21,7 @@ from ikns._kernels.body.marker_gate import (
 )
 from ikns._kernels.body.marker_ik import far_cost, solve_frame
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
-from ikns._kernels.compiled import borrowing, compiled, inner_borrowing
+from ikns._kernels.compiled import borrowing, compiled, inner, inner_borrowing
 from ikns.arrays import Array, Indices, Mask
 
 #: Suspicious: so many times the usual root mean square error, which is of this size at
@@ -55,7 +55,7 @@ def new_memory(nq: int, limbs: int) -> Array:
     return memory
 
 
-@compiled
+@inner
 def cut_memory(memory: Array, limbs: int) -> FrameMemory:
     """Divide it."""
     good = _AGE + limbs

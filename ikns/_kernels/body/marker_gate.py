@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ikns._kernels.body.marker_problem import Scratch
-from ikns._kernels.compiled import compiled, inner_borrowing
+from ikns._kernels.compiled import inner, inner_borrowing
 from ikns.arrays import Array, Indices, Mask
 
 #: Entries of figures by group: the thorax, then the limbs.
@@ -37,7 +37,7 @@ def pack_gate(gate: MarkerGate) -> tuple[Indices, Array]:
     )
 
 
-@compiled
+@inner
 def unpack_gate(whole: Indices, real: Array) -> MarkerGate:
     """Unpack it."""
     n = len(real) - 3
