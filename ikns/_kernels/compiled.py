@@ -42,8 +42,7 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 def inner(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function of which other kernel files make use, and Python never does.
 
-    Without a wrapper for Python it takes a fifth less time to compile, and half of it
-    where a tuple of many arrays is an argument.
+    It gets no wrapper for Python, which would unpack tuples of many arrays.
     """
     return _compiled(function, wrapped=False)
 
