@@ -114,7 +114,8 @@ class Motion:
         if (rejected >= 0).any():
             known = known & believed_joints(self.joint_names, rejected)
         for name in ("end_in_base", "end_rotation_in_base", "end_velocity_in_base"):
-            of_ends = getattr(self, name)
+            # Without ends, the number of frames is that of no array.
+            of_ends = getattr(self, name)[: None if self.ends else 1]
             of_ends = np.broadcast_to(of_ends, (n, *of_ends.shape[1:]))
             object.__setattr__(self, name, of_ends)
         object.__setattr__(self, "seen", seen)
