@@ -10,11 +10,8 @@ from sklearn.model_selection import GridSearchCV
 
 from ikns.errors import InvalidInput
 from ikns.nullspace.local_posture import REACH
-from ikns.nullspace.natural_posture import (
-    NaturalPosture,
-    natural_posture_people,
-    quadratic_terms,
-)
+from ikns.nullspace.natural_posture import NaturalPosture, quadratic_terms
+from ikns.nullspace.people_posture import natural_posture_people
 
 LOW, HIGH = np.array([0.1, -0.4, 0.0]), np.array([0.45, 0.1, 0.4])
 

@@ -31,6 +31,19 @@ def nearness(wrist_in_thorax: Array, places_in_thorax: Array) -> Array:
     return np.asarray((1 - r) ** 4 * (1 + 4 * r))
 
 
+def local_swivel(
+    wrist_in_thorax: Array, places_in_thorax: Array, heights: Array
+) -> Array:
+    """Sum of the bumps at wrist centers (..., D) m, (...) rad.
+
+    Place by place, as all distances of a long recording at once would fill the memory.
+    """
+    total = np.zeros(wrist_in_thorax.shape[:-1])
+    for place, height in zip(places_in_thorax, heights, strict=True):
+        total += height * nearness(wrist_in_thorax, place[None])[..., 0]
+    return total
+
+
 def fit_local(
     wrist_in_thorax: Array, left_rad: Array, penalty: float
 ) -> tuple[Array, Array]:

@@ -7,84 +7,23 @@ from it is what a person means (posture is not intent).
 
 from __future__ import annotations
 
-import tomllib
-from functools import cache
-from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array, Mask
-from ikns.errors import FileError, InvalidInput
+from ikns.errors import InvalidInput
 from ikns.nullspace.estimator_base import EstimatorBase
-from ikns.nullspace.local_posture import fit_local, nearness
+from ikns.nullspace.local_posture import fit_local, local_swivel
 from ikns.nullspace.map.checks import checked_rows
+from ikns.nullspace.people_posture import natural_posture_people
 
 #: Middle of the work space, m, and the unit of length, m: the quadratic terms are then
 #: of order 1 wherever a hand goes (ISB thorax, right arm).
 MIDDLE, UNIT = np.array([0.25, -0.15, 0.20]), 0.2
 #: What of the taught places counts as taught.
 _TAUGHT = 0.99
-_PEOPLE = Path(__file__).with_name("natural_posture_people.toml")
-
-
-class People(NamedTuple):
-    """Natural posture of a population: quadratics in the wrist center.
-
-    Parameters
-    ----------
-    mean : (10,) array
-        Coefficients of :func:`quadratic_terms`, rad.
-    covariance : (10, 10) array
-        Between arms of different people, rad^2.
-    leverage : (10, 10) array
-        Matrix of the leverage over all their movements.
-    taught_leverage : float
-        99th percentile of the leverage over all their movements.
-    arms : int
-        How many arms they are from.
-    source, license : str
-    """
-
-    mean: Array
-    covariance: Array
-    leverage: Array
-    taught_leverage: float
-    arms: int
-    source: str
-    license: str
-
-
-@cache
-def natural_posture_people() -> People:
-    """Return the population that ships with the package.
-
-    Made by ``benchmarks/natural_posture_people.py``.
-
-    Raises
-    ------
-    FileError
-        When the file is damaged.
-    """
-    try:
-        table = tomllib.loads(_PEOPLE.read_text(encoding="utf-8"))
-        mean = np.array(table["mean_rad"], dtype=np.float64)
-        covariance = np.array(table["covariance_rad2"], dtype=np.float64)
-        leverage = np.array(table["leverage"], dtype=np.float64)
-        if {mean.shape * 2, covariance.shape, leverage.shape} != {(10, 10)}:
-            raise ValueError(f"{mean.shape}, {covariance.shape}, {leverage.shape}")
-        return People(
-            mean,
-            covariance,
-            leverage,
-            float(table["taught_leverage"]),
-            int(table["arms"]),
-            table["source"],
-            table["license"],
-        )
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        raise FileError(f"{_PEOPLE}: cannot be read: {error!r}.") from None
 
 
 def quadratic_terms(wrist_in_thorax: ArrayLike) -> Array:
@@ -275,7 +214,7 @@ class NaturalPosture(EstimatorBase):
         if near is not None:
             places, heights = fit_local(w, left, near)
         self.places_, self.heights_ = places, heights
-        left = left - nearness(w, self.places_) @ self.heights_
+        left = left - local_swivel(w, self.places_, self.heights_)
         low, high = np.quantile(w, [0.01, 0.99], axis=0)
         self.coverage_: dict[str, Any] = {
             "frames": len(w),
@@ -294,7 +233,7 @@ class NaturalPosture(EstimatorBase):
         if self.guard:
             beyond = np.maximum(self._leverage(phi) / self.taught_leverage_, 1.0)
             own = self.offset_ + (own - self.offset_) / beyond
-        near = nearness(rows, self.places_) @ self.heights_
+        near = local_swivel(rows, self.places_, self.heights_)
         return np.asarray(phi @ self.people_ + own + near)
 
     def predict(self, X: ArrayLike) -> Array:
