@@ -533,25 +533,37 @@ finger.connect()
 os.unlink(sys.argv[1])
 finger.make_safe("a test")
 finger._bus.close()
-if sys.argv[2] == "asked":
+if sys.argv[2] != "never":
     try:
         finger.relax()
     except FingerError as error:
         sys.stderr.write(f"first: {error}\\n")
+if sys.argv[2] == "connected again":
+    try:
+        finger.connect()
+    except FingerError:
+        pass
 """
 
 
-@pytest.mark.parametrize("asked", ["asked", "never"])
-def test_torque_that_stays_on_is_told_once(wire, asked):
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ("asked", ["first: "]),
+        ("never", ["ikns: "]),
+        ("connected again", ["first: ", "ikns: "]),
+    ],
+)
+def test_torque_that_stays_on_is_told_once_a_connection(wire, asked, told):
     done = subprocess.run(
         [sys.executable, "-c", UNPLUGGED, str(wire.port), asked],
         capture_output=True,
         text=True,
         timeout=TIMEOUT,
     )
-    (line,) = done.stderr.splitlines()
-    assert line.startswith({"asked": "first: ", "never": "ikns: "}[asked])
-    assert "did not confirm that its torque is off" in line
+    for line, start in zip(done.stderr.splitlines(), told, strict=True):
+        assert line.startswith(start)
+        assert "did not confirm that its torque is off" in line
 
 
 def test_no_thread_outlives_a_finger(wire):

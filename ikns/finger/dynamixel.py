@@ -189,18 +189,20 @@ class DynamixelFinger:
         self._stop.set()
         with self._access:
             self._stop.set()
+            alive = self._thread is not None and self._thread.is_alive()
             if self._thread is not None:
                 self._thread.join()
                 self._thread = None
-            elif self._torque_owed:
+            if self._torque_owed and not alive:  # what its thread tried has failed
                 self._close()
             owed = self._torque_owed
         if owed:
             watchdog = "bus_watchdog" in self._model
             raise not_relaxed(
+                self,
                 f"{self._bus.port}: servo {self._bus.id} did not confirm that its "
                 "torque is off, cut its power"
-                + (" (its own watchdog stops it)." if watchdog else ".")
+                + (" (its own watchdog stops it)." if watchdog else "."),
             )
 
     def __enter__(self) -> Self:

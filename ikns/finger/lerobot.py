@@ -163,8 +163,9 @@ class LeRobotFinger:
                     self._thread = thread = None
             if thread is not None or not self._joint.off:
                 raise not_relaxed(
+                    self,
                     f"{self._name} did not confirm that its torque is off, cut its "
-                    "power."
+                    "power.",
                 )
 
     def __enter__(self) -> Self:

@@ -31,7 +31,7 @@ class _Connected(Protocol):
 
 
 _connected: list[_Connected] = []
-_told: set[str] = set()
+_told: dict[int, str] = {}  # of a finger since it was connected last, by its id
 _lock = threading.Lock()
 _hook_before: Callable[[threading.ExceptHookArgs], object] = threading.excepthook
 
@@ -40,6 +40,7 @@ def relax_at_exit(finger: _Connected) -> None:
     """Relax a finger when the program ends, however it ends."""
     global _hook_before
     with _lock:
+        _told.pop(id(finger), None)
         if not any(other is finger for other in _connected):
             _connected.append(finger)
         if threading.excepthook is not _make_all_safe:
@@ -53,17 +54,19 @@ def relax_at_exit(finger: _Connected) -> None:
 def forget(finger: _Connected) -> None:
     """Undo :func:`relax_at_exit`, for a finger that is relaxed already."""
     with _lock:
+        _told.pop(id(finger), None)
         _connected[:] = [other for other in _connected if other is not finger]
         if not _connected and threading.excepthook is _make_all_safe:
             threading.excepthook = _hook_before
 
 
-def not_relaxed(sentence: str) -> FingerError:
+def not_relaxed(finger: _Connected, sentence: str) -> FingerError:
     """Return the error for a finger that is not relaxed, which is told now.
 
-    It is tried again when the program ends, and told again only in other words.
+    It is tried again when the program ends, and told again only in other words, or
+    when it was connected again in between.
     """
-    _told.add(sentence)
+    _told[id(finger)] = sentence
     return FingerError(sentence)
 
 
@@ -80,13 +83,13 @@ def _relax_all() -> None:
         # What ends the program must not stop this too; each finger has its deadline.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
             signal.signal(number, signal.SIG_IGN)
-    before = frozenset(_told)
     for finger in tuple(_connected):
+        before = _told.get(id(finger))
         try:
             finger.relax()
         # A failure must not leave other fingers under torque.
         except Exception as error:
-            if str(error) in before:
+            if str(error) == before:
                 continue
             with contextlib.suppress(OSError):  # the terminal may be gone
                 sys.stderr.write(f"ikns: {error}\n")
