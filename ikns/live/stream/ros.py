@@ -143,7 +143,7 @@ class RosFeed(ClientFeed):
                 f"{len(self._senders)} (nodes {' and '.join(nodes)}); stop all but "
                 "one, or give them topics of their own."
             )
-        self._sender = next(iter(self._senders))
+        self._sender, self._heard = next(iter(self._senders)), time.monotonic()
         names: dict[str, None] = {}
         for found in self._first:
             named = [name for name in found.names if name]
