@@ -133,11 +133,9 @@ def calibrate(
     >>> len(subject.null_space_map.centers_), subject.chain
     (10, 'right_arm')
     """
-    if not explorations:
-        raise InvalidInput("expected at least one exploration recording, found none.")
+    _check_given(explorations, min_still=min_still, min_rest=min_rest)
     if not isinstance(chain, str):
         check_chain(generic or Skeleton.load(), chain, n_dof=n_dof)
-    _check_seconds(min_still=min_still, min_rest=min_rest)
     names = ", ".join(recording.source for recording in explorations)
     measured = measured_body(
         static,
@@ -152,11 +150,10 @@ def calibrate(
     say = progress or silent
     say(LEARNING, 0, 1)
     skeleton, motions = measured.skeleton, measured.explorations
-    gates = [
-        still_mask(motion, chain, max_hand_speed=max_hand_speed, min_duration=min_rest)
-        for motion in motions
+    pairs = [
+        (m, still_mask(m, chain, max_hand_speed=max_hand_speed, min_duration=min_rest))
+        for m in motions
     ]
-    pairs = list(zip(motions, gates, strict=True))
     enough = int(np.ceil(min_still * explorations[0].rate))
     learned = NullSpaceMap(
         n_points,
@@ -168,9 +165,8 @@ def calibrate(
         # Fewer samples than joints do not determine all components.
         min_samples=max(enough, len(chain_joints(chain)) + 1),
     )
-    other = other_hand_moves(motions, chain, times=_OTHER_SIDE)
-    side = _say_side(other, chain)
-    if not any(gate.any() for gate in gates):
+    side = _say_side(motions, chain)
+    if not any(gate.any() for _, gate in pairs):
         found = no_still_sample(motions, chain, max_hand_speed, min_duration=min_rest)
         raise NotEnoughData(f"{names}: {found} {side}".rstrip())
     with naming(names):
@@ -232,7 +228,9 @@ def _settings(
     }
 
 
-def _check_seconds(**given: float) -> None:
+def _check_given(explorations: Sequence[Recording], **given: float) -> None:
+    if not explorations:
+        raise InvalidInput("expected at least one exploration recording, found none.")
     for name, seconds in given.items():
         if not 0 <= seconds < np.inf:
             raise InvalidInput(f"expected {name} of at least 0 s, found {seconds:g}.")
@@ -297,8 +295,9 @@ def _rejections(
     ]
 
 
-def _say_side(other: str, chain: ChainLike) -> str:
+def _say_side(motions: Sequence[Motion], chain: ChainLike) -> str:
     """Say that the other hand moved, if it did."""
+    other = other_hand_moves(motions, chain, times=_OTHER_SIDE)
     if not other:
         return ""
     return f"{other[0].upper()}{other[1:]}: {chain} seems to be the wrong side."

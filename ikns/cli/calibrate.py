@@ -257,28 +257,17 @@ def calibrate(
         natural = [*(natural or []), *movement]
     assert exploration is not None
     check_inputs([static, *exploration, *(natural or [])])
-    from ikns.calibration.steps import calibration_steps
-    from ikns.motion.unseen import warn_unseen
-
-    explorations = [read(path, start=from_, end=to) for path in exploration]
-    estimates: dict[str, Any] = {}
-    with progress(estimates=estimates) as report:
-        still = None if static is None else read(static)
-        moving = [read(path) for path in natural or []]
-        steps = calibration_steps(still, explorations, moving)
-        person = ikns.calibrate(
-            still,
-            explorations,
-            natural=moving,
-            # Also when points were skipped live: clusters that stay empty are left out.
-            n_points=points,
-            radius=radius,
-            outside=outside,
-            progress=one_bar("calibrating", steps, report, estimates),
-            **common,
-        )
-    for frames in explorations:
-        warn_unseen(person.skeleton, frames, own)
+    person = _learn(
+        read,
+        static,
+        [read(path, start=from_, end=to) for path in exploration],
+        natural or [],
+        # Also when points were skipped live: clusters that stay empty are left out.
+        n_points=points,
+        radius=radius,
+        outside=outside,
+        **common,
+    )
     person.save(out, force=force)
     show(
         {"subject": out} | person.report | ({"takes": takes} if live else {}),
@@ -286,6 +275,34 @@ def calibrate(
         f"Wrote {out}",
         as_json=as_json,
     )
+
+
+def _learn(
+    read: Read,
+    static: Path | None,
+    explorations: list[ikns.Recording],
+    natural: list[Path],
+    **options: Any,
+) -> ikns.Subject:
+    """Calibrate, with a bar for all steps, and warn of markers that were not seen."""
+    from ikns.calibration.steps import calibration_steps
+    from ikns.motion.unseen import warn_unseen
+
+    estimates: dict[str, Any] = {}
+    with progress(estimates=estimates) as report:
+        still = None if static is None else read(static)
+        moving = [read(path) for path in natural]
+        steps = calibration_steps(still, explorations, moving)
+        person = ikns.calibrate(
+            still,
+            explorations,
+            natural=moving,
+            progress=one_bar("calibrating", steps, report, estimates),
+            **options,
+        )
+    for frames in explorations:
+        warn_unseen(person.skeleton, frames, options["chain"])
+    return person
 
 
 def _chain(

@@ -168,7 +168,6 @@ def compare(
     if figure is not None:
         _draw(figure, plain, across, simulated=simulated, force=force)
     title = f"{'Simulated, ' if simulated else ''}{recording}"
-    brackets = "; in brackets 95 % intervals" if intervals else ""
     show(
         {
             "recording": recording,
@@ -177,32 +176,60 @@ def compare(
             "chain": str(own),
             "method": method,
             "task": task,
-            "settings": options
-            | {"level": 0.95}
-            | {f"{name}_{_UNITS[name]}": value for name, value in gate.items()},
+            "settings": _settings(options, gate),
             "points": rows,
-            "comparisons": [
-                findings_json(each, chain=names[0], task=names[1], coordinates=names[2])
-                for names, each in found
-            ],
-            "crosstalk": None
-            if across is None
-            else crosstalk_json(across, recording=reaches or recording),
+            **_found_json(found, across, recording=reaches or recording),
             "figure": figure,
             "warnings": warned,
         },
+        *_tables(found, plain, across, title=title, intervals=intervals > 0),
+        *([] if figure is None else [f"Wrote {figure}"]),
+        *notes(warned),
+        as_json=as_json,
+    )
+
+
+def _settings(options: dict[str, Any], gate: dict[str, float]) -> dict[str, Any]:
+    """Return how intervals were made and which samples were taken."""
+    units = {f"{name}_{_UNITS[name]}": value for name, value in gate.items()}
+    return options | {"level": 0.95} | units
+
+
+def _found_json(
+    found: list[Named], across: Crosstalk | None, *, recording: Path
+) -> dict[str, Any]:
+    """Return all comparisons, and the crosstalk on a recording if it is known."""
+    return {
+        "comparisons": [
+            findings_json(each, chain=names[0], task=names[1], coordinates=names[2])
+            for names, each in found
+        ],
+        "crosstalk": None
+        if across is None
+        else crosstalk_json(across, recording=recording),
+    }
+
+
+def _tables(
+    found: list[Named],
+    plain: list[Named],
+    across: Crosstalk | None,
+    *,
+    title: str,
+    intervals: bool,
+) -> list[Any]:
+    """Return tables of every point, where `plain`, and of all points together."""
+    brackets = "; in brackets 95 % intervals" if intervals else ""
+    return [
         *(
-            point_table(each, f"{title}: {own}, hand {HELD[names[1]]} held")
+            point_table(each, f"{title}: {names[0]}, hand {HELD[names[1]]} held")
             for names, each in plain
         ),
         pooled_table(found, f"All points together (root mean squares){brackets}"),
         leak_sentence(plain[0][1]),
         *([] if across is None else [crosstalk_sentence(across)]),
         LEGEND,
-        *([] if figure is None else [f"Wrote {figure}"]),
-        *notes(warned),
-        as_json=as_json,
-    )
+    ]
 
 
 def _crosstalk(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Any
 
 import ikns
 from ikns.cli.marker_options import (
@@ -15,6 +16,9 @@ from ikns.cli.options import AsJson, MinStatic
 from ikns.cli.output import notes, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import naming
+
+if TYPE_CHECKING:
+    from ikns.calibration.set_check import FollowedSet, SetCheck
 
 #: A marker this many placement deviations from its nominal place is pointed out.
 _FAR = 3.0
@@ -56,22 +60,7 @@ def check(
             marker_set=worn,
             min_duration=min_static,
         )
-    remarks = [
-        *(
-            f"{m.label} is {m.offset_sd:.1f} standard deviations from its place: "
-            "misplaced, swapped, or from another set."
-            for m in found.markers
-            if m.seen and m.offset_sd > _FAR
-        ),
-        *(f"{m.label} is never seen." for m in found.markers if not m.seen),
-        *(
-            f"{j.joint} is at {math.degrees(j.angle):.0f} deg, beyond its limits."
-            for j in found.joints
-            if not j.lower <= j.angle <= j.upper
-        ),
-        *([] if found.converged else ["the fit did not converge."]),
-        *([] if moved is None else [one.sentence for one in moved.findings]),
-    ]
+    remarks = _remarks(found, moved)
     show(
         {
             "marker_set": marker_set,
@@ -96,46 +85,76 @@ def check(
             "segment_lengths_m": found.lengths,
             "notes": remarks,
         },
-        table(
-            f"{marker_set} in {static}",
-            {
-                "marker": "s",
-                "segment": "s",
-                "off its place mm": ".1f",
-                "in sd": ".1f",
-                "residual mm": ".1f",
-                **({} if moved is None else {"moving mm": ".1f"}),
-            },
-            [
-                [
-                    m.label,
-                    m.link,
-                    1000 * m.offset,
-                    m.offset_sd,
-                    1000 * m.residual,
-                    *(
-                        []
-                        if moved is None
-                        else [1000 * in_motion.get(m.label, math.nan)]
-                    ),
-                ]
-                for m in found.markers
-            ],
-        ),
-        table(
-            "The person stands like this",
-            {"joint": "s", "deg": ".0f", "limits deg": "s", "note": "s"},
-            [
-                [
-                    j.joint,
-                    math.degrees(j.angle),
-                    f"{math.degrees(j.lower):.0f} .. {math.degrees(j.upper):.0f}",
-                    "held" if j.held else "",
-                ]
-                for j in found.joints
-            ],
-        ),
+        _marker_table(found, moved, f"{marker_set} in {static}"),
+        _posture_table(found),
         *([] if moved is None else [followed_sentence(movement, moved.residual)]),
         *notes(remarks),
         as_json=as_json,
+    )
+
+
+def _remarks(found: SetCheck, moved: FollowedSet | None) -> list[str]:
+    """Say what is unusual about the markers, the posture and the movement."""
+    return [
+        *(
+            f"{m.label} is {m.offset_sd:.1f} standard deviations from its place: "
+            "misplaced, swapped, or from another set."
+            for m in found.markers
+            if m.seen and m.offset_sd > _FAR
+        ),
+        *(f"{m.label} is never seen." for m in found.markers if not m.seen),
+        *(
+            f"{j.joint} is at {math.degrees(j.angle):.0f} deg, beyond its limits."
+            for j in found.joints
+            if not j.lower <= j.angle <= j.upper
+        ),
+        *([] if found.converged else ["the fit did not converge."]),
+        *([] if moved is None else [one.sentence for one in moved.findings]),
+    ]
+
+
+def _marker_table(found: SetCheck, moved: FollowedSet | None, title: str) -> Any:
+    """Return how far each marker is from its place, and from the body."""
+    return table(
+        title,
+        {
+            "marker": "s",
+            "segment": "s",
+            "off its place mm": ".1f",
+            "in sd": ".1f",
+            "residual mm": ".1f",
+            **({} if moved is None else {"moving mm": ".1f"}),
+        },
+        [
+            [
+                m.label,
+                m.link,
+                1000 * m.offset,
+                m.offset_sd,
+                1000 * m.residual,
+                *(
+                    []
+                    if moved is None
+                    else [1000 * moved.markers.get(m.label, math.nan)]
+                ),
+            ]
+            for m in found.markers
+        ],
+    )
+
+
+def _posture_table(found: SetCheck) -> Any:
+    """Return the joint angles of the static trial."""
+    return table(
+        "The person stands like this",
+        {"joint": "s", "deg": ".0f", "limits deg": "s", "note": "s"},
+        [
+            [
+                j.joint,
+                math.degrees(j.angle),
+                f"{math.degrees(j.lower):.0f} .. {math.degrees(j.upper):.0f}",
+                "held" if j.held else "",
+            ]
+            for j in found.joints
+        ],
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,6 +20,9 @@ from ikns.cli.output import held_sentences, notes, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput, naming
 from ikns.output.file import refuse_overwriting, write_text
+
+if TYPE_CHECKING:
+    from ikns.calibration.own_markers import OwnMarkerSet
 
 
 @reads_markers
@@ -82,32 +85,7 @@ def new(
             name=name or out.stem,
             min_duration=min_static,
         )
-    where = {one.label: one.site for one in made.placed}
-    rows: list[list[Any]] = [
-        [
-            m.label,
-            where[m.label].name,
-            millimeters(m.position),
-            "measured" if where[m.label].position is None else "known",
-            "static only" if m.static_only else "",
-        ]
-        for m in made.marker_set.markers
-    ]
-    remarks = [
-        *(
-            f"no landmark on {link}: its angles count from the static trial's posture."
-            for link in made.assumed
-        ),
-        *([f"left out: {', '.join(made.skipped)}."] if made.skipped else []),
-        *(
-            [
-                f"{', '.join(made.turning)} turn about the forearm with its skin: the "
-                "hand shows how far the forearm is turned."
-            ]
-            if made.turning
-            else []
-        ),
-    ]
+    remarks = _remarks(made)
     followed = None
     if moved is not None:
         followed = follow_movement(
@@ -135,17 +113,7 @@ def new(
             "skipped": made.skipped,
             "assumed": made.assumed,
         },
-        table(
-            f"{made.marker_set.name}, from {static}",
-            {
-                "marker": "s",
-                "place": "s",
-                "forward, up, right mm": "s",
-                "how": "s",
-                "note": "s",
-            },
-            rows,
-        ),
+        _place_table(made, f"{made.marker_set.name}, from {static}"),
         *held_sentences(made.marker_set.held),
         *([] if followed is None else [followed_sentence(movement, followed.residual)]),
         *notes(remarks),
@@ -153,4 +121,49 @@ def new(
         + f" --min-static {min_static:g}" * (min_static != 1.0)
         + f" --movement {movement or 'RECORDING'}",
         as_json=as_json,
+    )
+
+
+def _remarks(made: OwnMarkerSet) -> list[str]:
+    """Say what was assumed or left out."""
+    return [
+        *(
+            f"no landmark on {link}: its angles count from the static trial's posture."
+            for link in made.assumed
+        ),
+        *([f"left out: {', '.join(made.skipped)}."] if made.skipped else []),
+        *(
+            [
+                f"{', '.join(made.turning)} turn about the forearm with its skin: the "
+                "hand shows how far the forearm is turned."
+            ]
+            if made.turning
+            else []
+        ),
+    ]
+
+
+def _place_table(made: OwnMarkerSet, title: str) -> Any:
+    """Return where each marker sits, and how that is known."""
+    where = {one.label: one.site for one in made.placed}
+    rows: list[list[Any]] = [
+        [
+            m.label,
+            where[m.label].name,
+            millimeters(m.position),
+            "measured" if where[m.label].position is None else "known",
+            "static only" if m.static_only else "",
+        ]
+        for m in made.marker_set.markers
+    ]
+    return table(
+        title,
+        {
+            "marker": "s",
+            "place": "s",
+            "forward, up, right mm": "s",
+            "how": "s",
+            "note": "s",
+        },
+        rows,
     )

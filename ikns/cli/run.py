@@ -129,6 +129,7 @@ def run(
     Research software, not a medical device.
     """
     _check_options(subject, duration, session, resume=resume)
+    _check_machine(publish or [], realtime=realtime)
 
     from ikns.calibration.simulated import is_simulated, played_files
     from ikns.finger import Safety, open_fingers
@@ -136,7 +137,6 @@ def run(
     from ikns.live.runtime import run as drive
     from ikns.live.stream import open_source
 
-    _check_machine(publish or [], realtime=realtime)
     timeline = timeline_of(rerun=rerun, rrd=rrd)
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
@@ -151,7 +151,7 @@ def run(
     )
     with ExitStack() as stack:
         opened = open_source(source, subject=calibrated, names=names)
-        stream = stack.enter_context(opened)
+        stream, losses = stack.enter_context(opened), list[str]()
         simulated = is_simulated(calibrated, subject, played_files(source))
         shared = publishing(
             publish or [],
@@ -163,7 +163,6 @@ def run(
         publisher = stack.enter_context(shared)
         ikns.warm_up()
         stop = stack.enter_context(stop_on_signals())
-        losses: list[str] = []
         started = {
             "source": source,
             "source_labels": list(stream.labels),
@@ -188,10 +187,7 @@ def run(
         told = _once(lambda: say_undriven(n_dof, group.dofs))  # with all connected
         shown = [told, stack.enter_context(_status_line(arm))]
         if view:
-            body = _body(
-                stack, calibrated, subject, simulated=simulated, dofs=group.dofs
-            )
-            shown.append(body)
+            shown.append(_body(stack, calibrated, subject, simulated, group.dofs))
         report = drive(
             stream,
             calibrated,
@@ -265,7 +261,6 @@ def _body(
     stack: ExitStack,
     calibrated: ikns.Subject,
     subject: Path,
-    *,
     simulated: bool,
     dofs: tuple[int, ...],
 ) -> Callable[[LoopStatus], None]:

@@ -81,7 +81,7 @@ def conduct(
     as_json : bool
     """
     from ikns.experiments.cockpit import Cockpit
-    from ikns.experiments.conduct import Command, Conductor, HeldInput, run_visit
+    from ikns.experiments.conduct import Conductor, HeldInput, run_visit
     from ikns.experiments.visits import visit_lock
 
     session = arm.session or identity.folder / "session"
@@ -127,22 +127,9 @@ def conduct(
             )
         address = ""
         if subject is not None:
-            stops = watch_stops(
-                lambda: conductor.submit(Command("connect")),
-                how="; the panel can connect it again",
+            shown, address = _open_displays(
+                stack, conductor, subject, arm, simulated=simulated
             )
-            shown = [stack.enter_context(stops)]
-            if arm.view:
-                assert arm.subject is not None
-                name = arm.subject.resolve().name
-                address = _open_view(
-                    stack,
-                    subject,
-                    name,
-                    shown,
-                    simulated=simulated,
-                    dofs=driven_dofs(arm, subject),
-                )
             drivers["ikns"] = lambda: arm_driver(
                 arm, subject, session, identity.participant, shown, losses, publisher
             )
@@ -168,6 +155,34 @@ def conduct(
         run_visit(conductor, drivers, stop=stop, rate=pages.rate)
     _show_attempts(identity, conductor, losses, as_json=as_json)
     _exit(losses)
+
+
+def _open_displays(
+    stack: ExitStack,
+    conductor: Conductor,
+    subject: ikns.Subject,
+    arm: ArmOptions,
+    *,
+    simulated: bool,
+) -> tuple[list[Callable[[LoopStatus], None]], str]:
+    """Return what shows the live loop's status, and the address of the view, if any."""
+    from ikns.experiments.conduct import Command
+
+    stops = watch_stops(
+        lambda: conductor.submit(Command("connect")),
+        how="; the panel can connect it again",
+    )
+    shown, address = [stack.enter_context(stops)], ""
+    if arm.view:
+        from ikns.view.scene import body_view
+
+        assert arm.subject is not None
+        name, dofs = arm.subject.resolve().name, driven_dofs(arm, subject)
+        view = body_view(subject, simulated=simulated, name=name, dofs=dofs)
+        window, draw = stack.enter_context(view)
+        shown.append(draw)
+        address = window.url
+    return shown, address
 
 
 def _ring(
@@ -296,24 +311,6 @@ def _page_drivers(held: Mapping[str, HeldInput]) -> Drivers:
         return lambda: nullcontext(one)
 
     return {name: opener(one) for name, one in held.items()}
-
-
-def _open_view(
-    stack: ExitStack,
-    subject: ikns.Subject,
-    name: str,
-    shown: list[Callable[[LoopStatus], None]],
-    *,
-    simulated: bool,
-    dofs: Sequence[int],
-) -> str:
-    """Serve the 3-D view; `shown` gets what draws a status. Returns its address."""
-    from ikns.view.scene import body_view
-
-    view = body_view(subject, simulated=simulated, name=name, dofs=dofs)
-    window, draw = stack.enter_context(view)
-    shown.append(draw)
-    return window.url
 
 
 def _announce(page: str, panel: str, *, browser: bool) -> None:
