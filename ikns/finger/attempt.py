@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 
-class Attempt:
+class ConnectionAttempt:
     """An attempt to connect, made by the finger's thread for a caller that waits.
 
     Attributes

@@ -10,7 +10,7 @@ from typing import Self
 
 from ikns.endings import ending_requested
 from ikns.errors import InvalidInput
-from ikns.finger.attempt import Attempt, relax_after
+from ikns.finger.attempt import ConnectionAttempt, relax_after
 from ikns.finger.bus import Bus
 from ikns.finger.configuration import ServoConfiguration
 from ikns.finger.drive import Drive
@@ -119,7 +119,7 @@ class DynamixelFinger:
         self._drive = Drive(self._bus, self._configuration, self._guard, self._lock)
         self._access = threading.Lock()  # held while connecting or relaxing
         self._thread: threading.Thread | None = None
-        self._attempt: Attempt | None = None
+        self._attempt: ConnectionAttempt | None = None
         self._stop = threading.Event()
         self._torque_owed = False  # torque may be on since an earlier connection
 
@@ -137,7 +137,7 @@ class DynamixelFinger:
             the torque off until :meth:`relax`.
         """
         with self._access:
-            attempt = Attempt()
+            attempt = ConnectionAttempt()
             relax_at_exit(self)
             try:
                 self._begin(attempt)
@@ -214,7 +214,7 @@ class DynamixelFinger:
         """Relax; a failure is added as a note to an exception already raised."""
         relax_after(self.relax, exception[1])
 
-    def _begin(self, attempt: Attempt) -> None:
+    def _begin(self, attempt: ConnectionAttempt) -> None:
         """Hand an attempt to connect to the thread that owns the bus."""
         thread = self._thread
         if thread is not None and self._stop.is_set():  # an interrupted relaxing
@@ -258,7 +258,7 @@ class DynamixelFinger:
             late.error = FingerError(f"{self._bus.port}: connecting was aborted.")
             late.done.set()
 
-    def _open(self, attempt: Attempt) -> bool:
+    def _open(self, attempt: ConnectionAttempt) -> bool:
         """Connect, on the thread; return whether the bus is still needed."""
         connected_before = self._torque_owed
         with self._lock:

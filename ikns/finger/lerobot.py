@@ -11,7 +11,7 @@ from typing import Self
 
 from ikns.endings import ending_requested
 from ikns.errors import InvalidInput
-from ikns.finger.attempt import Attempt, relax_after
+from ikns.finger.attempt import ConnectionAttempt, relax_after
 from ikns.finger.errors import FingerError
 from ikns.finger.guard import Guard, Safety
 from ikns.finger.lerobot_joint import RobotDevice, RobotJoint
@@ -71,7 +71,7 @@ class LeRobotFinger:
         self._lock = threading.RLock()  # guard and results, never during a call
         self._access = threading.Lock()  # held while connecting or relaxing
         self._thread: threading.Thread | None = None
-        self._connecting: Attempt | None = None
+        self._connecting: ConnectionAttempt | None = None
         self._stop = threading.Event()
         self._known = FingerState()
         self._sent = self._responded = math.nan
@@ -98,7 +98,7 @@ class LeRobotFinger:
                 if thread.is_alive():
                     raise FingerError(f"{self._name} does not answer.")
             relax_at_exit(self)
-            request = self._connecting = Attempt()
+            request = self._connecting = ConnectionAttempt()
             if thread is None or not thread.is_alive():
                 self._stop.clear()
                 thread = self._start()
@@ -240,7 +240,7 @@ class LeRobotFinger:
         with contextlib.suppress(Exception):
             self._joint.disconnect()
 
-    def _open(self, request: Attempt) -> None:
+    def _open(self, request: ConnectionAttempt) -> None:
         """Connect, on the thread; note what went wrong in the request."""
         try:
             with self._lock:
