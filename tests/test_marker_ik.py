@@ -244,6 +244,9 @@ def test_any_pattern_of_gaps_gives_a_finite_pose(pattern, seed):
         (np.full((22, 3), np.inf), "found infinity"),
         (np.diag([np.inf] + [0.3] * 21)[:, :3], "found infinity"),
         (np.diag([-np.inf] + [np.nan] * 21)[:, :3], "found infinity"),
+        # Their squares are infinite.
+        (np.diag([1e160] + [0.3] * 21)[:, :3], r"found one 1e\+160 m away"),
+        (np.diag([-1e308] + [0.3] * 21)[:, :3], r"found one 1e\+308 m away"),
     ],
 )
 def test_impossible_markers_are_refused(skeleton, markers, said):

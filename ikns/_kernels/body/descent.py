@@ -27,6 +27,8 @@ from ikns.arrays import Array
 #: the Hessian changes, up to 50 per radian where markers barely determine a joint. So
 #: after a step of this times the root of the tolerance less than 5 % of it remain.
 _NEWTON = 0.03
+#: Damping from which on no equation is solvable: numbers are too large to square.
+_HOPELESS = 1e30
 
 
 @inner_borrowing
@@ -57,6 +59,23 @@ def errors_at(problem: MarkerProblem, s: Scratch, q: Array) -> tuple[float, floa
         s.x,
         s.error,
         s.turned,
+    )
+
+
+@inner_borrowing
+def penalties_at(problem: MarkerProblem, s: Scratch, q: Array, pull: float) -> float:
+    """Write how far `q` is from `s.start` and beyond limits; return what that costs."""
+    return penalties(
+        problem.tree,
+        problem.angle,
+        problem.lower,
+        problem.upper,
+        s.start,
+        pull,
+        problem.limit,
+        q,
+        s.moved,
+        s.beyond,
     )
 
 
@@ -93,21 +112,11 @@ def descend(
             s.error,
             s.turned,
         )
-        trial_cost += penalties(
-            tree,
-            problem.angle,
-            problem.lower,
-            problem.upper,
-            s.start,
-            pull,
-            problem.limit,
-            s.trial,
-            s.moved,
-            s.beyond,
-        )
+        trial_cost += penalties_at(problem, s, s.trial, pull)
         if not back:
             iterations += 1
-            if trial_cost > cost:
+            # A cost of NaN is no better either.
+            if not trial_cost <= cost:
                 # Once more where it came from, for its errors.
                 back = True
                 copy(s.q, s.trial)
@@ -136,43 +145,13 @@ def descend(
             )
         back = solvable = False
         while not solvable:
-            share = 1.0 if true_hessian else 0.0
-            copy(s.extra, s.damped)
-            if damping > 0:
-                # In proportion to the diagonal (More), so that meters and radians are
-                # treated alike.
-                write_inertia(
-                    carrier, s.weight, s.x, s.error, 0.0, s.moments, s.inertia
-                )
-                diagonal(tree, s.axes, s.moments, s.damped)
-                for d in range(len(s.damped)):
-                    s.damped[d] = s.extra[d] + damping * (s.extra[d] + s.damped[d])
-            write_inertia(carrier, s.weight, s.x, s.error, share, s.moments, s.inertia)
-            release_clusters(
-                tree,
-                s.axes,
-                problem.turn_joint,
-                problem.marker_turn,
-                s.weight,
-                s.x,
-                s.error,
-                share,
-                s.inertia,
-            )
-            solvable = factor(
-                tree,
-                s.axes,
-                s.wrench,
-                share,
-                problem.free,
-                s.damped,
-                s.inertia,
-                s.rows,
-            )
+            solvable = _factored(problem, s, damping, 1.0 if true_hessian else 0.0)
             if not solvable and true_hessian:
                 definite = true_hessian = False
             elif not solvable:
                 damping = max(10 * damping, 1e-6)
+                if damping > _HOPELESS:
+                    return np.sqrt(distance / n_seen), iterations, False
         for d in range(len(s.step)):
             s.step[d] = -s.gradient[d]
         solve(tree, s.rows, s.twist, s.step)
@@ -182,6 +161,68 @@ def descend(
         converged = largest < (enough if true_hessian else tolerance)
         if definite and not true_hessian:
             converged = converged and damping > 1e-3
+
+
+@borrowing
+def _factored(problem: MarkerProblem, s: Scratch, damping: float, share: float) -> bool:
+    """Factor the damped matrix into `s.rows`; False if it is not positive definite."""
+    copy(s.extra, s.damped)
+    if damping > 0:
+        # In proportion to the diagonal (More), so that meters and radians are treated
+        # alike.
+        write_inertia(
+            problem.marker_carrier,
+            s.weight,
+            s.x,
+            s.error,
+            0.0,
+            s.moments,
+            s.inertia,
+        )
+        diagonal(problem.tree, s.axes, s.moments, s.damped)
+        for d in range(len(s.damped)):
+            s.damped[d] = s.extra[d] + damping * (s.extra[d] + s.damped[d])
+    return factor_at(problem, s, s.damped, share)
+
+
+@inner_borrowing
+def factor_at(problem: MarkerProblem, s: Scratch, extra: Array, share: float) -> bool:
+    """Factor the matrix where errors and axes were taken last into `s.rows`.
+
+    `extra` (n,) is added to the diagonal; see
+    :mod:`ikns._kernels.body.articulated`, also for `share`. False if it is not positive
+    definite.
+    """
+    write_inertia(
+        problem.marker_carrier,
+        s.weight,
+        s.x,
+        s.error,
+        share,
+        s.moments,
+        s.inertia,
+    )
+    release_clusters(
+        problem.tree,
+        s.axes,
+        problem.turn_joint,
+        problem.marker_turn,
+        s.weight,
+        s.x,
+        s.error,
+        share,
+        s.inertia,
+    )
+    return factor(
+        problem.tree,
+        s.axes,
+        s.wrench,
+        share,
+        problem.free,
+        extra,
+        s.inertia,
+        s.rows,
+    )
 
 
 @borrowing

@@ -29,8 +29,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.articulated import factor, solve, write_inertia
-from ikns._kernels.body.free_turn import release_clusters
+from ikns._kernels.body.articulated import solve
+from ikns._kernels.body.descent import factor_at
 from ikns._kernels.body.marker_errors import penalties
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch
 from ikns._kernels.body.tree import joint_axes
@@ -157,36 +157,7 @@ def factor_information(
         if s.beyond[d] != 0:
             s.extra[d] += problem.limit**2
     joint_axes(problem.tree, s.rotation, s.translation, s.axes)
-    write_inertia(
-        problem.marker_carrier,
-        s.weight,
-        s.x,
-        s.error,
-        0.0,
-        s.moments,
-        s.inertia,
-    )
-    release_clusters(
-        problem.tree,
-        s.axes,
-        problem.turn_joint,
-        problem.marker_turn,
-        s.weight,
-        s.x,
-        s.error,
-        0.0,
-        s.inertia,
-    )
-    return factor(
-        problem.tree,
-        s.axes,
-        s.wrench,
-        0.0,
-        problem.free,
-        s.extra,
-        s.inertia,
-        s.rows,
-    )
+    return factor_at(problem, s, s.extra, 0.0)
 
 
 @inner_borrowing

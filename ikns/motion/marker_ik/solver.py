@@ -129,6 +129,11 @@ class MarkerIK:
                 "marker positions must be finite or NaN, found infinity."
             )
         if pose.residual == np.inf:
+            if q is None or np.isfinite(q).all():
+                farthest = np.nanmax(np.abs(seen))
+                raise InvalidInput(
+                    f"expected markers of a person, found one {farthest:.2g} m away."
+                )
             raise InvalidInput("the pose before must be finite, found NaN or infinity.")
         return pose
 
