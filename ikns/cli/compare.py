@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,16 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 import ikns
-from ikns.cli.comparison_tables import (
-    HELD,
-    LEGEND,
-    crosstalk_json,
-    crosstalk_sentence,
-    findings_json,
-    leak_sentence,
-    point_table,
-    pooled_table,
-)
+from ikns.cli.comparison_json import Named, found_json
+from ikns.cli.comparison_rows import comparison_rows
+from ikns.cli.comparison_tables import HELD, found_tables
 from ikns.cli.options import (
     AnyMethod,
     AsJson,
@@ -30,14 +22,14 @@ from ikns.cli.options import (
     SubjectFolder,
     To,
 )
-from ikns.cli.output import notes, progress, show, table
+from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.cli.steps_left import one_bar
 from ikns.errors import NotEnoughData, naming
 
 if TYPE_CHECKING:
-    from ikns.analysis.compare import Crosstalk, NullSpaceComparison
+    from ikns.analysis.compare import Crosstalk
     from ikns.body.chains import ChainLike
     from ikns.nullspace.readout import Readout
 
@@ -50,7 +42,6 @@ _PAPER_ONLY = (
 )
 #: Steps after the tracking; their costs are CPU s of the 40 points of four comparisons.
 _POINTS, _COMBINED, _CROSSTALK = "points", "comparisons", "crosstalk"
-Named = tuple[tuple[str, str, str], "NullSpaceComparison"]
 
 
 @reads_markers
@@ -178,11 +169,11 @@ def compare(
             "task": task,
             "settings": _settings(options, gate),
             "points": rows,
-            **_found_json(found, across, recording=reaches or recording),
+            **found_json(found, across, recording=reaches or recording),
             "figure": figure,
             "warnings": warned,
         },
-        *_tables(found, plain, across, title=title, intervals=intervals > 0),
+        *found_tables(found, plain, across, title=title, intervals=intervals > 0),
         *([] if figure is None else [f"Wrote {figure}"]),
         *notes(warned),
         as_json=as_json,
@@ -193,43 +184,6 @@ def _settings(options: dict[str, Any], gate: dict[str, float]) -> dict[str, Any]
     """Return how intervals were made and which samples were taken."""
     units = {f"{name}_{_UNITS[name]}": value for name, value in gate.items()}
     return options | {"level": 0.95} | units
-
-
-def _found_json(
-    found: list[Named], across: Crosstalk | None, *, recording: Path
-) -> dict[str, Any]:
-    """Return all comparisons, and the crosstalk on a recording if it is known."""
-    return {
-        "comparisons": [
-            findings_json(each, chain=names[0], task=names[1], coordinates=names[2])
-            for names, each in found
-        ],
-        "crosstalk": None
-        if across is None
-        else crosstalk_json(across, recording=recording),
-    }
-
-
-def _tables(
-    found: list[Named],
-    plain: list[Named],
-    across: Crosstalk | None,
-    *,
-    title: str,
-    intervals: bool,
-) -> list[Any]:
-    """Return tables of every point, where `plain`, and of all points together."""
-    brackets = "; in brackets 95 % intervals" if intervals else ""
-    return [
-        *(
-            point_table(each, f"{title}: {names[0]}, hand {HELD[names[1]]} held")
-            for names, each in plain
-        ),
-        pooled_table(found, f"All points together (root mean squares){brackets}"),
-        leak_sentence(plain[0][1]),
-        *([] if across is None else [crosstalk_sentence(across)]),
-        LEGEND,
-    ]
 
 
 def _crosstalk(
@@ -336,80 +290,3 @@ def _draw(
         crosstalk=across,
     )
     write_picture(path, drawn, force=force)
-
-
-def comparison_rows(
-    subject: ikns.Subject,
-    motion: ikns.Motion,
-    *,
-    source: str,
-    task: Literal["pose", "position"] = "pose",
-) -> tuple[list[dict[str, Any]], list[str]]:
-    """Return one row a PCA point, and what the analytic map warns of.
-
-    Where the recording has no still sample near a point, its row says just that.
-    """
-    import numpy as np
-
-    from ikns.analysis.compare import compare_visited
-    from ikns.nullspace.map import MapWarning
-
-    with naming(source), warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", MapWarning)
-        visited = compare_visited(
-            subject.null_space_map,
-            subject.skeleton,
-            motion,
-            chain=subject.chain,
-            task=task,
-            **subject.gate,
-        )
-    found = visited.comparison
-    rows: list[dict[str, Any]] = [
-        {"point": k + 1, "samples": int(count)}
-        for k, count in enumerate(visited.counts)
-    ]
-    for i, k in enumerate(visited.points):
-        rows[k] |= {
-            "angle_deg": np.degrees(found.angles[i]).tolist(),
-            "inside": float(found.inside[i]),
-            "learned_leak_m": float(found.learned_leak[i]),
-            "learned_leak_corrected_m": float(found.learned_leak_corrected[i]),
-            "learned_leak_interval_m": found.learned_leak_interval[i].tolist(),
-            "analytic_leak_m": float(found.analytic_leak[i]),
-            "agreement": float(found.agreement[i]),
-            "learned_direction": visited.learned.directions_[i].tolist(),
-            "analytic_direction": visited.analytic.directions_[i].tolist(),
-        }
-    return rows, [f"analytic map: {warning.message}" for warning in caught]
-
-
-def comparison_table(rows: list[dict[str, Any]], title: str) -> Any:
-    """Return the rows as a table for people."""
-    nan = float("nan")
-    return table(
-        title,
-        {
-            "point": "d",
-            "still\nsamples": "d",
-            "angle\ndeg": ".1f",
-            "% variance\nalong analytic": ".1f",
-            "leak mm/c\nlearned": ".1f",
-            "without\nnoise": ".1f",
-            "leak mm/c\nanalytic": ".1f",
-            "r of\nboth c": ".3f",
-        },
-        [
-            [
-                row["point"],
-                row["samples"],
-                max(row.get("angle_deg", [nan])),
-                100 * row.get("inside", nan),
-                1000 * row.get("learned_leak_m", nan),
-                1000 * row.get("learned_leak_corrected_m", nan),
-                1000 * row.get("analytic_leak_m", nan),
-                row.get("agreement", nan),
-            ]
-            for row in rows
-        ],
-    )

@@ -1,4 +1,4 @@
-"""What ``ikns compare`` found, as JSON and as tables for people."""
+"""What ``ikns compare`` found, as tables for people."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ikns.cli.comparison_json import Named
 from ikns.cli.output import table
 
 if TYPE_CHECKING:
@@ -14,78 +15,6 @@ if TYPE_CHECKING:
 #: Names in words.
 HELD = {"pose": "position and orientation", "position": "position"}
 SHOULDER = {"internal": "internal", "isb": "ISB", "rotation_vector": "vector"}
-
-
-def findings_json(found: NullSpaceComparison, **about: Any) -> dict[str, Any]:
-    """Return all numbers of a comparison; angles in deg, everything else in SI."""
-    import numpy as np
-
-    def degrees(values: Any) -> Any:
-        return np.degrees(values).tolist()
-
-    points = [
-        {
-            "point": int(found.points[i]) + 1,
-            "samples": int(found.counts[i]),
-            "angles_deg": degrees(found.angles[i]),
-            "angle_corrected_deg": degrees(found.angle_corrected[i]),
-            "angle_interval_deg": degrees(found.angle_interval[i]),
-            "mean_posture_angles_deg": degrees(found.mean_posture_angles[i]),
-            "mean_posture_interval_deg": degrees(found.mean_posture_interval[i]),
-            "concentration": found.concentration[i],
-            "inside": found.inside[i],
-            "inside_interval": found.inside_interval[i],
-            "inside_mean_posture": found.inside_mean_posture[i],
-            "inside_chance_median_and_95": found.inside_chance[i],
-            "leak_m": found.leak[i],
-            "leak_corrected_m": found.leak_corrected[i],
-            "leak_interval_m": found.leak_interval[i],
-            "turn_deg": degrees(found.turn[i]),
-            "turn_corrected_deg": degrees(found.turn_corrected[i]),
-            "turn_interval_deg": degrees(found.turn_interval[i]),
-            "kinematic_leak_m": found.kinematic_leak[i],
-            "kinematic_turn_deg": degrees(found.kinematic_turn[i]),
-            "curvature_deg": degrees(found.curvature[i]),
-            "straight_leak_m": found.straight_leak[i],
-            "straight_turn_deg": degrees(found.straight_turn[i]),
-            "agreement": found.agreement[i],
-            "agreement_interval": found.agreement_interval[i],
-            "direction": found.directions[i],
-            "null_directions": found.null_directions[i],
-        }
-        for i in range(len(found.points))
-    ]
-    pooled: dict[str, Any] = {}
-    for name, values in found.pooled.items():
-        kind = name.removesuffix("_corrected")
-        angle = kind.endswith(("angle", "turn", "curvature"))
-        unit = "_deg" if angle else "_m" if kind.endswith("leak") else ""
-        value, low, high = degrees(values) if angle else values
-        pooled[name + unit] = {"value": value, "interval": [low, high]}
-    return about | {
-        "null_space_dimensions": found.null_dim,
-        "chance_angles_deg": {
-            "one_in_twenty_below": degrees(found.chance_angles[0]),
-            "median": degrees(found.chance_angles[1]),
-        },
-        "points": points,
-        "pooled": pooled,
-    }
-
-
-def crosstalk_json(found: Crosstalk, **about: Any) -> dict[str, Any]:
-    """Return all numbers of the reaches."""
-    return about | {
-        "reaches": len(found.change),
-        "mean_change": found.mean_change,
-        "mean_change_interval": found.mean_change_interval,
-        "per_meter": found.per_meter,
-        "per_meter_interval": found.per_meter_interval,
-        "largest_excursion": found.largest,
-        "changes": found.change,
-        "distances_m": found.distance,
-        "excursions": found.excursion,
-    }
 
 
 def point_table(found: NullSpaceComparison, title: str) -> Any:
@@ -263,3 +192,25 @@ def _percent(share: Any) -> Any:
 
 def _milli(meters: Any) -> Any:
     return 1000 * meters
+
+
+def found_tables(
+    found: list[Named],
+    plain: list[Named],
+    across: Crosstalk | None,
+    *,
+    title: str,
+    intervals: bool,
+) -> list[Any]:
+    """Return tables of every point, where `plain`, and of all points together."""
+    brackets = "; in brackets 95 % intervals" if intervals else ""
+    return [
+        *(
+            point_table(each, f"{title}: {names[0]}, hand {HELD[names[1]]} held")
+            for names, each in plain
+        ),
+        pooled_table(found, f"All points together (root mean squares){brackets}"),
+        leak_sentence(plain[0][1]),
+        *([] if across is None else [crosstalk_sentence(across)]),
+        LEGEND,
+    ]

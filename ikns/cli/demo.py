@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ikns.cli.compare import comparison_rows, comparison_table
+from ikns.cli.comparison_rows import comparison_rows, comparison_table
 from ikns.cli.options import AsJson, Force
 from ikns.cli.output import json_text, loading, notes, progress, show
 from ikns.cli.steps_left import one_bar

@@ -9,9 +9,9 @@ from typing import Annotated, Literal
 import typer
 
 import ikns
+from ikns.cli.comparison_json import findings_json
 from ikns.cli.comparison_tables import (
     HELD,
-    findings_json,
     leak_sentence,
     point_table,
     pooled_table,

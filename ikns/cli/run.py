@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import shutil
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -35,19 +34,16 @@ from ikns.cli.options import (
     Rrd,
     SubjectFolder,
 )
-from ikns.cli.output import show, table
 from ikns.cli.reading import label_names
-from ikns.cli.stop_notice import STOPPED, arm_hint, watch_stops
+from ikns.cli.run_report import show_report
+from ikns.cli.run_status import LINE_EVERY, each, once, status_line
+from ikns.cli.stop_notice import STOPPED
 from ikns.endings import signal_exit_code, stop_on_signals
 from ikns.errors import DataLoss, InvalidInput
 
 if TYPE_CHECKING:
-    from ikns.live.publish import Publishers
-    from ikns.live.runtime import AxisStatus, LoopStatus, Report
+    from ikns.live.runtime import LoopStatus, Report
     from ikns.live.session.writer import RunWriter
-
-#: Interval of the status line on the terminal, s.
-_LINE_EVERY = 0.2
 
 
 def run(
@@ -184,8 +180,8 @@ def run(
         )
         writer = stack.enter_context(log)
         arm = threading.Event()
-        told = _once(lambda: say_undriven(n_dof, group.dofs))  # with all connected
-        shown = [told, stack.enter_context(_status_line(arm))]
+        told = once(lambda: say_undriven(n_dof, group.dofs))  # with all connected
+        shown = [told, stack.enter_context(status_line(arm))]
         if view:
             shown.append(_body(stack, calibrated, subject, simulated, group.dofs))
         report = drive(
@@ -197,8 +193,8 @@ def run(
             duration=math.inf if duration is None else duration,
             stop=stop,
             arm=arm,
-            on_status=_each(shown),
-            status_every=1 / 30 if view else _LINE_EVERY,
+            on_status=each(shown),
+            status_every=1 / 30 if view else LINE_EVERY,
             on_notice=say,
             listener=publisher,
             realtime=realtime,
@@ -206,7 +202,7 @@ def run(
         told()  # it may have been too short for a status
     session = _kept(report, writer, session)
     title = f"{source} to {'nothing (dry run)' if dry_run else ' and '.join(addresses)}"
-    _show_report(report, title, session, losses, publisher, as_json=as_json)
+    show_report(report, title, session, losses, publisher, as_json=as_json)
     _exit(report, losses)
 
 
@@ -275,41 +271,6 @@ def _body(
     return take
 
 
-def _show_report(
-    report: Report,
-    title: str,
-    session: Path | None,
-    losses: list[str],
-    publisher: Publishers | None,
-    *,
-    as_json: bool,
-) -> None:
-    """Print how a run went."""
-    from ikns.live.runtime.report import frames
-
-    published = None if publisher is None else publisher.counts
-    result = _result(report) | {
-        "session": session,
-        "losses": losses,
-        "published": published,
-    }
-    show(
-        result,
-        table(
-            title,
-            {"quantity": "s", "value": "s"},
-            _rows(report, published),
-        ),
-        *(
-            f"{c.time:9.3f} s  {c.before} to {c.after}: {c.reason}"
-            for c in report.transitions[-12:]
-        ),
-        *(f"{frames(n)}: {why}" for why, n in _most(report.rejections)),
-        *([f"Wrote {session}"] if session else []),
-        as_json=as_json,
-    )
-
-
 def _exit(report: Report, losses: list[str]) -> None:
     """Say what must not be missed, and exit with its code."""
     if losses:
@@ -319,126 +280,3 @@ def _exit(report: Report, losses: list[str]) -> None:
         raise typer.Exit(STOPPED)
     if code := signal_exit_code():
         raise typer.Exit(code)
-
-
-def _most(rejections: dict[str, int]) -> list[tuple[str, int]]:
-    """Return the most frequent reasons."""
-    return list(rejections.items())[:12]
-
-
-@contextmanager
-def _status_line(arm: threading.Event) -> Iterator[Callable[[LoopStatus], None]]:
-    """Rewrite one line on stderr if it is a terminal; a key arms what is stopped."""
-    with watch_stops(arm.set, announce=False) as watch:
-        if not sys.stderr.isatty():
-            yield watch
-            return
-        last = -math.inf
-
-        def write(status: LoopStatus) -> None:
-            nonlocal last
-            watch(status)
-            if status.time - last >= _LINE_EVERY:
-                last = status.time
-                # A wrapped line could not be rewritten.
-                room = shutil.get_terminal_size().columns - 1
-                sys.stderr.write(f"\r\x1b[K{_line(status)[:room]}")
-                sys.stderr.flush()
-
-        yield write
-        sys.stderr.write("\n")
-
-
-def _each(shown: list[Callable[[LoopStatus], None]]) -> Callable[[LoopStatus], None]:
-    def show(status: LoopStatus) -> None:
-        for one in shown:
-            one(status)
-
-    return show
-
-
-def _once(call: Callable[[], None]) -> Callable[..., None]:
-    """Return what does something the first time that it is called."""
-    left = [call]
-
-    def tell(*_: LoopStatus) -> None:
-        while left:
-            left.pop()()
-
-    return tell
-
-
-def _line(s: LoopStatus) -> str:
-    """Return the status, most important first: a narrow terminal cuts the rest."""
-    # The reason stands above, where it does not vanish.
-    state = f"STOPPED{arm_hint()}:" if s.stopped else f"{s.state:<7}"
-    drive = f"{state} {' '.join(_axis(axis, s.axes) for axis in s.axes)}"
-    late = 1e3 * s.latency
-    # Never wider, so that 80 columns hold the residual too.
-    pace = f"{s.rate:4.0f}/s p99 {late:4.{2 if late < 9.995 else 0}f} ms"
-    if s.rejection:
-        return f"{drive} {s.rejection} {pace} misses {s.misses}"
-    place = "inside" if s.inside else "OUTSIDE"
-    return (
-        f"{drive} {pace} {place:<7} residual {1e3 * s.residual:4.1f} mm "
-        f"c +-{s.uncertainty:5.3f} worst {1e3 * s.worst_residual:3.0f} mm "
-        f"misses {s.misses}"
-    )
-
-
-def _axis(axis: AxisStatus, axes: tuple[AxisStatus, ...]) -> str:
-    if len(axes) == 1 and axis.dof == 1:
-        return f"c {axis.c:5.2f} flexion {axis.flexion:4.2f} ({axis.measured:4.2f})"
-    # Two fit into 80 columns: c, flexion, measured.
-    return f"c_{axis.dof} {axis.c:5.2f} {axis.flexion:4.2f} ({axis.measured:4.2f})"
-
-
-def _result(report: Report) -> dict[str, Any]:
-    return {
-        "frames": report.frames,
-        "seconds": report.seconds,
-        "deadline_misses": report.misses,
-        "latency_s": {
-            name: {
-                "p50": times.percentile(50),
-                "p99": times.percentile(99),
-                "p999": times.percentile(99.9),
-                "worst": times.percentile(100),
-            }
-            for name, times in report.stages.items()
-        },
-        "source": report.source,
-        "problem": report.problem,
-        "rejections": report.rejections,
-        "notices": report.notices,
-        "transitions": [change._asdict() for change in report.transitions],
-        "lost_rows": report.lost_rows,
-    }
-
-
-def _rows(report: Report, published: dict[str, Any] | None) -> list[list[str]]:
-    total = report.stages["total"]
-    counted = report.source
-    return [
-        ["frames", str(report.frames)],
-        ["seconds", f"{report.seconds:.1f}"],
-        ["frames rejected", str(sum(report.rejections.values()))],
-        [
-            "dropped, late, repeated, out of order",
-            ", ".join(
-                str(counted[name])
-                for name in ("dropped", "late", "repeated", "out_of_order")
-            ),
-        ],
-        [
-            "receipt to command, p50 / p99 / worst ms",
-            " / ".join(f"{1e3 * total.percentile(p):.2f}" for p in (50, 99, 100)),
-        ],
-        ["frames that took longer than a frame period", str(report.misses)],
-        ["rows missing on disk", str(report.lost_rows)],
-        *(
-            [["published / dropped", "{sent} / {dropped}".format(**published)]]
-            if published
-            else []
-        ),
-    ]
