@@ -257,7 +257,7 @@ class Subject:
 
     def _map(self) -> dict[str, Any]:
         learned = self.null_space_map
-        # What a chain of one's own is, nothing else says.
+        # Nothing else in the folder says what a custom chain is.
         known_chain = str(self.chain) in shipped_chains()
         own = {} if known_chain else as_chain(self.chain).table()
         # A map that was not fitted has no postures.

@@ -1,4 +1,4 @@
-"""``ikns markers new``: a marker set of one's own."""
+"""``ikns markers new``: a marker set of your own."""
 
 from __future__ import annotations
 

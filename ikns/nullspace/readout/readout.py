@@ -150,7 +150,7 @@ def _intent_map(table: dict[str, Any]) -> IntentMap:
         held["leverage"],
         offset=held["offset_rad"],
         taught_leverage=held["taught_leverage"],
-        # Folders of before have none.
+        # Older folders have none.
         places=held.get("places_m", ()),
         heights=held.get("heights_rad", ()),
         coverage=held["coverage"],
