@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns.errors import InvalidInput
-from ikns.live.control.frame import ControlFrame, FrameSolver
+from ikns.live.control.frame import FrameSolver
+from ikns.live.control.frame_result import ControlFrame
 from ikns.live.control.rejection import (
     NONE_EXCHANGED,
     fits_markers,

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
-from ikns.live.control.frame import ControlFrame, FrameSolver
+from ikns.live.control.frame import FrameSolver
+from ikns.live.control.frame_result import ControlFrame
 from ikns.live.control.settings import ControlSettings
 from ikns.motion.marker_ik.rejection import (
     chain_columns,

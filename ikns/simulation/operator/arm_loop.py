@@ -15,7 +15,8 @@ from ikns._kernels.body.simulated_markers import write_cubic
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.live.control.controller import Controller
-from ikns.live.control.frame import MAX_UNCERTAINTY, ControlFrame, FrameSolver
+from ikns.live.control.frame import MAX_UNCERTAINTY, FrameSolver
+from ikns.live.control.frame_result import ControlFrame
 from ikns.live.control.settings import ControlSettings
 from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.artifacts import SoftTissue
