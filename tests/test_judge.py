@@ -195,6 +195,19 @@ def test_a_marker_put_elsewhere_is_told():
     assert "30 mm farther apart" in found.found
 
 
+def test_noise_does_not_hide_a_marker_that_was_put_elsewhere():
+    markers = np.array(reaching().markers)
+    markers += np.random.default_rng(2).normal(0, 0.008, markers.shape)
+    noisy = changed(reaching(), markers)
+    assert "marker moved" not in {one.kind for one in check(noisy).findings}
+    first, second = (reaching().labels.index(f"Ann:{m}") for m in ("RFRM", "RWRA"))
+    line = reaching().markers[:, first] - reaching().markers[:, second]
+    markers[:, first] += 0.04 * line / np.linalg.norm(line, axis=1, keepdims=True)
+    found = {one.kind: one for one in check(changed(reaching(), markers)).findings}
+    assert {"noise", "marker moved"} <= set(found)
+    assert "farther apart than in the static trial" in found["marker moved"].found
+
+
 def test_another_persons_static_trial_is_told_by_distances_and_by_name():
     rng = np.random.default_rng(3)
     worn = generic().marker_set

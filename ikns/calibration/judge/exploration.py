@@ -10,6 +10,11 @@ from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.distance_findings import (
+    exchanged_names,
+    moved_marker,
+    unsteady_pair,
+)
 from ikns.calibration.judge.distances import (
     MOST_CHANGE,
     Distances,
@@ -23,7 +28,6 @@ from ikns.calibration.judge.finding import (
     Finding,
     refused,
     say_frames,
-    say_markers,
     worst_first,
 )
 from ikns.calibration.judge.labels import judge_labels
@@ -112,10 +116,14 @@ def _judge(
     if spoiled.all():
         return findings
     good = measured[~spoiled]
-    distant, exchanges = _judge_distances(where, worn, good, pairs, apart)
-    if any(finding.kind == "noise" for finding in findings):
-        # Noise lets distances vary; that names are wrong is not the reason.
-        distant = [finding for finding in distant if finding.kind != "marker moved"]
+    distant, exchanges = _judge_distances(
+        where,
+        worn,
+        good,
+        pairs,
+        apart,
+        noisy=any(finding.kind == "noise" for finding in findings),
+    )
     findings += distant
     if not exchanges and len(pairs):
         every = pair_distances(measured, pairs)
@@ -160,9 +168,19 @@ def _pairs(worn: MarkerSet) -> Indices:
 
 
 def _judge_distances(
-    where: str, worn: MarkerSet, markers: Array, pairs: Indices, apart: Array | None
+    where: str,
+    worn: MarkerSet,
+    markers: Array,
+    pairs: Indices,
+    apart: Array | None,
+    *,
+    noisy: bool,
 ) -> tuple[list[Finding], list[tuple[int, int]]]:
-    """Judge distances within segments; also return the exchanges that mend them."""
+    """Judge distances within segments; also return the exchanges that mend them.
+
+    That distances vary says nothing where markers are `noisy`; that their middle is
+    another than on the person does.
+    """
     if not len(pairs):
         return [], []
     labels = worn.labels
@@ -174,7 +192,7 @@ def _judge_distances(
     if apart is not None and _sides_exchanged(found, pairs, apart, labels):
         return [sides_exchanged(where, "then all distances fit")], []
     exchanges, left = exchanged_by_distance(found, pairs, apart)
-    findings = _exchanged(where, labels, exchanges)
+    findings = exchanged_names(where, labels, exchanges)
     if apart is not None and not exchanges:
         i, j = pairs.T
         off = np.abs(found.middle[i, j] - apart)
@@ -196,9 +214,9 @@ def _judge_distances(
         spread = found.spread[i, j]
         shift = np.zeros(len(i)) if apart is None else found.middle[i, j] - apart[left]
         if np.abs(shift).max() > MOST_CHANGE:
-            findings.append(_moved(where, labels, pairs[left], shift))
-        else:
-            findings.append(_unsteady(where, labels, pairs[left], spread))
+            findings.append(moved_marker(where, labels, pairs[left], shift))
+        elif not noisy:
+            findings.append(unsteady_pair(where, labels, pairs[left], spread))
     return findings, exchanges
 
 
@@ -222,73 +240,6 @@ def _sides_exchanged(
         found.middle[np.ix_(other, other)], found.spread[np.ix_(other, other)]
     )
     return _share_off(swapped, pairs, apart) < min(_OTHERS, share / 2)
-
-
-def _exchanged(
-    where: str, labels: tuple[str, ...], exchanges: list[tuple[int, int]]
-) -> list[Finding]:
-    """Name the markers of each exchange, those that share one together."""
-    groups: list[list[tuple[int, int]]] = []
-    for pair in exchanges:
-        joined = [g for g in groups if any(set(pair) & set(p) for p in g)]
-        groups = [g for g in groups if g not in joined]
-        groups.append([*(p for g in joined for p in g), pair])
-    findings = []
-    for group in groups:
-        names = tuple(
-            labels[i] for i in dict.fromkeys(i for pair in group for i in pair)
-        )
-        steps = ", then ".join(f"{labels[a]} and {labels[b]}" for a, b in group)
-        findings.append(
-            Finding(
-                "exchanged",
-                "refuse",
-                where,
-                f"{say_markers(names)} have swapped names: their distances to other "
-                "markers of their segments are off",
-                f"swap {steps}: then all distances fit",
-                names,
-            )
-        )
-    return findings
-
-
-def _moved(
-    where: str, labels: tuple[str, ...], pairs: Indices, changes: Array
-) -> Finding:
-    """Name the two markers whose distance changes most; changes (N,) are signed, m."""
-    total = np.bincount(pairs.ravel(), np.repeat(np.abs(changes), 2), len(labels))
-    worst = int(total.argmax())
-    own = np.flatnonzero((pairs == worst).any(axis=1))
-    k = own[int(np.abs(changes[own]).argmax())]
-    pair = [labels[i] for i in pairs[k]]
-    size = f"{1000 * abs(changes[k]):.0f} mm"
-    side = "farther apart" if changes[k] > 0 else "closer"
-    return Finding(
-        "marker moved",
-        "warn",
-        where,
-        f"{pair[0]} and {pair[1]} are {size} {side} than in the static trial",
-        f"check {labels[worst]}: a marker moved or has another marker's name",
-        (labels[worst], *(name for name in pair if name != labels[worst])),
-    )
-
-
-def _unsteady(
-    where: str, labels: tuple[str, ...], pairs: Indices, spread: Array
-) -> Finding:
-    """Name the two markers of a segment whose distance varies most."""
-    k = int(spread.argmax())
-    pair = tuple(labels[i] for i in pairs[k])
-    return Finding(
-        "marker moved",
-        "warn",
-        where,
-        f"the distance of {pair[0]} and {pair[1]}, on one segment, varies by "
-        f"{1000 * spread[k]:.0f} mm",
-        f"check {pair[0]} and {pair[1]}: a marker has another marker's name",
-        pair,
-    )
 
 
 def _astray(where: str, worn: MarkerSet, apart: Array, pairs: Indices) -> list[Finding]:
