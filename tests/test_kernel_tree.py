@@ -64,23 +64,17 @@ def test_poses_and_axes_of_any_tree_are_pinocchios(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_way_of_each_degree_of_freedom_to_the_root_is_its_support(seed):
+def test_way_of_each_joint_to_the_root_is_its_support(seed):
     rng = np.random.default_rng(seed)
     model = any_model(rng, 8)
     tree, _ = joint_tree(model)
     for i in range(8):
-        support = [
-            dof
-            for joint in list(model.supports[i + 1])[1:]
-            for dof in range(
-                model.idx_vs[joint], model.idx_vs[joint] + model.nvs[joint]
-            )
-        ]
-        way, dof = [], int(tree.first_v[i]) + model.nvs[i + 1] - 1
-        while dof >= 0:
-            way.append(dof)
-            dof = int(tree.dof_parent[dof])
-        assert sorted(way) == sorted(support)
+        way, joint = [], i
+        while joint >= 0:
+            way.append(joint + 1)
+            joint = int(tree.parent[joint])
+        assert sorted(way) == sorted(list(model.supports[i + 1])[1:])
+        assert tree.first_v[i] == model.idx_vs[i + 1]
 
 
 def test_markers_and_hands_in_the_tree_are_where_the_skeleton_has_them():

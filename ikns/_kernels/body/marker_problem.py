@@ -98,7 +98,6 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
         tree.parent,
         tree.first_q,
         tree.first_v,
-        tree.dof_parent,
         p.angle,
         p.marker_joint,
         p.marker_carrier,
@@ -130,7 +129,7 @@ def unpack(whole: Indices, real: Array) -> MarkerProblem:
     """Unpack a problem."""
     J, n, M, S, nq = whole[0], whole[1], whole[2], whole[3], whole[4]
     i, K = 8, whole[7]
-    tree_at, i = i, i + 4 * J + n
+    tree_at, i = i, i + 4 * J
     angle_at, i = i, i + n
     marker_at, i = i, i + 4 * M
     branch_at, i = i, i + nq
@@ -149,7 +148,6 @@ def unpack(whole: Indices, real: Array) -> MarkerProblem:
         whole[tree_at + 3 * J : tree_at + 4 * J],
         real[rotation_at : rotation_at + 9 * J].reshape(J, 3, 3),
         _table(real, translation_at, J, 3),
-        whole[tree_at + 4 * J : tree_at + 4 * J + n],
     )
     return MarkerProblem(
         tree,

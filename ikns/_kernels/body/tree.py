@@ -30,7 +30,6 @@ class Tree(NamedTuple):
     first_v: Indices  # (J,) and in v
     rotation: Array  # (J, 3, 3) the joint's placement in its parent's frame
     translation: Array  # (J, 3) m
-    dof_parent: Indices  # (n,) next degree of freedom towards the root, or -1
 
 
 @borrowing

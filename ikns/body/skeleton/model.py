@@ -84,14 +84,6 @@ def joint_tree(model: pin.Model) -> tuple[Tree, Array]:
         rotation[i] = carrier.T @ placement.rotation @ turned[i]
         translation[i] = carrier.T @ placement.translation
     first_v = np.array([joint.idx_v for joint in joints])
-    dof_parent = np.empty(model.nv, dtype=np.int64)
-    for i, joint in enumerate(joints):
-        above = -1
-        if parent[i] >= 0:
-            carrier_joint = joints[parent[i]]
-            above = carrier_joint.idx_v + carrier_joint.nv - 1
-        for k in range(joint.nv):
-            dof_parent[joint.idx_v + k] = above if k == 0 else joint.idx_v + k - 1
     tree = Tree(
         kind=np.array(kinds, dtype=np.int64),
         parent=parent.astype(np.int64),
@@ -99,7 +91,6 @@ def joint_tree(model: pin.Model) -> tuple[Tree, Array]:
         first_v=first_v.astype(np.int64),
         rotation=rotation,
         translation=translation,
-        dof_parent=dof_parent,
     )
     return tree, turned
 
