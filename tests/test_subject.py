@@ -204,10 +204,18 @@ def test_a_missing_file_is_named(folder: Path, tmp_path: Path, name: str) -> Non
         Subject.load(tmp_path / "person")
 
 
+def test_what_remembers_places_is_refused_by_those_who_know_of_none(folder: Path):
+    table = json.loads((folder / "intent.json").read_text())
+    assert table["natural_posture"]["heights_rad"]
+    assert table["format"] == 2
+    for name in ("map.json", "calibration.json", "proximal.json"):
+        assert json.loads((folder / name).read_text())["format"] == 1
+
+
 @pytest.mark.parametrize(
     "name", ["map.json", "calibration.json", "proximal.json", "intent.json"]
 )
-@pytest.mark.parametrize("version", [0, 2, "1", None])
+@pytest.mark.parametrize("version", [0, 3, "1", None])
 def test_an_unknown_version_is_refused(
     folder: Path, tmp_path: Path, name: str, version: object
 ) -> None:

@@ -8,7 +8,6 @@ samples of the calibration are known.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chain_files import chain_of_table, shipped_chains
+from ikns.body.chain_files import shipped_chains
 from ikns.body.chains import (
     ChainLike,
     as_chain,
@@ -33,20 +32,21 @@ from ikns.calibration.subject_files import (
     SAMPLES,
     check_subject_folder,
 )
-from ikns.errors import FileError, IknsError, InvalidInput, naming, plain
+from ikns.calibration.subject_tables import (
+    COLUMNS,
+    FORMAT,
+    chain_of_map,
+    read_json,
+    read_readout,
+    read_samples,
+    write_json,
+    write_readout,
+)
+from ikns.errors import FileError, IknsError, InvalidInput, naming
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.readout import METHODS, Method, Readout
 from ikns.output.folder import check_output_folder, output_folder
-
-#: Version of the folder's layout and of the JSON files in it.
-FORMAT = 1
-
-#: Columns of the still samples: hand position, m in the thorax frame, and number of the
-#: PCA point, from 1; 0 for none.
-_COLUMNS = "x_m,y_m,z_m,point"
-#: What a map of a chain that does not come with the package says of it.
-_OF_CHAIN = ("joints", "ends", "base", "extrinsic")
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +149,10 @@ class Subject:
         with output_folder(folder) as part:
             self.skeleton.write(part / "skeleton.urdf")
             self.skeleton.marker_set.write(part / "markers.toml")
-            _write_json(part / "map.json", self._map())
-            _write_json(part / "calibration.json", {"format": FORMAT} | self.report)
+            write_json(part / "map.json", self._map())
+            write_json(part / "calibration.json", {"format": FORMAT} | self.report)
             for method, readout in self.readouts.items():
-                table = {"format": FORMAT} | readout.table()
-                _write_json(part / f"{method}.json", table)
+                write_readout(part / f"{method}.json", readout)
             if self.samples is not None:
                 # A tenth of a millimeter is finer than cameras see.
                 np.savetxt(
@@ -161,7 +160,7 @@ class Subject:
                     self.samples,
                     fmt=["%.4f"] * 3 + ["%d"],
                     delimiter=",",
-                    header=_COLUMNS,
+                    header=COLUMNS,
                     comments="",
                 )
 
@@ -182,11 +181,11 @@ class Subject:
         text = read_urdf(urdf)
         with naming(str(urdf)):
             skeleton = Skeleton(text, worn)
-        report = _read_json(place / "calibration.json")
+        report = read_json(place / "calibration.json")
         del report["format"]
-        table = _read_json(place / "map.json")
+        table = read_json(place / "map.json")
         try:
-            chain = _chain(table)
+            chain = chain_of_map(table)
             check_chain(skeleton, chain)
             if tuple(table["joints"]) != chain_joints(chain):
                 raise InvalidInput(
@@ -218,9 +217,9 @@ class Subject:
             raise FileError(
                 f"{place / 'map.json'}: cannot be read as a null-space map: {fault}"
             ) from None
-        samples = _read_samples(place / SAMPLES, n_points=len(learned.centers_))
+        samples = read_samples(place / SAMPLES, n_points=len(learned.centers_))
         readouts = {
-            method: _read_readout(place / f"{method}.json", method, chain)
+            method: read_readout(place / f"{method}.json", method, chain)
             for method in OTHERS
             if (place / f"{method}.json").exists()
         }
@@ -293,72 +292,3 @@ class Subject:
                 )
             ],
         }
-
-
-def _write_json(path: Path, table: dict[str, Any]) -> None:
-    text = json.dumps(table, indent=1, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
-
-
-def _read_samples(path: Path, *, n_points: int) -> Array | None:
-    """Read the still samples; None where a folder has none."""
-    if not path.exists():
-        return None
-    try:
-        header, *rows = path.read_text(encoding="utf-8").splitlines()
-        if header != _COLUMNS:
-            raise InvalidInput(f"the columns {_COLUMNS} were expected, not {header}.")
-        samples = np.array([row.split(",") for row in rows], dtype=np.float64)
-        samples = samples.reshape(-1, 4) if not rows else samples
-        if samples.ndim != 2 or samples.shape[1] != 4 or not np.isfinite(samples).all():
-            raise InvalidInput("four finite numbers were expected in each row.")
-        point = samples[:, 3]
-        if np.any((point % 1 != 0) | (point < 0) | (point > n_points)):
-            raise InvalidInput(f"points 0 to {n_points} were expected.")
-    except (OSError, ValueError) as error:
-        fault = f"{error}" if isinstance(error, IknsError) else f"({plain(error)})."
-        raise FileError(
-            f"{path}: cannot be read as still samples: {fault} Only pictures need "
-            "them: the file can be deleted."
-        ) from None
-    return samples
-
-
-def _chain(table: dict[str, Any]) -> ChainLike:
-    """Return the name of a chain that comes with the package, or the chain."""
-    name = table["chain"]
-    if "ends" not in table:
-        return str(as_chain(name))
-    return chain_of_table(name, {key: table[key] for key in _OF_CHAIN})
-
-
-def _read_readout(path: Path, method: str, chain: ChainLike) -> Readout:
-    """Read the map of a method beside the paper's."""
-    table = _read_json(path)
-    try:
-        if (table["method"], table["chain"]) != (method, str(chain)):
-            raise InvalidInput(
-                f"expected {method} of {chain}, found {table['method']} of "
-                f"{table['chain']}."
-            )
-        return Readout.from_table(table, chain)
-    except (LookupError, TypeError, ValueError) as error:
-        fault = f"{error}" if isinstance(error, IknsError) else f"({error!r})."
-        raise FileError(
-            f"{path}: cannot be read as a map of {method}: {fault} Only --method "
-            f"{method} needs it: the file can be deleted."
-        ) from None
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise FileError(f"{path}: cannot be read as JSON: {plain(error)}.") from None
-    version = table.get("format") if isinstance(table, dict) else None
-    if version != FORMAT:
-        raise FileError(
-            f"{path}: expected format version {FORMAT}, found {version!r}; calibrate "
-            "again or use the version of ikns that wrote it."
-        )
-    return dict(table)

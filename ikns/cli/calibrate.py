@@ -371,7 +371,7 @@ def _rewear(
     """Fit a subject to new places of its markers, and write another folder."""
     from ikns.calibration.rewear import rewear
     from ikns.calibration.steps import body_steps
-    from ikns.calibration.subject import FILES
+    from ikns.calibration.subject_files import FILES
 
     check_output_folder(out, FILES, force=force, inputs=[folder])
     known = ikns.Subject.load(folder)
