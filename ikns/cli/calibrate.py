@@ -6,16 +6,14 @@ who follows prompts; the rest is the same.
 
 from __future__ import annotations
 
-from collections.abc import Container
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
-import ikns
-from ikns.body.chain import ChainLike
-from ikns.cli.calibration_options import check_options
-from ikns.cli.calibration_tables import calibration_parts, methods_parts, shift_sentence
+from ikns.cli.calibration_options import body_of, chain_of, check_options, lengths_of
+from ikns.cli.calibration_runs import fit_again, learn
+from ikns.cli.calibration_tables import calibration_parts
 from ikns.cli.live_calibration import LiveOptions, record_live
 from ikns.cli.options import (
     AsJson,
@@ -26,9 +24,8 @@ from ikns.cli.options import (
     MinStatic,
     To,
 )
-from ikns.cli.output import notes, progress, show
+from ikns.cli.output import show
 from ikns.cli.reading import Read, check_inputs, reads_markers
-from ikns.cli.steps_left import one_bar
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
@@ -203,14 +200,14 @@ def calibrate(
     from ikns.calibration.subject_files import FILES
 
     given_names = check_options(context, live=live, rewear=rewear, short=short)
-    own = _chain(chain, side, clavicle=clavicle, given=given_names)
-    generic = _body_of(stature, mass, sex)
+    own = chain_of(chain, side, clavicle=clavicle, given=given_names)
+    generic = body_of(stature, mass, sex)
     inputs = [static, *(exploration or []), *(natural or []), marker_set, subject]
     inputs.append(None if chain is None else chain_file(chain)[0])
     check_output_folder(out, FILES, force=force, inputs=[*inputs, recordings])
     if rewear:
         assert subject is not None and static is not None  # noqa: PT018
-        _rewear(
+        fit_again(
             read,
             subject,
             static,
@@ -222,7 +219,7 @@ def calibrate(
             as_json=as_json,
         )
         return
-    points, static_seconds, free_seconds = _lengths(
+    points, static_seconds, free_seconds = lengths_of(
         (points, static_seconds, free_seconds), given_names, live=live, short=short
     )
     common: dict[str, Any] = {
@@ -257,7 +254,7 @@ def calibrate(
         natural = [*(natural or []), *movement]
     assert exploration is not None
     check_inputs([static, *exploration, *(natural or [])])
-    person = _learn(
+    person = learn(
         read,
         static,
         [read(path, start=from_, end=to) for path in exploration],
@@ -272,127 +269,6 @@ def calibrate(
     show(
         {"subject": out} | person.report | ({"takes": takes} if live else {}),
         *calibration_parts(person.report),
-        f"Wrote {out}",
-        as_json=as_json,
-    )
-
-
-def _learn(
-    read: Read,
-    static: Path | None,
-    explorations: list[ikns.Recording],
-    natural: list[Path],
-    **options: Any,
-) -> ikns.Subject:
-    """Calibrate, with a bar for all steps, and warn of markers that were not seen."""
-    from ikns.calibration.steps import calibration_steps
-    from ikns.motion.unseen import warn_unseen
-
-    estimates: dict[str, Any] = {}
-    with progress(estimates=estimates) as report:
-        still = None if static is None else read(static)
-        moving = [read(path) for path in natural]
-        steps = calibration_steps(still, explorations, moving)
-        person = ikns.calibrate(
-            still,
-            explorations,
-            natural=moving,
-            progress=one_bar("calibrating", steps, report, estimates),
-            **options,
-        )
-    for frames in explorations:
-        warn_unseen(person.skeleton, frames, options["chain"])
-    return person
-
-
-def _chain(
-    name: str | None, side: str, *, clavicle: bool, given: Container[str]
-) -> ChainLike:
-    if name is not None:
-        if "side" in given or clavicle:
-            raise InvalidInput("--chain says the joints; leave out --side, --clavicle.")
-        from ikns.body.chain_files import load_chain, shipped_chains
-
-        return name if name in shipped_chains() else load_chain(name)
-    if side != "both":
-        return f"{side}_arm" + "_clavicle" * clavicle
-    if clavicle:
-        raise InvalidInput("--clavicle works with --side right or left, not with both.")
-    return "both_arms"
-
-
-def _lengths(
-    values: tuple[int, float, float], given: Container[str], *, live: bool, short: bool
-) -> tuple[int, float, float]:
-    """Points, and seconds of the static trial and of free exploration."""
-    points, static, free = values
-    if short:
-        return (
-            points if "points" in given else 2,
-            static if "static_seconds" in given else 3.0,
-            free if "free_seconds" in given else 0.0,
-        )
-    if live and not free > 0:
-        raise InvalidInput(
-            f"expected --free-seconds above 0 s, found {free:g} s; only --short works "
-            "without free exploration."
-        )
-    return values
-
-
-def _body_of(
-    stature: float | None, mass: float | None, sex: str | None
-) -> ikns.Skeleton | None:
-    """Return a body from anthropometry; None without any of the three."""
-    if stature is not None and mass is not None and sex is not None:
-        return ikns.Skeleton.from_anthropometry(stature, mass, sex)
-    options = {"--stature": stature, "--mass": mass, "--sex": sex}
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise InvalidInput(
-            "expected --stature, --mass and --sex together or none of them, found "
-            f"only {' and '.join(given)}."
-        )
-    return None
-
-
-def _rewear(
-    read: Read,
-    folder: Path,
-    static: Path,
-    natural: list[Path],
-    *,
-    out: Path,
-    marker_set: str | None,
-    min_static: float,
-    force: bool,
-    as_json: bool,
-) -> None:
-    """Fit a subject to new places of its markers, and write another folder."""
-    from ikns.calibration.rewear import rewear
-    from ikns.calibration.steps import body_steps
-    from ikns.calibration.subject_files import FILES
-
-    check_output_folder(out, FILES, force=force, inputs=[folder])
-    known = ikns.Subject.load(folder)
-    estimates: dict[str, Any] = {}
-    with progress(estimates=estimates) as report:
-        still, moving = read(static), [read(path) for path in natural]
-        steps = body_steps(still, moving)
-        person = rewear(
-            known,
-            still,
-            moving,
-            marker_set=marker_set,
-            min_static=min_static,
-            progress=one_bar("calibrating", steps, report, estimates),
-        )
-    person.save(out, force=force)
-    show(
-        {"subject": out, "from": folder} | person.report,
-        shift_sentence(person.report["rewear"], known.methods),
-        *methods_parts(person.report),
-        *notes(person.report["warnings"]),
         f"Wrote {out}",
         as_json=as_json,
     )

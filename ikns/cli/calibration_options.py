@@ -1,11 +1,13 @@
-"""Which options of ``ikns calibrate`` go together."""
+"""Options of ``ikns calibrate``: which go together, and what they mean."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 import typer
 
+import ikns
+from ikns.body.chain import ChainLike
 from ikns.errors import InvalidInput
 
 #: Options of files only.
@@ -86,3 +88,55 @@ def check_options(
             f"expected {' and '.join(missing)}, or --live with a --source."
         )
     return given
+
+
+def chain_of(
+    name: str | None, side: str, *, clavicle: bool, given: Container[str]
+) -> ChainLike:
+    """Return the chain that --chain, --side and --clavicle ask for."""
+    if name is not None:
+        if "side" in given or clavicle:
+            raise InvalidInput("--chain says the joints; leave out --side, --clavicle.")
+        from ikns.body.chain_files import load_chain, shipped_chains
+
+        return name if name in shipped_chains() else load_chain(name)
+    if side != "both":
+        return f"{side}_arm" + "_clavicle" * clavicle
+    if clavicle:
+        raise InvalidInput("--clavicle works with --side right or left, not with both.")
+    return "both_arms"
+
+
+def lengths_of(
+    values: tuple[int, float, float], given: Container[str], *, live: bool, short: bool
+) -> tuple[int, float, float]:
+    """Points, and seconds of the static trial and of free exploration."""
+    points, static, free = values
+    if short:
+        return (
+            points if "points" in given else 2,
+            static if "static_seconds" in given else 3.0,
+            free if "free_seconds" in given else 0.0,
+        )
+    if live and not free > 0:
+        raise InvalidInput(
+            f"expected --free-seconds above 0 s, found {free:g} s; only --short works "
+            "without free exploration."
+        )
+    return values
+
+
+def body_of(
+    stature: float | None, mass: float | None, sex: str | None
+) -> ikns.Skeleton | None:
+    """Return a body from anthropometry; None without any of the three."""
+    if stature is not None and mass is not None and sex is not None:
+        return ikns.Skeleton.from_anthropometry(stature, mass, sex)
+    options = {"--stature": stature, "--mass": mass, "--sex": sex}
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise InvalidInput(
+            "expected --stature, --mass and --sex together or none of them, found "
+            f"only {' and '.join(given)}."
+        )
+    return None
