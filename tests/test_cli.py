@@ -220,8 +220,10 @@ def test_control_writes_what_the_live_loop_would_send(
 ) -> None:
     out = tmp_path / "control.csv"
     argv = ["control", "--subject", str(files / "person"), str(files / "points.c3d")]
-    assert main([*argv, "--out", str(out)]) == 0
+    figure = tmp_path / "c.png"
+    assert main([*argv, "--out", str(out), "--figure", str(figure)]) == 0
     assert capsys.readouterr().err == ""
+    assert figure.read_bytes().startswith(b"\x89PNG")
     rows = read_csv(out)
     measured = ["time_s", "c", "hand_speed_m_s", "inside", "residual_m"]
     assert list(rows) == [*measured, "c_uncertainty"]

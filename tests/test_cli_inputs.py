@@ -21,7 +21,7 @@ from ikns.cli.app import command_parser
 FILES_OUT = {
     "scale": ["out"],
     "ik": ["out"],
-    "control": ["out"],
+    "control": ["out", "figure"],
     "convert": ["target"],
     "markers new": ["out"],
     "compare": ["figure"],

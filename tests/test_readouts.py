@@ -18,7 +18,7 @@ from ikns.calibration.natural import check_own_arm
 from ikns.calibration.readouts import learn_readouts
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.live.control.recorded import control_table
+from ikns.live.control.recorded import control_table, jump_sentence
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.nullspace.map.smooth import SmoothField
@@ -238,6 +238,36 @@ def test_control_writes_what_the_method_reads():
         found = control_table(subject, motion, method=method)
         c = subject.readout(method).control_signal(subject.skeleton, motion)
         np.testing.assert_array_equal(found.rows[:, 1], np.clip(c, 0, 1))
+
+
+def test_jumps_outside_the_volume_are_counted_and_told():
+    subject = small_person.subject()
+    motion, points = subject.motions[0], subject.null_space_map.centers_
+    middle = points.mean(axis=0)
+    # Held in the volume, the hand makes no jump; carried from corner to corner far
+    # outside in one frame, it changes the nearest point each time.
+    hand = np.array(motion.hand_in_thorax)
+    hand[...] = middle
+    held = dataclasses.replace(motion, hand_in_thorax=hand)
+    hand = np.array(hand)
+    corners = middle + 3 * (points - middle)
+    hand[...] = corners[np.arange(len(hand)) % len(corners), None]
+    carried = dataclasses.replace(motion, hand_in_thorax=hand)
+    told = {m: control_table(subject, carried, method=m).summary for m in METHODS}
+    c = control_table(subject, carried).rows[:, 1]
+    far = int((np.abs(np.diff(c)) > 0.1).sum())
+    assert told["paper"]["jumps_outside"] == far > 10
+    assert control_table(subject, held).summary["jumps_outside"] == 0
+    assert told["proximal"]["jumps_outside"] == told["intent"]["jumps_outside"] == 0
+    assert f"jumps {far} times by more than 0.1" in jump_sentence("paper", far)
+    assert "--outside project, or read c with --method" in jump_sentence("paper", far)
+    assert jump_sentence("paper", 0) == ""
+    # What `inside` means depends on the method.
+    assert [told[m]["inside_means"] for m in METHODS] == [
+        "in the volume of the places",
+        "in the ellipsoid around the places",
+        "where natural movement was taught",
+    ]
 
 
 def test_natural_movement_that_covers_nothing_is_refused():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,9 +19,13 @@ from ikns.cli.options import (
     To,
 )
 from ikns.cli.output import notes, progress, show, table
+from ikns.cli.picture import refuse_picture, write_picture
 from ikns.cli.reading import Read, check_inputs, reads_markers
 from ikns.errors import naming
 from ikns.output.file import refuse_overwriting, write_csv
+
+if TYPE_CHECKING:
+    from ikns.live.control.recorded import ControlTable
 
 
 @reads_markers
@@ -40,6 +44,10 @@ def control(
             max=10.0,
         ),
     ] = 0.025,
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="Picture of c over time to write: .png, .svg or .pdf."),
+    ] = None,
     from_: From = None,
     to: To = None,
     force: Force = False,
@@ -52,10 +60,12 @@ def control(
     used is refused, as by `ikns check`.
     """
     refuse_overwriting(out, force=force, inputs=[recording, subject])
+    refuse_picture(figure, force=force, inputs=[recording, subject])
     check_inputs([recording], subject)
 
     from ikns.calibration.judged_motion import judged_motion
-    from ikns.live.control.recorded import control_table
+    from ikns.calibration.simulated import is_simulated
+    from ikns.live.control.recorded import control_table, jump_sentence
 
     calibrated = ikns.Subject.load(subject)
     with naming(str(subject)):
@@ -78,41 +88,61 @@ def control(
     )
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
+    if jumps := jump_sentence(method, result["jumps_outside"]):
+        warned = [*warned, jumps]
+    simulated = is_simulated(calibrated, subject, [recording])
+    if figure is not None:
+        _draw(figure, found, simulated=simulated, force=force)
     show(
         {
             "recording": recording,
             "csv": out,
+            "figure": figure,
+            "simulated": simulated,
             "method": method,
             "methods": calibrated.methods,
             "warnings": warned,
         }
         | result,
-        table(
-            str(recording),
-            {"quantity": "s", "value": "g"},
-            [
-                ["frames", result["frames"]],
-                ["of these without a signal", result["frames_without_signal"]],
-                ["of these, markers rejected", result["frames_rejected"]],
-                ["of these, c too uncertain", result["frames_uncertain"]],
-                ["% with the hand in the volume", _percent(result["inside_share"])],
-                ["% with c clipped to 0 or 1", _percent(result["clipped_share"])],
-                ["median of c", round(result["c_median"], 3)],
-                [
-                    "median standard deviation of c",
-                    round(result["uncertainty_median"], 4),
-                ],
-                [
-                    "median marker residual, mm",
-                    round(1000 * result["residual_median_m"], 1),
-                ],
-            ],
-        ),
+        table(str(recording), {"quantity": "s", "value": "g"}, _rows(result)),
         _methods(method, calibrated),
         *notes(warned),
-        f"Wrote {out}",
+        f"Wrote {out}" + (f" and {figure}" if figure else ""),
         as_json=as_json,
     )
+
+
+def _rows(result: dict[str, Any]) -> list[list[Any]]:
+    """Return the quantities of a summary, for people."""
+    return [
+        ["frames", result["frames"]],
+        ["of these without a signal", result["frames_without_signal"]],
+        ["of these, markers rejected", result["frames_rejected"]],
+        ["of these, c too uncertain", result["frames_uncertain"]],
+        [f"% with the hand {result['inside_means']}", _percent(result["inside_share"])],
+        ["% with c clipped to 0 or 1", _percent(result["clipped_share"])],
+        ["median of c", round(result["c_median"], 3)],
+        ["median standard deviation of c", round(result["uncertainty_median"], 4)],
+        ["median marker residual, mm", round(1000 * result["residual_median_m"], 1)],
+    ]
+
+
+def _draw(path: Path, found: ControlTable, *, simulated: bool, force: bool) -> None:
+    """Draw c as the CSV file has it, with the hand's speed."""
+    from ikns.view.signals import control_figure
+
+    at, rows = found.columns.index, found.rows
+    c = rows[:, 1 : at("hand_speed_m_s")]
+    drawn = control_figure(
+        rows[:, 0],
+        c,
+        rows[:, at("hand_speed_m_s")],
+        # Where c is unknown the line is broken, which says it.
+        (rows[:, at("inside")] > 0) | (c != c).any(axis=1),
+        taught=found.summary["inside_means"],
+        simulated=simulated,
+    )
+    write_picture(path, drawn, force=force)
 
 
 def _methods(method: str, calibrated: ikns.Subject) -> str:

@@ -93,21 +93,24 @@ def control_figure(
     *,
     simulated: bool,
     gate: float | None = None,
+    taught: str = "in the volume",
 ) -> Figure:
-    """Draw c and hand speed over time, shaded where the hand is outside the volume.
+    """Draw c and hand speed over time, shaded where the hand is not as taught.
 
     Parameters
     ----------
     time : (T,) array
         Seconds.
     control_signal : (T,) or (T, d) array
-        Unclipped c; NaN breaks the line.
+        c, clipped or not; NaN breaks the line.
     hand_speed : (T,) array
         m/s in the thorax frame.
     inside : (T,) boolean array
         Whether the hand was inside the interpolation volume.
     gate : float, optional
         Hand speed below which samples were learned from, m/s; drawn as a line.
+    taught : str
+        Where the hand is while `inside` holds.
     """
     t, speed = series(time, "time"), series(hand_speed, "hand_speed")
     signal = np.asarray(control_signal, dtype=np.float64)
@@ -118,7 +121,7 @@ def control_figure(
         figure = new_figure("Control signal over time", simulated=simulated, height=3.9)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.7, 1])
         for axes in (upper, lower):
-            _shade(axes, t, ~within)
+            _shade(axes, t, ~within, f"hand not {taught}")
         for level in (0, 1):
             upper.axhline(level, color=GREY, lw=0.7)
         for k, column in enumerate(signals.T):
@@ -139,7 +142,7 @@ def control_figure(
     return figure
 
 
-def _shade(axes: Any, time: Array, where: Mask) -> None:
+def _shade(axes: Any, time: Array, where: Mask, label: str) -> None:
     """Shade the time intervals in which `where` holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
     if not edges.size:
@@ -152,7 +155,7 @@ def _shade(axes: Any, time: Array, where: Mask) -> None:
         transform=axes.get_xaxis_transform(),
         color="#E3E3E3",
         lw=0,
-        label="hand outside the volume",
+        label=label,
     )
 
 

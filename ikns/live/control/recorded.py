@@ -12,13 +12,17 @@ from ikns.errors import InvalidInput
 from ikns.live.control.frame import MAX_UNCERTAINTY, FrameSolver
 from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
+from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 from ikns.nullspace.map.interpolator import NearestPoint
-from ikns.nullspace.readout import Method, Readout
+from ikns.nullspace.readout import IntentMap, Method, Readout
 from ikns.nullspace.signal_names import signal_names
 from ikns.numerics.median import finite_median
 from ikns.recording.recording import Recording
+
+#: No person moves c by more from one frame of cameras to the next.
+_JUMP = 0.1
 
 
 class ControlTable(NamedTuple):
@@ -29,12 +33,14 @@ class ControlTable(NamedTuple):
     columns : list of str
         ``time_s``; ``c``, clipped to 0 to 1 (``c_1``, ``c_2``, ... for several degrees
         of freedom), NaN while it is too uncertain or the chain's markers are rejected;
-        ``hand_speed_m_s`` in the thorax frame; ``inside``, 1 within the volume of the
-        PCA points, or of intent where natural movement was taught; ``residual_m`` of
-        the markers; ``c_uncertainty`` (``c_1_uncertainty``, ...), a standard deviation.
+        ``hand_speed_m_s`` in the thorax frame; ``inside``, 1 where the method was
+        taught, see :func:`inside_means`; ``residual_m`` of the markers;
+        ``c_uncertainty`` (``c_1_uncertainty``, ...), a standard deviation.
     rows : (T, len(columns)) array
     summary : dict
-        Counts, shares and medians, ready for JSON.
+        Counts, shares and medians, ready for JSON. ``jumps_outside`` counts changes of
+        c by more than 0.1 from one frame to the next that come from the rule of the
+        nearest point outside the volume.
     """
 
     columns: list[str]
@@ -109,6 +115,8 @@ def control_table(
         "frames_rejected": sum(rejections.values()),
         "rejections": rejections,
         "inside_share": float((inside & known).sum() / max(known.sum(), 1)),
+        "inside_means": inside_means(readout),
+        "jumps_outside": _jumps_outside(readout, motion, c, inside),
         "c_median": finite_median(c[:, 0]),
         "clipped_share": float(clipped.any(axis=1).sum() / max(known.sum(), 1)),
         "residual_median_m": finite_median(motion.residual),
@@ -117,6 +125,47 @@ def control_table(
     columns = ["time_s", *names, "hand_speed_m_s", "inside", "residual_m"]
     columns += [f"{name}_uncertainty" for name in names]
     return ControlTable(columns, rows, summary)
+
+
+def inside_means(readout: Readout) -> str:
+    """Say in words where the hand is while ``inside`` is 1."""
+    if isinstance(readout.map, IntentMap):
+        return "where natural movement was taught"
+    if readout.map.interpolation == "smooth":
+        return "in the ellipsoid around the places"
+    return "in the volume of the places"
+
+
+def jump_sentence(method: str, jumps: int) -> str:
+    """Warn of jumps outside the volume; empty without any."""
+    if not jumps:
+        return ""
+    remedy = "calibrate with --outside project"
+    if method == "paper":
+        remedy += ", or read c with --method intent"
+    times = "once" if jumps == 1 else f"{jumps} times"
+    return (
+        f"c jumps {times} by more than {_JUMP:g} from one frame to the next where the "
+        "hand is outside the volume of the places, as the map of the nearest place "
+        f"counts there; {remedy}."
+    )
+
+
+def _jumps_outside(
+    readout: Readout, motion: Motion, c: NDArray[np.float64], inside: NDArray[np.bool_]
+) -> int:
+    """Count jumps of c where the nearest point changes or the hand crosses the hull."""
+    learned = readout.map
+    if isinstance(learned, IntentMap) or learned.interpolation == "smooth":
+        return 0
+    if learned.outside != "nearest":
+        return 0
+    hand = np.nan_to_num(motion.task_position(readout.chain))
+    nearest = nearest_center(hand, learned.centers_, radius=np.inf)[0]
+    other = (np.diff(nearest) != 0) & ~inside[1:] & ~inside[:-1]
+    other |= inside[1:] != inside[:-1]
+    far = (np.abs(np.diff(c, axis=0)) > _JUMP).any(axis=1)
+    return int((other & far).sum())
 
 
 def _knows(readout: Readout) -> bool:
