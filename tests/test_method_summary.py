@@ -71,10 +71,14 @@ def test_a_method_is_recommended_for_live_use(moved):
     rows, best = found["methods"], found["recommended"]
     cost = {m: rows[m]["natural"] + rows[m]["turned_hand"] for m in ("paper", "intent")}
     assert best == min(cost, key=cost.get)
-    assert f"{rows[best]['turned_hand']:.2f} with a turned hand" in found["why"]
-    # What decides is printed, also where one of the two says the opposite.
-    for sum_of_two in cost.values():
-        assert f"({sum_of_two / 2:.2f} on average)" in found["why"]
+    (other,) = cost.keys() - {best}
+    # What decides is printed first, also where one of the two says the opposite.
+    first, rest = found["why"].split(" (")
+    assert f"moves by {cost[best] / 2:.2f} on average" in first
+    assert f"that of {other} by {cost[other] / 2:.2f}" in first
+    for cause, name in (("natural", "natural reach"), ("turned_hand", "turned hand")):
+        a, b = rows[best][cause], rows[other][cause]
+        assert f"{a:.2f} and {b:.2f} with a {name}" in rest
 
 
 def test_a_range_smaller_than_a_reach_s_change_is_no_range(moved):

@@ -216,14 +216,28 @@ def _recommended(
     if len(cost) == 1:
         return {"recommended": best, "why": f"{best} is the only method available"}
 
-    def told_of(method: Method) -> str:
-        values = [(rows[method][cause], name) for cause, name in causes.items()]
-        parts = [f"{v:.2f} with {name}" for v, name in values if v is not None]
-        mean = f" ({cost[method]:.2f} on average)" if len(parts) > 1 else ""
-        return " and ".join(parts) + mean
-
     (other,) = (method for method in cost if method != best)
-    why = f"its c moves by {told_of(best)}, that of {other} by {told_of(other)}"
+    each = {name: (rows[best][c], rows[other][c]) for c, name in causes.items()}
+    why = _why(best, other, cost, each)
     if kind is None:
         why += f"; fewer than {_FEWEST} reaches were recorded"
     return {"recommended": best, "why": why}
+
+
+def _why(
+    best: Method,
+    other: Method,
+    cost: dict[Method, float],
+    causes: dict[str, tuple[float | None, float | None]],
+) -> str:
+    """Say what decided between two methods first, then what it is the mean of."""
+
+    def told(value: float | None) -> str:
+        return "unknown" if value is None or not np.isfinite(value) else f"{value:.2f}"
+
+    each = [f"{told(a)} and {told(b)} with {name}" for name, (a, b) in causes.items()]
+    why = (
+        f"its c moves by {told(cost[best])} on average while nothing is meant, that of "
+        f"{other} by {told(cost[other])}"
+    )
+    return f"{why} ({', '.join(each)})"
