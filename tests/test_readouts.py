@@ -103,11 +103,12 @@ def test_a_half_explored_place_is_asked_for_again():
     wrist, swivel, which = planted(2)
     keep = (which != 3) | (np.arange(len(which)) % 60 < 30)
     intent = IntentMap(8).fit(wrist[keep], swivel[keep])
-    with pytest.warns(MapWarning, match="1 of 8 places were half explored") as told:
+    with pytest.warns(MapWarning, match="turned only part of the way") as told:
         intent.warn_of_scatter([f"point {k}" for k in range(1, 9)])
     assert len(told) == 1
     worst = 1 + int(np.argmin(intent.upper_ - intent.lower_))
-    assert f"point {worst} (0." in str(told[0].message)
+    assert f"at point {worst} the elbow" in str(told[0].message)
+    assert f"is {intent.scatter_.max():.2f} of the range" in str(told[0].message)
     assert "hold the hand there again" in str(told[0].message)
 
 
@@ -117,8 +118,16 @@ def test_a_place_of_another_posture_is_no_half_explored_one():
     # 0.4 rad of a range of 1.2; one place of eight moves the ends of all by nothing.
     assert np.isclose(intent.scatter_.max(), 0.4 / 1.2, atol=1e-6)
     assert np.allclose(intent.ends_, (-0.3, 0.9), atol=1e-6)
-    with pytest.warns(MapWarning, match="1 of 8 .*another natural posture.*movement"):
+    with pytest.warns(
+        MapWarning, match="than the natural one.*0.33 of.*movement"
+    ):
         intent.warn_of_scatter()
+    # Several points in one sentence, the worst first.
+    intent.scatter_[:] = [0.2, 0.3, 0.15, 0.4, 0.5, 0, 0, 0]
+    names = [f"point {k}" for k in range(1, 9)]
+    several = r"at point 5, point 4 and point 2 \(and 2 more\) .*0.50, 0.40 and 0.30 of"
+    with pytest.warns(MapWarning, match=several):
+        intent.warn_of_scatter(names)
 
 
 @given(st.integers(0, 50), st.floats(0.1, 0.5))

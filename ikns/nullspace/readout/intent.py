@@ -15,7 +15,7 @@ are known, the ends are those of the motion without its noise
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -303,25 +303,31 @@ class IntentMap(EstimatorBase):
         narrow = width < (1 - _HALF_EXPLORED) * (self.ends_[1] - self.ends_[0])
         wide = self.scatter_ > _HALF_EXPLORED
         for which, why, remedy in (
-            (wide & narrow, "half explored", "hold the hand there again, and turn the "
-             "elbow to both ends"),
-            (wide & ~narrow, "swept about another natural posture",
-             "record ordinary movement there too"),
+            (wide & narrow, "the elbow turned only part of the way, and an end of the "
+             "swing is", "hold the hand there again, and turn the elbow to both ends"),
+            (wide & ~narrow, "the elbow swings about a posture other than the natural "
+             "one, and an end of the swing is", "record ordinary movement there too"),
         ):  # fmt: skip
             worst = [k for k in np.argsort(-self.scatter_).tolist() if which[k]]
-            named = [
-                f"{names[k] if names else format_point(self.centers_, k)} "
-                f"({self.scatter_[k]:.2f})"
-                for k in worst[:_NAMED]
-            ]
-            if named:
-                warnings.warn(
-                    f"{len(worst)} of {len(self.centers_)} places were {why}, their "
-                    f"ends more than {_HALF_EXPLORED:g} of the range from the mean: "
-                    f"{', '.join(named)}{', ...' * (len(worst) > _NAMED)}; {remedy}.",
-                    MapWarning,
-                    stacklevel=2,
-                )
+            if not worst:
+                continue
+            told = worst[:_NAMED]
+            at = _list(names[k] if names else format_point(self.centers_, k)
+                       for k in told)  # fmt: skip
+            by = _list(f"{self.scatter_[k]:.2f}" for k in told)
+            more = len(worst) - len(told)
+            warnings.warn(
+                f"at {at}{f' (and {more} more)' * (more > 0)} {why} {by} of the range "
+                f"from where it is at the other points; {remedy}.",
+                MapWarning,
+                stacklevel=2,
+            )
+
+
+def _list(words: Iterable[str]) -> str:
+    """Join words as in a sentence: point 6, point 7 and point 2."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def wrapped(angle: Array) -> Array:
