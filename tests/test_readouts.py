@@ -118,9 +118,7 @@ def test_a_place_of_another_posture_is_no_half_explored_one():
     # 0.4 rad of a range of 1.2; one place of eight moves the ends of all by nothing.
     assert np.isclose(intent.scatter_.max(), 0.4 / 1.2, atol=1e-6)
     assert np.allclose(intent.ends_, (-0.3, 0.9), atol=1e-6)
-    with pytest.warns(
-        MapWarning, match="than the natural one.*0.33 of.*movement"
-    ):
+    with pytest.warns(MapWarning, match="than the natural one.*0.33 of.*movement"):
         intent.warn_of_scatter()
     # Several points in one sentence, the worst first.
     intent.scatter_[:] = [0.2, 0.3, 0.15, 0.4, 0.5, 0, 0, 0]

@@ -5,6 +5,7 @@ between frames in double precision what a page stores as float32: 1e-6 m.
 """
 
 import io
+import re
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -167,6 +168,32 @@ def test_a_recording_plays_with_our_controls_and_with_meshcats(
     tab.page.click("#play")
     assert tab.page.evaluate("viewer.animator.playing") is False
     assert tab.complaints == []
+
+
+def test_c_leaves_the_picture_where_it_is_far_beyond_its_range(
+    tab: Tab, tmp_path: Path
+) -> None:
+    person, body = small_person.subject(), small_person.subject().skeleton
+    recording = small_person.cut(small_person.protocol().points.recording, 0, 60)
+    motion = MarkerIK(body).track(recording)
+    scene = recording_scene(
+        body,
+        person.null_space_map,
+        CHAIN,
+        motion,
+        recording,
+        c=np.linspace(-1, 2, len(motion.time)),
+        simulated=True,
+    )
+    tab.show(address(scene, tmp_path))
+    drawn = "document.querySelector('#c_curve path').getAttribute('d')"
+    points = re.split("[ML]", tab.page.evaluate(drawn))[1:]
+    heights = [float(point.split()[1]) for point in points]
+    # 0 is at 100 and 1 at 0; the picture ends at -15 and 115, the line does not.
+    assert heights[0] == 200 and heights[-1] < -90
+    hidden = "getComputedStyle(document.querySelector('#c_curve svg')).overflow"
+    assert tab.page.evaluate(hidden) == "hidden"
+    assert "before clipping" in tab.page.inner_text("#player .name")
 
 
 def test_a_live_view_follows_the_postures(tab: Tab) -> None:

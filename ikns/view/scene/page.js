@@ -108,13 +108,14 @@ const play = (on) => {
   find("play").textContent = on ? "\u275A\u275A" : "\u25B6";
   find("play").setAttribute("aria-label", on ? "Pause" : "Play");
 };
-// A curve over the whole time, from 0 to a top; a click or a drag goes to that time.
+// A curve over the whole time, from 0 to a top; a click or a drag goes to that time. What
+// is far beyond leaves the picture, as a line along its edge would look like a plateau.
 const draw = (holder, values, top) => {
   const last = scene.times[scene.times.length - 1], points = [];
   let pen = "M";
   values.forEach((value, k) => {
     if (Number.isNaN(value)) { pen = "M"; return; }
-    const y = 100 * (1 - Math.min(1.15, Math.max(-0.15, value / top)));
+    const y = 100 * (1 - Math.min(99, Math.max(-99, value / top)));
     points.push(`${pen}${((1000 * scene.times[k]) / last).toFixed(1)} ${y.toFixed(1)}`);
     pen = "L";
   });

@@ -21,6 +21,11 @@ from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
 
 #: Arrays up to this size are written as numbers.
 _SHORT = 16
+#: Shown over the curve of c; the gray box goes from 0 to 1.
+_CURVE = (
+    "c before clipping: the finger is told 0 below and 1 above the gray box; beyond "
+    "-0.15 and 1.15 the line leaves the picture"
+)
 _KINDS = {"f": ("<f4", "f4"), "u": ("<u4", "u4"), "i": ("<u4", "u4")}
 
 
@@ -57,8 +62,8 @@ def scene_html(scene: Scene, *, live: str | None = None) -> str:
     title = escape(scene.title)
     rows = "".join(
         f"""<div class="signal">
-<span class="name">{name}<small>control signal</small></span>
-<div id="{name}_curve" class="curve"></div>
+<span class="name">{name}<small>control signal before clipping</small></span>
+<div id="{name}_curve" class="curve" title="{_CURVE}"></div>
 <output id="{name}"></output>
 <div id="{name}_gauge" class="gauge"><i></i></div></div>
 """
