@@ -53,7 +53,10 @@ def comparison_rows(
             "learned_direction": visited.learned.directions_[i].tolist(),
             "analytic_direction": visited.analytic.directions_[i].tolist(),
         }
-    return rows, [f"analytic map: {warning.message}" for warning in caught]
+    return rows, [
+        f"the analytic map, which c is not read from: {warning.message}"
+        for warning in caught
+    ]
 
 
 def comparison_table(rows: list[dict[str, Any]], title: str) -> Any:
