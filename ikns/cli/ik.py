@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -85,7 +85,7 @@ def ik(
     from ikns.motion.export import write_motion
     from ikns.motion.file_names import MODEL, STORAGE
     from ikns.motion.gimbal import gimbal_sentence
-    from ikns.motion.table import motion_table
+    from ikns.motion.table import limits_passed, motion_table
 
     left_out: list[str] = []
     still, measured = None, True
@@ -95,14 +95,7 @@ def ik(
         skeleton, measured = person.skeleton, person.measured
     else:
         still = read(static)
-        with naming(still.source):
-            skeleton, scaling = ikns.scale(
-                ikns.Skeleton.load(),
-                still,
-                marker_set=marker_set or "oxford24",
-                min_duration=min_static,
-            )
-        left_out = scaling.sentences(still.source)
+        skeleton, left_out = _scaled(still, marker_set, min_static)
     frames = read(recording, start=from_, end=to)
     with progress() as report, naming(frames.source):
         motion, warned = judged_motion(
@@ -125,25 +118,55 @@ def ik(
     csv = next((path for path in outputs if path.suffix.lower() == ".csv"), None)
     found = motion_table(motion)
     summary = found.summary
+    beyond = limits_passed(skeleton, found.range_deg)
     show(
-        {"recording": recording, "csv": csv, "files": outputs, "notes": said} | summary,
+        {"recording": recording, "csv": csv, "files": outputs, "notes": said}
+        | summary
+        | {"beyond_limit_deg": beyond},
         f"{recording}: {summary['frames_converged']} of {summary['frames']} frames "
         f"solved, median marker residual {1000 * summary['residual_median_m']:.1f} mm",
-        table(
-            "Joint angles",
-            {"joint": "s", "lowest deg": ".1f", "highest deg": ".1f", "note": "s"},
-            [
-                [name, low, high, _note(name, low, motion.held)]
-                for name, (low, high) in found.range_deg.items()
-            ],
-        ),
+        _angles(found.range_deg, motion.held, beyond),
         *notes(said),
         f"Wrote {', '.join(map(str, outputs))}",
         as_json=as_json,
     )
 
 
-def _note(joint: str, lowest: float, held: tuple[str, ...]) -> str:
+def _scaled(
+    still: ikns.Recording, marker_set: str | None, min_static: float
+) -> tuple[ikns.Skeleton, list[str]]:
+    """Return the body of a static trial, and what was left out of it."""
+    with naming(still.source):
+        skeleton, scaling = ikns.scale(
+            ikns.Skeleton.load(),
+            still,
+            marker_set=marker_set or "oxford24",
+            min_duration=min_static,
+        )
+    return skeleton, scaling.sentences(still.source)
+
+
+def _angles(
+    range_deg: dict[str, tuple[float, float]],
+    held: tuple[str, ...],
+    beyond: dict[str, float],
+) -> Any:
+    """Return the table of joint angles."""
+    return table(
+        "Joint angles",
+        {"joint": "s", "lowest deg": ".1f", "highest deg": ".1f", "note": "s"},
+        [
+            [name, low, high, _note(name, low, held, beyond)]
+            for name, (low, high) in range_deg.items()
+        ],
+    )
+
+
+def _note(
+    joint: str, lowest: float, held: tuple[str, ...], beyond: dict[str, float]
+) -> str:
     if joint in held:
         return "held: no marker shows it"
+    if joint in beyond:
+        return f"beyond its limit, {beyond[joint]:.0f}"
     return "never visible" if math.isnan(lowest) else ""

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ikns.arrays import Array
+from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
 from ikns.numerics.median import finite_median
@@ -63,3 +64,20 @@ def motion_table(motion: Motion) -> MotionTable:
     }
     ranges = dict(zip(motion.joint_names, ends, strict=True))
     return MotionTable(columns, rows, ranges, summary)
+
+
+def limits_passed(
+    skeleton: Skeleton, range_deg: dict[str, tuple[float, float]]
+) -> dict[str, float]:
+    """Return the limit, deg, of each joint that goes beyond it by 0.1 deg or more.
+
+    Of two limits that of the farther end; a joint never seen has none.
+    """
+    found = {}
+    limits = zip(np.degrees(skeleton.lower), np.degrees(skeleton.upper), strict=True)
+    for joint, (lower, upper) in zip(skeleton.joint_names, limits, strict=True):
+        low, high = range_deg[joint]
+        below, above = lower - low, high - upper
+        if max(below, above) >= 0.1:
+            found[joint] = round(float(upper if above >= below else lower), 1)
+    return found
