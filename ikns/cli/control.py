@@ -88,11 +88,10 @@ def control(
     )
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
-    if jumps := jump_sentence(method, result["jumps_outside"]):
-        warned = [*warned, jumps]
+    jumps = jump_sentence(method, result["jumps_outside"])
+    warned += [jumps] * bool(jumps)
     simulated = is_simulated(calibrated, subject, [recording])
-    if figure is not None:
-        _draw(figure, found, simulated=simulated, force=force)
+    _draw(figure, found, simulated=simulated, force=force)
     show(
         {
             "recording": recording,
@@ -127,8 +126,12 @@ def _rows(result: dict[str, Any]) -> list[list[Any]]:
     ]
 
 
-def _draw(path: Path, found: ControlTable, *, simulated: bool, force: bool) -> None:
-    """Draw c as the CSV file has it, with the hand's speed."""
+def _draw(
+    path: Path | None, found: ControlTable, *, simulated: bool, force: bool
+) -> None:
+    """Draw c as the CSV file has it, with the hand's speed, if asked to."""
+    if path is None:
+        return
     from ikns.view.signals import control_figure
 
     at, rows = found.columns.index, found.rows
