@@ -48,6 +48,21 @@ def test_converted_files_have_the_new_labels(
     assert read(target).labels == read(files / "points.c3d").labels
 
 
+def test_a_renaming_says_that_it_applies_to_the_static_trial_too(
+    files: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    argv = ["check", str(files / "points.c3d"), "--rename", "RFIN=LFIN"]
+    assert main(argv) == 2
+    assert "--static" not in capsys.readouterr().err
+    assert main([*argv, "--static", str(files / "static.c3d")]) == 2
+    said = capsys.readouterr().err
+    assert said.endswith("; --rename and --labels apply to --static too.\n")
+    monkeypatch.setenv("COLUMNS", "200")
+    for command, told in (("check", True), ("ik", True), ("markers check", False)):
+        assert main([*command.split(), "--help"]) == 0
+        assert ("every recording, --static too" in capsys.readouterr().out) == told
+
+
 def test_a_replayed_recording_drives_the_finger_under_its_new_labels(
     files: Path, renamed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

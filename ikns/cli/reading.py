@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -42,6 +42,16 @@ _OPTIONS = {
     ),
 }
 
+_RenameAll = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--rename",
+        metavar="OLD=NEW",
+        help="Read marker OLD as NEW, in every recording, --static too. Repeat for "
+        "more markers.",
+    ),
+]
+
 
 def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options to a command that takes a parameter ``read``.
@@ -60,9 +70,10 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
         Parameter(
             name, Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=kind
         )
-        for name, (kind, default) in _OPTIONS.items()
+        for name, (kind, default) in _options(own).items()
     ]
 
+    @_static_too
     @wraps(command)
     def run(**values: Any) -> None:
         given = {name: values.pop(name, None) for name in _OPTIONS}
@@ -100,9 +111,36 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
 
     # Typer reads the options from here, and nobody from the command below.
     del run.__wrapped__
-    run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__signature__ = own.replace(parameters=parameters)
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
+
+
+def _options(own: Signature) -> dict[str, Any]:
+    """Return the options that a command with this signature gets."""
+    static = own.parameters.get("static")
+    as_option = static is not None and static.default is None
+    return _OPTIONS | ({"rename": (_RenameAll, None)} if as_option else {})
+
+
+def _static_too(run: Callable[..., None]) -> Any:
+    """Say in an error that a static trial beside the recordings was renamed too."""
+
+    @wraps(run)
+    def renaming(**values: Any) -> None:
+        try:
+            run(**values)
+        except ikns.IknsError as error:
+            names = ("recording", "recordings", "exploration")
+            beside = any(values.get(name) for name in names)
+            if not beside or values.get("static") is None:
+                raise
+            if not (values.get("rename") or values.get("labels")):
+                raise
+            told = f"{str(error).rstrip('.')}; --rename and --labels apply to --static"
+            raise type(error)(f"{told} too.") from None
+
+    return renaming
 
 
 def check_inputs(
