@@ -62,29 +62,12 @@ def ik(
     No model that comes with OpenSim has the joints of this body: write --out body.osim
     too, open it in OpenSim, and load the .mot there as a motion.
     """
-    from ikns.motion.file_names import check_motion_file
-
     outputs = out or [Path("motion.csv")]
-    for path in outputs:
-        refuse_overwriting(path, force=force, inputs=[recording, subject, static])
-        check_motion_file(path)
-    if len({path.resolve() for path in outputs}) < len(outputs):
-        raise InvalidInput("expected different files for each --out, found one twice.")
-    if (subject is None) == (static is None):
-        raise InvalidInput(
-            "expected --subject, a folder of `ikns calibrate`, or --static, a "
-            f"recording, found {'neither' if subject is None else 'both'}."
-        )
-    if subject is not None and marker_set is not None:
-        raise InvalidInput(
-            "--marker-set works only with --static; a subject has its own markers."
-        )
+    _check(outputs, recording, subject, static, marker_set, force=force)
     check_inputs([recording, static], subject)
 
     from ikns.calibration.judged_motion import judged_motion
     from ikns.motion.export import write_motion
-    from ikns.motion.file_names import MODEL, STORAGE
-    from ikns.motion.gimbal import gimbal_sentence
     from ikns.motion.table import limits_passed, motion_table
 
     left_out: list[str] = []
@@ -106,14 +89,7 @@ def ik(
             progress=partial(report, "joint angles"),
         )
     told = [write_motion(path, motion, skeleton, force=force) for path in outputs]
-    endings = {path.suffix.lower() for path in outputs}
-    angles = bool(endings & {*STORAGE})
-    told.append(gimbal_sentence(motion, thorax=angles))
-    if angles and MODEL not in endings:
-        told.append(
-            "the coordinates are those of this body, which no model that comes with "
-            f"OpenSim has; --out body{MODEL} writes it as a model."
-        )
+    told += _cautions(motion, outputs)
     said = [*left_out, *(sentence for sentence in told if sentence), *warned]
     csv = next((path for path in outputs if path.suffix.lower() == ".csv"), None)
     found = motion_table(motion)
@@ -130,6 +106,50 @@ def ik(
         f"Wrote {', '.join(map(str, outputs))}",
         as_json=as_json,
     )
+
+
+def _check(
+    outputs: list[Path],
+    recording: Path,
+    subject: Path | None,
+    static: Path | None,
+    marker_set: str | None,
+    *,
+    force: bool,
+) -> None:
+    """Refuse, before any work, files and options that do not go together."""
+    from ikns.motion.file_names import check_motion_file
+
+    for path in outputs:
+        refuse_overwriting(path, force=force, inputs=[recording, subject, static])
+        check_motion_file(path)
+    if len({path.resolve() for path in outputs}) < len(outputs):
+        raise InvalidInput("expected different files for each --out, found one twice.")
+    if (subject is None) == (static is None):
+        raise InvalidInput(
+            "expected --subject, a folder of `ikns calibrate`, or --static, a "
+            f"recording, found {'neither' if subject is None else 'both'}."
+        )
+    if subject is not None and marker_set is not None:
+        raise InvalidInput(
+            "--marker-set works only with --static; a subject has its own markers."
+        )
+
+
+def _cautions(motion: ikns.Motion, outputs: list[Path]) -> list[str]:
+    """Say what whoever opens the files has to know."""
+    from ikns.motion.file_names import MODEL, STORAGE
+    from ikns.motion.gimbal import gimbal_sentence
+
+    endings = {path.suffix.lower() for path in outputs}
+    angles = bool(endings & {*STORAGE})
+    told = [gimbal_sentence(motion, thorax=angles)]
+    if angles and MODEL not in endings:
+        told.append(
+            "the coordinates are those of this body, which no model that comes with "
+            f"OpenSim has; --out body{MODEL} writes it as a model."
+        )
+    return told
 
 
 def _scaled(
