@@ -173,7 +173,7 @@ def test_input_that_cannot_be_split_is_refused_in_one_sentence(
     sentence = refused(command([*reaches[:8], still], files))
     assert "still.c3d" in sentence
     assert "faster than 0.05 m/s" in sentence
-    assert "each recording once" in refused(command([*reaches, reaches[0]], files))
+    assert "given twice" in refused(command([*reaches, reaches[0]], files))
     same = [tmp_path / f"same{i}.c3d" for i in range(8)]
     for path in same:
         path.write_bytes(reaches[0].read_bytes())

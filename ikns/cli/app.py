@@ -172,8 +172,10 @@ def _refuse_empty(argv: Sequence[str]) -> None:
     """Refuse an empty value: as the name of a file it would mean the folder here."""
     for before, argument in pairwise(["", *argv]):
         option, equals, value = argument.partition("=")
-        named = option if equals and option.startswith("--") else before
-        if not (value if named == option else argument):
+        named = before
+        if equals and option.startswith("--"):
+            named, argument = option, value
+        if not argument:
             where = f"for {named}" if named.startswith("--") else "as an argument"
             raise InvalidInput(f"expected a value {where}, found an empty one.")
 

@@ -25,7 +25,7 @@ from ikns.cli.options import (
     To,
 )
 from ikns.cli.output import show
-from ikns.cli.reading import Read, check_inputs, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers, refuse_repeated
 from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
@@ -200,6 +200,8 @@ def calibrate(
     from ikns.calibration.subject_files import FILES
 
     given_names = check_options(context, live=live, rewear=rewear, short=short)
+    refuse_repeated(exploration or [], "--exploration")
+    refuse_repeated(natural or [], "--natural")
     own = chain_of(chain, side, clavicle=clavicle, given=given_names)
     generic = body_of(stature, mass, sex)
     inputs = [static, *(exploration or []), *(natural or []), marker_set, subject]

@@ -17,7 +17,7 @@ from ikns.cli.options import (
     To,
 )
 from ikns.cli.output import show, table
-from ikns.cli.reading import Read, check_inputs, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers, refuse_repeated
 from ikns.errors import InvalidInput, MarkerMismatch
 
 
@@ -54,6 +54,7 @@ def check(
         raise InvalidInput(
             "--marker-set works only with --static; a subject has its own markers."
         )
+    refuse_repeated(recordings)
     check_inputs([*recordings, static], subject)
 
     from ikns.calibration.judge.finding import refused

@@ -163,6 +163,24 @@ def check_inputs(
     loading()
 
 
+def refuse_repeated(recordings: Iterable[Path], where: str = "") -> None:
+    """Refuse a recording given twice, which would count twice; `where` is the option.
+
+    Raises
+    ------
+    InvalidInput
+        When two paths lead to the same file.
+    """
+    seen: set[Path] = set()
+    for path in recordings:
+        if path.resolve() in seen:
+            raise InvalidInput(
+                f"{path}: given twice{f' for {where}' * bool(where)}; give each "
+                "recording once."
+            )
+        seen.add(path.resolve())
+
+
 def _keep(labels: Path | None, values: dict[str, Any]) -> None:
     """Refuse to write over the file with the labels."""
     for name in _OUTPUTS if labels is not None else ():

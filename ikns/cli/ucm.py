@@ -13,7 +13,7 @@ import ikns
 from ikns.cli.options import AsJson, Force, From, SubjectFolder, To
 from ikns.cli.output import notes, progress, show
 from ikns.cli.picture import refuse_picture, write_picture
-from ikns.cli.reading import Read, check_inputs, reads_markers
+from ikns.cli.reading import Read, check_inputs, reads_markers, refuse_repeated
 from ikns.cli.ucm_designs import over_points, over_time
 from ikns.errors import InvalidInput
 
@@ -72,11 +72,7 @@ def ucm(
     recording.
     """
     refuse_picture(figure, force=force, inputs=[*recordings, subject])
-    if len({path.resolve() for path in recordings}) < len(recordings):
-        raise InvalidInput(
-            "expected each recording once, as a repetition counts once, found "
-            f"{len(recordings)} names of fewer files."
-        )
+    refuse_repeated(recordings)
     if math.isnan(most_different):
         raise InvalidInput("expected a number for --most-different, found nan.")
     check_inputs(recordings, subject)

@@ -44,14 +44,28 @@ def _wrong_words(error: typer.TyperException, message: str, argv: Sequence[str])
     elif option and message.endswith("does not take a value"):
         message = f"expected no value after {option}, found one"
     elif message.startswith("No such command"):
-        known = ", ".join(context.command.commands) if context else ""
-        word = message.removeprefix("No such command ").strip("'\"")
-        message = f"expected a command ({known}), found {word}"
+        return _unknown_command(message, context, command)
     elif message.startswith("Got unexpected extra argument"):
         words = message.partition("(s) (")[2].removesuffix(")")
         known = " and ".join(map(name_of, filter(_is_argument, parts)))
         message = f"expected {known or 'options'} only, found also {words}"
     return f"{message}; see `{command} --help`"
+
+
+def _unknown_command(message: str, context: Any, command: str) -> str:
+    """Say which commands there are, and which one is probably meant.
+
+    Typer's words are *No such command 'chek'. Did you mean 'check'?*
+    """
+    known = list(context.command.commands) if context else []
+    word = message.removeprefix("No such command ").partition(". Did you")[0]
+    word = word.strip("'\"")
+    meant = " or ".join(f"'{each}'" for each in get_close_matches(word, known, n=2))
+    advice = f"did you mean {meant}? See" if meant else "see"
+    return (
+        f"expected a command ({', '.join(known)}), found '{word}'; {advice} "
+        f"`{command} --help`"
+    )
 
 
 def _wrong_value(error: typer.TyperException, argv: Sequence[str]) -> str:
