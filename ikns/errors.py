@@ -74,8 +74,8 @@ def plain(error: Exception) -> str:
 
 
 @contextmanager
-def naming(source: str) -> Iterator[None]:
-    """Put the name of a file before the sentence of an error that lacks it.
+def naming(source: str, *others: str) -> Iterator[None]:
+    """Put the name of a file before the sentence of an error that names none of these.
 
     >>> with naming("walk.c3d"):
     ...     raise NotEnoughData("no frame is still.")
@@ -85,6 +85,6 @@ def naming(source: str) -> Iterator[None]:
     try:
         yield
     except IknsError as error:
-        if source in str(error):
+        if any(each in str(error) for each in (source, *others)):
             raise
         raise type(error)(f"{source}: {error}") from None

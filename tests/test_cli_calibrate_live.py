@@ -270,7 +270,7 @@ def test_too_few_points_are_reported_and_recordings_stay(
         (["--static", "a.c3d"], "--static"),
         (["--static", "a.c3d", "--exploration", "b.c3d"], "one or the other"),
         (["--resume"], "found none"),
-        (["--recordings", "no/where"], "existing folder"),
+        (["--recordings", "no/where"], "does not exist"),
         (["--recordings", "taken"], "--resume"),
         (["--points", "0"], "0"),
         (["--n-dof", "8"], "1 to 7 for --n-dof"),

@@ -122,7 +122,7 @@ def test_nothing_to_answer_with_is_one_sentence(
     assert "give --sites FILE" in capfd.readouterr().err
     for more, says in (
         (["--guess", "--sites", static], "expected --sites or --guess, found both"),
-        (["--guess", "--out", str(tmp_path / "a.txt")], "ends in .toml, found '.txt'"),
+        (["--guess", "--out", str(tmp_path / "a.txt")], "ends in .toml, found .txt"),
     ):
         words = ["markers", "new", static, "--out", out, *more]
         assert says in check_refused(words, tmp_path, capfd)

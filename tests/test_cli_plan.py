@@ -172,7 +172,7 @@ def test_the_table_names_the_assumption_and_marks_what_is_needed(study):
         (["--margin", "1", "--level-spread", "0"], "one above 0"),
         (["--margin", "1", "--power", "1"], "a power between alpha"),
         (["--margin", "1", "--alpha", "0.6"], "alpha"),
-        (["--margin", "1", "--figure", "power.jpg"], "that ends in .png, .svg, .pdf"),
+        (["--margin", "1", "--figure", "power.jpg"], "that ends in .png, .svg or .pdf"),
         (["--margin", "1", "--spread", "1", "--pilot", "x"], "--spread or --pilot"),
     ],
 )

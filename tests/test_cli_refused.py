@@ -41,3 +41,43 @@ def test_what_is_given_twice_is_not_called_empty(
 def test_a_static_trial_may_be_compared_with_itself(files: Path) -> None:
     static = str(files / "static.c3d")
     assert main(["check", "--static", static, static]) == 0
+
+
+def test_a_marker_set_is_not_made_of_a_trial_in_which_the_person_moves(
+    files: Path, tmp_path: Path, capfd: Refused
+) -> None:
+    moving = str(files / "points.c3d")
+    calibrated = ["calibrate", "--static", moving, "--exploration", moving]
+    said = check_refused([*calibrated, "--out", str(tmp_path / "x")], tmp_path, capfd)
+    assert "the person moved: " in said
+    made = ["markers", "new", moving, "--guess", "--out", str(tmp_path / "m.toml")]
+    places = tmp_path / "places.txt"
+    places.write_text("CLAV=sternal_notch\nRELB=right_lateral_epicondyle\n")
+    placed = ["markers", "new", moving, "--sites", str(places)]
+    assert check_refused(placed, tmp_path, capfd).startswith(f"ikns: {moving}: ")
+    for argv in (made, ["markers", "check", "oxford24", moving]):
+        assert check_refused(argv, tmp_path, capfd) == said
+
+
+@pytest.mark.parametrize(
+    ("words", "ending"),
+    [
+        ("control {free} --subject {person} --out {other} --force", ".csv"),
+        ("view {person} --out {other} --force", ".html or .htm"),
+        ("scale --stature 1.7 --mass 70 --sex male --out {other} --force", ".urdf"),
+        ("markers new {static} --guess --out {other} --force", ".toml"),
+        ("ucm {free} --subject {person} --figure {other} --force", ".svg or .pdf"),
+    ],
+)
+def test_a_file_of_another_format_is_never_replaced(
+    words: str, ending: str, files: Path, tmp_path: Path, capfd: Refused
+) -> None:
+    other = tmp_path / "other.c3d"
+    other.write_bytes((files / "free.c3d").read_bytes())
+    names = {name: str(files / f"{name}.c3d") for name in ("static", "free")}
+    names |= {"person": str(files / "person"), "other": str(other)}
+    argv = [word.format(**names) for word in words.split()]
+    said = check_refused(argv, tmp_path, capfd)
+    assert said.endswith(f"{ending}, found .c3d.\n")
+    argv = [word for word in argv if word != "--force"]
+    assert check_refused(argv, tmp_path, capfd) == said

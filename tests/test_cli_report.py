@@ -104,4 +104,4 @@ def test_a_faulty_study_file_or_output_folder_is_refused(
     argv = ["report", str(study), "--out", str(other), "--force"]
     assert "thesis.txt" in check_refused(argv, tmp_path, capfd)
     argv = ["report", str(study), "--out", str(tmp_path / "a" / "b")]
-    assert "existing folder" in check_refused(argv, tmp_path, capfd)
+    assert "does not exist" in check_refused(argv, tmp_path, capfd)

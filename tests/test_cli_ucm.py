@@ -179,9 +179,9 @@ def test_input_that_cannot_be_split_is_refused_in_one_sentence(
         path.write_bytes(reaches[0].read_bytes())
     assert "constant" in refused(command(same, files))
     assert "near a PCA point" in refused(command([still], files))
-    assert "ends in .png, .svg, .pdf" in refused(
+    assert "ends in .png, .svg or .pdf" in refused(
         command(reaches, files, "--figure", tmp_path / "split.jpg")
     )
     assert "onset-speed" in refused(command(reaches, files, "--onset-speed", "-1"))
     nowhere = tmp_path / "nowhere" / "split.png"
-    assert "existing folder" in refused(command(reaches, files, "--figure", nowhere))
+    assert "does not exist" in refused(command(reaches, files, "--figure", nowhere))

@@ -55,7 +55,7 @@ def test_what_may_not_be_written_is_refused_with_its_reason(tmp_path: Path) -> N
     for path, reason in (
         (old, "use --force"),
         (tmp_path, "found a folder"),
-        (tmp_path / "none" / "new.csv", "existing folder"),
+        (tmp_path / "none" / "new.csv", "does not exist"),
         (Path("/dev/null"), "found a device"),
     ):
         with pytest.raises(InvalidInput, match=reason):

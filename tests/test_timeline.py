@@ -181,7 +181,7 @@ def test_wrong_uses_are_one_sentence(files, tmp_path, capfd, monkeypatch):
     rrd = ["--rrd", str(tmp_path / "a.rrd")]
     for more, words in (
         (["--rrd", str(tmp_path / "a.html")], "with the ending .rrd"),
-        (["--rrd", str(tmp_path / "none" / "a.rrd")], "an existing folder"),
+        (["--rrd", str(tmp_path / "none" / "a.rrd")], "does not exist"),
         ([*rrd, "--rerun"], "--rerun or --rrd, found both"),
         ([*rrd, "--out", str(tmp_path / "a.html")], "leave out --out"),
     ):

@@ -11,6 +11,7 @@ from ikns.arrays import Array
 from ikns.body.marker_set import Marker, MarkerSet
 from ikns.body.sites import Site, site
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.static import refuse_moving
 from ikns.calibration.observed import with_unshown_held
 from ikns.calibration.size_fit import SizeFit, fit_sizes, size_factors
 from ikns.calibration.static_trial import static_posture
@@ -109,6 +110,8 @@ def own_marker_set(
 
     Raises
     ------
+    NotEnoughData
+        When the trial is too short or the person moves in it.
     MarkerMismatch
         When the trial does not show a label, or no marker is on a landmark.
     InvalidInput
@@ -125,6 +128,7 @@ def own_marker_set(
     reference, target, _ = static_posture(
         generic, static, marker_set=roughly, min_duration=min_duration
     )
+    refuse_moving(static, roughly)
     fit = fit_sizes(reference, target)
     measured = _measured(reference, fit, target, placed)
     known = zip(roughly.markers, placed, strict=True)

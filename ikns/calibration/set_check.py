@@ -11,6 +11,7 @@ from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding
+from ikns.calibration.judge.static import refuse_moving
 from ikns.calibration.judge.tracking import followed
 from ikns.calibration.scaling import scale
 from ikns.calibration.size_fit import fit_sizes, size_factors
@@ -98,6 +99,7 @@ def check_marker_set(
         generic, static, marker_set=marker_set, min_duration=min_duration
     )
     worn = reference.marker_set
+    refuse_moving(static, worn)
     fit = fit_sizes(reference, target)
     sized = reference.resized(size_factors(fit.log_sizes))
     offsets = fit.positions - sized.marker_positions

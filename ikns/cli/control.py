@@ -59,8 +59,9 @@ def control(
     there, frames whose markers cannot be right have none. A recording that must not be
     used is refused, as by `ikns check`.
     """
-    refuse_overwriting(out, force=force, inputs=[recording, subject])
-    refuse_picture(figure, force=force, inputs=[recording, subject])
+    inputs = [recording, subject]
+    refuse_overwriting(out, force=force, inputs=inputs, endings=[".csv"])
+    refuse_picture(figure, force=force, inputs=inputs)
     check_inputs([recording], subject)
 
     from ikns.calibration.judged_motion import judged_motion

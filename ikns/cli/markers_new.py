@@ -58,11 +58,8 @@ def new(
     Markers that --movement lacks are taken to be worn in static trials only, and how
     well the body follows that movement is said.
     """
-    refuse_overwriting(out, force=force, inputs=[static, sites, movement])
-    if out.suffix.lower() != ".toml":
-        raise InvalidInput(
-            f"{out}: expected a file that ends in .toml, found '{out.suffix}'."
-        )
+    inputs = [static, sites, movement]
+    refuse_overwriting(out, force=force, inputs=inputs, endings=[".toml"])
     if guess and sites is not None:
         raise InvalidInput("expected --sites or --guess, found both.")
     from ikns.calibration.own_markers import own_marker_set
@@ -77,7 +74,7 @@ def new(
         if sites is None
         else read_name_pairs(sites)
     )
-    with naming(str(static if sites is None else sites)):
+    with naming(str(static if sites is None else sites), str(static)):
         made = own_marker_set(
             ikns.Skeleton.load(),
             frames,

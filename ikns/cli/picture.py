@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import InvalidInput
 from ikns.output.file import refuse_overwriting, write_bytes
 
 _ENDINGS = (".png", ".svg", ".pdf")
@@ -25,11 +24,7 @@ def refuse_picture(
     """
     if path is None:
         return
-    if path.suffix.lower() not in _ENDINGS:
-        raise InvalidInput(
-            f"{path}: expected a picture file that ends in {', '.join(_ENDINGS)}."
-        )
-    refuse_overwriting(path, force=force, inputs=inputs)
+    refuse_overwriting(path, force=force, inputs=inputs, endings=_ENDINGS)
 
 
 def write_picture(path: Path, figure: Any, *, force: bool) -> None:

@@ -27,7 +27,7 @@ def scale(
     """
     from ikns.calibration.scaled_body import length_sd_at_stature
 
-    refuse_overwriting(out, force=force, inputs=[])
+    refuse_overwriting(out, force=force, inputs=[], endings=[".urdf"])
     skeleton = ikns.Skeleton.from_anthropometry(stature=stature, mass=mass, sex=sex)
     write_text(out, skeleton.urdf, force=force)
     lengths = skeleton.segment_lengths

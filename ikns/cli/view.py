@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from ikns.view.scene.picture import ScenePicture
 
 
+#: Endings of the page.
+_PAGES = (".html", ".htm")
 #: Of the table.
 _COLUMNS = {"quantity": "s", "value": "s"}
 
@@ -172,22 +174,15 @@ def _check_files(
     force: bool,
 ) -> None:
     """Refuse files that exist, that are the same, or whose endings are wrong."""
-    files = [path for path in (out, png, animation) if path is not None]
-    for path in files:
-        refuse_overwriting(path, force=force, inputs=inputs)
+    allowed = ((out, _PAGES), (png, [".png"]), (animation, [".gif", ".png"]))
+    files = [path for path, _ in allowed if path is not None]
+    for path, endings in allowed:
+        if path is not None:
+            refuse_overwriting(path, force=force, inputs=inputs, endings=endings)
     if len({path.resolve() for path in files}) < len(files):
         raise InvalidInput(
             f"{files[-1]}: expected different files for each picture and for "
             "the page, found the same one twice."
-        )
-    if png is not None and png.suffix.lower() != ".png":
-        raise InvalidInput(
-            f"{png}: expected a picture file that ends in .png, found '{png.suffix}'."
-        )
-    if animation is not None and animation.suffix.lower() not in (".gif", ".png"):
-        raise InvalidInput(
-            f"{animation}: expected an animation file that ends in .gif or .png, "
-            f"found '{animation.suffix}'."
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ikns.errors import InvalidInput
+from ikns.output.file import check_ending
 from ikns.recording.files.storage import STORAGE
 
 #: Endings of files with the markers of the fitted body.
@@ -19,8 +19,4 @@ MOTION_FILES = (".csv", *STORAGE, *FITTED, MODEL)
 
 def check_motion_file(path: Path) -> None:
     """Refuse a name whose ending is not of :data:`MOTION_FILES`."""
-    if path.suffix.lower() not in MOTION_FILES:
-        raise InvalidInput(
-            f"{path}: expected a name that ends in {', '.join(MOTION_FILES)}, found "
-            f"{path.suffix or 'no ending'}."
-        )
+    check_ending(path, MOTION_FILES)

@@ -18,7 +18,11 @@ _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.E
 
 
 def refuse_overwriting(
-    path: Path, *, force: bool, inputs: Iterable[Path | str | None]
+    path: Path,
+    *,
+    force: bool,
+    inputs: Iterable[Path | str | None],
+    endings: Sequence[str] = (),
 ) -> None:
     """Check, before any work, that a file may be written.
 
@@ -30,12 +34,14 @@ def refuse_overwriting(
         Whether an existing file may be replaced.
     inputs : iterable of Path, str or None
         Everything that is read, files and folders: never replaced.
+    endings : sequence of str
+        Those of the formats that are written, in lower case; by default any.
 
     Raises
     ------
     InvalidInput
         When it exists and `force` is not set, it is one of the inputs under whatever
-        name, it is not a file, or its folder does not exist.
+        name, it is not a file, its ending is another, or its folder does not exist.
     """
     if path.is_dir():
         raise InvalidInput(f"{path}: expected the name of a file, found a folder.")
@@ -43,10 +49,36 @@ def refuse_overwriting(
         raise InvalidInput(f"{path}: expected the name of a file, found a device.")
     if os.path.lexists(path):
         refuse_input(path, inputs)
+    if endings:
+        check_ending(path, endings)
+    if os.path.lexists(path):
         if not force:
             raise InvalidInput(f"{path}: exists already; use --force to overwrite it.")
+    check_parent(path)
+
+
+def check_parent(path: Path) -> None:
+    """Refuse a new file or folder where there is no folder for it."""
     if not path.absolute().parent.is_dir():
-        raise InvalidInput(f"{path}: expected an existing folder to write into.")
+        there = path.parent.exists()
+        why = "is a file; give a folder" if there else "does not exist; make it first"
+        raise InvalidInput(
+            f"{path}: {'' if there else 'the folder '}{path.parent} {why}."
+        )
+
+
+def check_ending(path: Path, endings: Sequence[str]) -> None:
+    """Refuse a name whose ending is none of these, given in lower case.
+
+    >>> check_ending(Path("signal.CSV"), [".csv"])
+    """
+    if path.suffix.lower() not in endings:
+        *rest, last = endings
+        known = f"{', '.join(rest)} or {last}" if rest else last
+        found = path.suffix or "no ending"
+        raise InvalidInput(
+            f"{path}: expected a name that ends in {known}, found {found}."
+        )
 
 
 def write_text(path: Path, text: str, *, force: bool = True) -> None:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ikns.errors import FileError, InvalidInput, plain
-from ikns.output.file import sync
+from ikns.output.file import check_parent, sync
 from ikns.output.inputs import refuse_input_folder
 
 
@@ -41,8 +41,7 @@ def check_output_folder(
         run wrote.
     """
     target = Path(folder)
-    if not target.absolute().parent.is_dir():
-        raise InvalidInput(f"{target}: expected an existing folder to write into.")
+    check_parent(target)
     if not target.exists():
         return
     if not target.is_dir():

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ikns.arrays import Array
+from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding, Severity, say_markers
@@ -18,9 +19,12 @@ from ikns.calibration.judge.plausible import (
     assumed,
 )
 from ikns.calibration.judge.repair import Repair, find_repair
+from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.judge.unit import size_ratio, wrong_unit
 from ikns.calibration.size_fit import SizeFit
+from ikns.errors import NotEnoughData
 from ikns.numerics.rigid import rigid_transform
+from ikns.recording.recording import Recording
 
 #: Largest displacement of a marker of a person who stands still, without the sway of
 #: the whole body, m: as much as markers are misplaced on the skin (10 mm for most of a
@@ -76,6 +80,21 @@ def movement(where: str, labels: Sequence[str], markers: Array) -> list[Finding]
     ]
 
 
+def refuse_moving(static: Recording, worn: MarkerSet) -> None:
+    """Refuse a static trial in which the person moves, as :func:`ikns.scale` does.
+
+    Raises
+    ------
+    NotEnoughData
+        With the marker that moves the most.
+    """
+    where, labels = static.source, worn.labels
+    markers = worn.pick(static.labels, static.markers)
+    _, spoiled, measured = judge_traces(where, labels, static.time, markers)
+    if moved := movement(where, labels, measured[~spoiled]):
+        raise NotEnoughData(moved[0].sentence)
+
+
 def body_size(where: str, markers: Array, body: Skeleton) -> list[Finding]:
     """Say that markers (T, M, 3) m are not those of a body of a person's size."""
     expected = body.markers_in_world(body.neutral())
@@ -83,13 +102,12 @@ def body_size(where: str, markers: Array, body: Skeleton) -> list[Finding]:
     if wrong is None:
         return []
     times, mistake = wrong
-    size = f"{times:.3g} times as large" if times > 1 else f"{times:.3g} of the size"
     return [
         Finding(
             "unit",
             "refuse",
             where,
-            f"the body is {size} expected for a person",
+            f"the body is {times:.3g} times as large as expected for a person",
             f"probably {mistake}: correct the unit in the file"
             if mistake
             else "expected positions in the file's own unit: export it again",

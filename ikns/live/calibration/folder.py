@@ -19,6 +19,7 @@ import numpy as np
 from ikns.errors import FileError, InvalidInput, plain
 from ikns.live.calibration.protocol import ProtocolStep
 from ikns.live.calibration.verdict import Verdict
+from ikns.output.file import check_parent
 from ikns.output.lock import hold_lock
 from ikns.recording.files import read, write_c3d
 from ikns.recording.recording import Recording
@@ -61,8 +62,7 @@ class RecordingsFolder:
                 f"{path}: already contains recordings; continue with --resume "
                 "or choose another folder with --recordings."
             )
-        if not path.absolute().parent.is_dir():
-            raise InvalidInput(f"{path}: expected an existing folder to write into.")
+        check_parent(path)
         try:
             path.mkdir()
         except OSError as error:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ikns.errors import InvalidInput
 from ikns.live.session.reader import Run
 from ikns.output.file import refuse_overwriting, write_bytes, write_text
 from ikns.recording.files import write_c3d
@@ -26,9 +25,8 @@ def check_export(path: Path, session: Path, *, force: bool) -> None:
         When the extension is not that of a format, or the file may not be written; see
         :func:`ikns.output.file.refuse_overwriting`.
     """
-    if path.suffix.lower().removeprefix(".") not in FORMATS:
-        raise InvalidInput(f"{path}: expected a name that ends in .csv, .mat or .c3d.")
-    refuse_overwriting(path, force=force, inputs=[session])
+    endings = [f".{name}" for name in FORMATS]
+    refuse_overwriting(path, force=force, inputs=[session], endings=endings)
 
 
 def export_run(run: Run, path: str | Path, *, force: bool = False) -> None:
