@@ -147,10 +147,10 @@ def test_renamed_markers_give_the_same_angles(
     assert main([*words, "--rename", "RWRA=RWRB", "--out", str(back)]) == 0
     assert back.read_text() == plain.read_text()
     capfd.readouterr()
-    # A label that no file has: told where it worked, and named where it did not.
+    # A label that no file has is refused, whatever would come of it.
     words = ["ik", free, "--subject", person, "--force", "--rename", "RELBO=RELB"]
-    assert main([*words, "--out", str(back)]) == 0
-    assert "no recording has the label RELBO of --rename" in capfd.readouterr().err
+    said = check_refused([*words, "--out", str(back)], tmp_path, capfd)
+    assert "no recording has the label RELBO of --rename" in said
     calibrated = ["calibrate", "--static", free, "--exploration", free]
     calibrated += ["--marker-set", "ue_adl", "--rename", "X1=RELB"]
     words = [*calibrated, "--out", str(tmp_path / "new")]

@@ -81,3 +81,44 @@ def test_a_file_of_another_format_is_never_replaced(
     assert said.endswith(f"{ending}, found .c3d.\n")
     argv = [word for word in argv if word != "--force"]
     assert check_refused(argv, tmp_path, capfd) == said
+
+
+LOST = ("--rename NOPE=RWRA", "no recording has the label NOPE of --rename")
+ONE = ("--from 1 --to 1", "points.c3d: the part has 1 frame; at least 2 are needed")
+LATE = ("--from 10 --to 5", "--from 10 s is after --to 5 s; give an earlier start.")
+PARTS = [
+    "check {free} --subject {person}",
+    "ik {free} --subject {person} --out new.csv",
+    "control {free} --subject {person} --out new.csv",
+    "ucm {points} --subject {person}",
+    "view {person} {free} --out new.html",
+    "compare {points} --subject {person}",
+    "convert {free} new.trc",
+    "calibrate --static {static} --exploration {points} --out new",
+]
+WHOLE = [
+    "markers check oxford24 {static}",
+    "markers new {static} --guess --out new.toml",
+    "run --subject {person} --source replay:{free} --dry-run --session new",
+]
+
+
+@pytest.mark.parametrize(
+    ("words", "more", "says"),
+    [(words, *LOST) for words in (*PARTS, *WHOLE)]
+    + [(words, *wrong) for words in PARTS for wrong in (ONE, LATE)],
+)
+def test_a_label_or_a_part_that_no_recording_has_is_refused(
+    words: str,
+    more: str,
+    says: str,
+    files: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: Refused,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names = {name: str(files / f"{name}.c3d") for name in ("static", "points")}
+    names |= {"person": str(files / "person"), "free": names["points"]}
+    argv = [word.format(**names) for word in f"{words} {more}".split()]
+    assert says in check_refused(argv, tmp_path, capfd)

@@ -124,7 +124,7 @@ def test_view_opens_the_page_that_it_wrote(
         (["--animation", "moving.mp4"], ".gif or .png"),
         (["--animation", "no/view.gif"], "no/view.gif"),
         (["--out", "old.html"], "--force"),
-        (["--png", "old.html"], "--force"),
+        (["--png", "old.html"], "ends in .png, found .html"),
         (["nowhere.c3d"], "nowhere.c3d"),
         (["old.html"], "old.html"),
     ],

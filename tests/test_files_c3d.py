@@ -388,7 +388,7 @@ def test_a_failure_half_way_leaves_the_old_file_and_no_litter(tmp_path, monkeypa
     [
         ([0, 1, 2, 3, 4, 6], ["A"], "constant frame rate"),
         (np.linspace(1, 2, 100) ** 2 - 1, ["A"], "constant frame rate"),
-        ([0.0], ["A"], "at least 2 frames"),
+        ([0.0], ["A"], "has 1 frame; at least 2 are needed"),
         ([-1, -0.5], ["A"], "expected to start between 0 and"),
         ([1e9, 1e9 + 0.01], ["A"], "expected to start between 0 and"),
         ([0, 1], [" A"], "without blanks"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -19,7 +18,7 @@ from ikns.cli.options import (
     To,
 )
 from ikns.cli.output import show
-from ikns.cli.reading import label_names, say_unused
+from ikns.cli.reading import label_names, refuse_unused
 from ikns.output.file import refuse_overwriting
 
 
@@ -57,18 +56,17 @@ def convert(
     from ikns.recording.files.convert import convert_file
 
     refuse_overwriting(target, force=force, inputs=[source, labels])
+    how = {"subject_prefix": subject_prefix, "stream": stream}
+    refuse_unused(rename, [source], **how)
     found = convert_file(
         source,
         target,
-        subject_prefix=subject_prefix,
+        **how,
         start=from_,
         end=to,
-        stream=stream,
         names=label_names(rename, labels),
         force=force,
     )
-    if unused := say_unused(rename or [], found.given):
-        sys.stderr.write(f"ikns: {unused}\n")
     lost = (
         f", without {found.left_out} frames in which a coordinate is missing"
         if found.left_out

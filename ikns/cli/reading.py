@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterable, Sequence
+import warnings
+from collections.abc import Callable, Iterable
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -15,8 +15,9 @@ import ikns
 from ikns.calibration.subject_files import check_subject_folder
 from ikns.cli.options import LabelFile, Rename, SubjectPrefix
 from ikns.cli.output import loading
-from ikns.errors import InvalidInput
+from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.output.inputs import refuse_input, refuse_input_folder
+from ikns.recording.part import require_rate
 
 #: What a command calls to read a marker file, with ``start`` and ``end`` of
 #: :func:`ikns.read` if it likes; it returns the recording.
@@ -24,6 +25,11 @@ Read = Callable[..., Any]
 
 #: Options of these commands that name something to write.
 _OUTPUTS = ("out", "png", "animation", "figure", "rrd")
+#: Options and arguments that are recordings.
+_RECORDINGS = (
+    *("recording", "recordings", "static", "exploration", "natural", "movement"),
+    "reaches",
+)
 _OPTIONS = {
     "subject_prefix": (SubjectPrefix, None),
     "rename": (Rename, None),
@@ -56,9 +62,8 @@ _RenameAll = Annotated[
 def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options to a command that takes a parameter ``read``.
 
-    The command calls ``read(path)`` instead of :func:`ikns.read`. Where it ends in an
-    error, labels of ``--rename`` that no file has had are named too, as one of them is
-    the likely reason; where it does not, on stderr.
+    The command calls ``read(path)`` instead of :func:`ikns.read`. Labels of
+    ``--rename`` that no file has are refused before it begins.
     """
     own = signature(command, eval_str=True)
     parameters = [p for p in own.parameters.values() if p.name != "read"]
@@ -83,13 +88,14 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
             )
         _keep(given["labels"], values)
         names = label_names(given["rename"], given["labels"])
-        said = given["rename"] or []
-        seen: list[str] = []
+        prefix = given["subject_prefix"]
+        refuse_unused(given["rename"], _recordings(values), subject_prefix=prefix)
 
         def read(path: Path, **part: Any) -> ikns.Recording:
-            prefix = given["subject_prefix"]
             recording = ikns.read(path, subject_prefix=prefix, **part)
-            seen.extend(recording.labels)
+            require_rate(
+                recording, part=any(each is not None for each in part.values())
+            )
             if names:
                 from ikns.recording.labels import renamed
 
@@ -100,14 +106,7 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
                 recording = low_pass(recording, given["cutoff"])
             return recording
 
-        try:
-            command(read=read, **values)
-        except ikns.IknsError as error:
-            if seen and (sentence := say_unused(said, seen)):
-                raise type(error)(f"{str(error).rstrip('.')}; {sentence}") from None
-            raise
-        if seen and (sentence := say_unused(said, seen)):
-            sys.stderr.write(f"ikns: {sentence}\n")
+        command(read=read, **values)
 
     # Typer reads the options from here, and nobody from the command below.
     del run.__wrapped__
@@ -190,27 +189,61 @@ def _keep(labels: Path | None, values: dict[str, Any]) -> None:
             refuse(output, [labels])
 
 
-def label_names(rename: list[str] | None, labels: Path | None) -> dict[str, str]:
-    """Return the new label of each old one of --rename and --labels."""
+def label_names(
+    rename: list[str] | None, labels: Path | None, source: str | None = None
+) -> dict[str, str]:
+    """Return the new label of each old one of --rename and --labels.
+
+    Where `source` replays recordings, they must have the labels of --rename.
+    """
     if not rename and labels is None:
         return {}
+    if source is not None:
+        from ikns.calibration.simulated import played_files
+
+        refuse_unused(rename, played_files(source))
     from ikns.recording.labels import name_pairs, read_name_pairs
 
     names = {} if labels is None else read_name_pairs(labels)
     return names | name_pairs(rename or [], where="--rename")
 
 
-def say_unused(said: Iterable[str], seen: Sequence[str]) -> str:
-    """Say which labels given on the command line no recording had."""
-    if not said:
-        return ""
+def refuse_unused(
+    rename: list[str] | None, recordings: Iterable[Path], **how: Any
+) -> None:
+    """Refuse labels of --rename that none of the recordings has.
+
+    One that cannot be read is left to the command, which says what is wrong with it.
+    `how` is that of :func:`ikns.read`.
+
+    Raises
+    ------
+    MarkerMismatch
+        With the labels, and a few of those that there are.
+    """
+    if not rename:
+        return
     from ikns.recording.labels import name_pairs, unused_names
 
-    lost = unused_names(seen, name_pairs(said, where="--rename"))
-    if not lost:
-        return ""
-    known = ", ".join(dict.fromkeys(seen[:6]))
-    return (
-        f"no recording has the label {', '.join(lost)} of --rename; there are {known} "
-        "and so on."
-    )
+    names = name_pairs(rename, where="--rename")
+    seen: list[str] = []
+    for path in recordings:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                seen += ikns.read(path, **how).labels
+        except (ikns.IknsError, OSError):
+            return
+    if seen and (lost := unused_names(seen, names)):
+        known = ", ".join(dict.fromkeys(seen[:6]))
+        raise MarkerMismatch(
+            f"no recording has the label {', '.join(lost)} of --rename; there are "
+            f"{known} and so on."
+        )
+
+
+def _recordings(values: dict[str, Any]) -> list[Path]:
+    """Return the marker files among the values of a command."""
+    given = [values.get(name) for name in _RECORDINGS]
+    lists = [each if isinstance(each, list) else [each] for each in given]
+    return [path for each in lists for path in each if path is not None]

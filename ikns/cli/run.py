@@ -136,7 +136,7 @@ def run(
     timeline = timeline_of(rerun=rerun, rrd=rrd)
     calibrated = ikns.Subject.load(subject)
     calibrated.readout(method)  # before a source or a finger is opened
-    names = label_names(rename, labels)
+    names = label_names(rename, labels, source)
     n_dof, addresses = calibrated.null_space_map.n_dof, finger or ["sim:"]
     group = open_fingers(addresses, n_dof=n_dof, safety=Safety(safe_state=safe_state))
     settings = ControlSettings(

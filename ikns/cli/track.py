@@ -205,7 +205,7 @@ def track(
             view=view,
             realtime=realtime,
             method=method,
-            names=label_names(rename, labels),
+            names=label_names(rename, labels, source),
             publish=publish,
             timeline=timeline_of(rerun=rerun, rrd=rrd),
             max_uncertainty=max_uncertainty,

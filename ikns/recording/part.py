@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData
 from ikns.recording.recording import Recording
 
 #: Between the name of a subject and that of a marker: Vicon's and Qualisys's.
@@ -71,7 +71,7 @@ def between(
     Raises
     ------
     InvalidInput
-        When no frame lies between them.
+        When no frame lies between them, or the first comes after the other.
 
     Examples
     --------
@@ -82,6 +82,7 @@ def between(
     time = recording.time
     low = -np.inf if start is None else start
     high = np.inf if end is None else end
+    check_order(recording.source, low, high)
     # A moment that was typed in lies a rounding beside the frame that it means.
     rounding = 1e-6
     kept = (time >= low - rounding) & (time <= high + rounding)
@@ -98,6 +99,24 @@ def between(
         recording.source,
         recording.notes,
     )
+
+
+def check_order(source: object, start: float, end: float) -> None:
+    """Refuse a part that ends before it starts; infinite moments are not given."""
+    if start > end:
+        raise InvalidInput(
+            f"{source}: --from {start:g} s is after --to {end:g} s; give an earlier "
+            "start."
+        )
+
+
+def require_rate(recording: Recording, *, part: bool) -> None:
+    """Refuse a recording, or the `part` of one, that is too short for a frame rate."""
+    if (frames := len(recording.time)) < 2:
+        what = "part" if part else "recording"
+        raise NotEnoughData(
+            f"{recording.source}: the {what} has {frames} frame; at least 2 are needed."
+        )
 
 
 def _said(moment: float | None, default: str) -> str:

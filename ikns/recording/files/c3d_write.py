@@ -115,8 +115,8 @@ def frame_numbers(recording: Recording) -> tuple[int, float]:
     time, rate = recording.time, recording.rate
     if len(time) < 2:
         raise InvalidInput(
-            f"{recording.source}: expected at least 2 frames to know the frame rate "
-            f"that the file states, found {len(time)}."
+            f"{recording.source}: the recording has {len(time)} frame; at least 2 are "
+            "needed, as the file states a frame rate."
         )
     counted = (time - time[0]) * rate
     # A lost frame is a long step, a drifting clock a growing difference.

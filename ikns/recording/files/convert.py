@@ -21,6 +21,7 @@ from ikns.recording.files.storage import (
 )
 from ikns.recording.files.table import text_lines
 from ikns.recording.labels import renamed
+from ikns.recording.part import check_order, require_rate
 
 
 class Converted(NamedTuple):
@@ -31,7 +32,6 @@ class Converted(NamedTuple):
     names: tuple[str, ...]
     duration: float  # s
     left_out: int  # frames that the new file cannot hold
-    given: tuple[str, ...] = ()  # labels of markers before they were renamed
 
 
 def convert_file(
@@ -86,7 +86,7 @@ def convert_file(
     recording = read(
         source, subject_prefix=subject_prefix, start=start, end=end, stream=stream
     )
-    given = recording.labels
+    require_rate(recording, part=start is not None or end is not None)
     if names:
         recording = renamed(recording, names)
     write(target, recording, force=force)
@@ -97,7 +97,6 @@ def convert_file(
         recording.labels,
         float(time[-1] - time[0]),
         0,
-        given,
     )
 
 
@@ -133,6 +132,7 @@ def _between(
             raise InvalidInput(
                 f"{path}: expected a number of seconds, found {said!r}."
             ) from None
+    check_order(path, *limits)
     kept = (table.time >= limits[0]) & (table.time <= limits[1])
     if not kept.any():
         raise InvalidInput(
