@@ -122,3 +122,77 @@ def test_a_label_or_a_part_that_no_recording_has_is_refused(
     names |= {"person": str(files / "person"), "free": names["points"]}
     argv = [word.format(**names) for word in f"{words} {more}".split()]
     assert says in check_refused(argv, tmp_path, capfd)
+
+
+ODD: dict[str, bytes] = {
+    "odd.csv": b"a,b\n",
+    "bad.toml": b"name = 'x'\n",
+    "no.c3d": b"hello",
+    "bytes.urdf": b"\xff\xfe\x00",
+    "bytes.csv": b"\xff\xfe\x00",
+    "one.csv": b"time_s,a_rad\n0,1\n",
+    "file": b"x",
+}
+ARM = (
+    '<robot name="r"><link name="base"/><link name="tip"/><joint name="a" '
+    'type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("ik adir --static {static}", "adir: this is a folder; give one recording."),
+        ("check adir", "adir: this is a folder; give one recording."),
+        ("stream adir", "adir: this is a folder; give one recording."),
+        ("convert adir new.trc", "adir: this is a folder; give one recording."),
+        ("view {person} adir", "adir: this is a folder; give one recording."),
+        ("markers new {static} --sites odd.csv", "odd.csv: expected LABEL=PLACE"),
+        ("markers show bad.toml", "bad.toml: the line `format = 1` is missing."),
+        (
+            "scale --stature 1.7 --mass -7 --sex male --out new.urdf",
+            "mass is -7 kg, expected 25 to 250 kg.\n",
+        ),
+        ("check no.c3d", "no.c3d: this is not a C3D file (it starts with the bytes "),
+        ("robot bytes.urdf one.csv --frame tip", "this is not a text file"),
+        ("robot arm.urdf bytes.csv --frame tip", "this is not a text file."),
+        ("robot arm.urdf one.csv --frame tip", "at least 2 rows, found 1 row."),
+        ("stream {static} --fault drop=2", "drop=2: a probability must be between"),
+        ("stream {static} --fault drop=1,swap=1", "drop=1, swap=1: probabilities"),
+        ("replay file", "found a file."),
+        ("report file", "found a file."),
+        ("study run nowhere", "nowhere: there is no such folder; "),
+        ("convert {static} no/such/new.trc", "the folder no/such does not exist"),
+        (
+            "convert {static} file/new.trc",
+            "file/new.trc: file is a file; give a folder",
+        ),
+    ],
+)
+def test_each_odd_thing_is_called_what_it_is(
+    words: str,
+    says: str,
+    files: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: Refused,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "adir").mkdir()
+    for name, content in (ODD | {"arm.urdf": ARM.encode()}).items():
+        (tmp_path / name).write_bytes(content)
+    names = {"static": str(files / "static.c3d"), "person": str(files / "person")}
+    argv = [word.format(**names) for word in words.split()]
+    assert says in check_refused(argv, tmp_path, capfd)
+
+
+def test_a_check_without_a_static_trial_says_so_and_no_zero_has_a_sign(
+    files: Path, capfd: Refused
+) -> None:
+    assert main(["check", str(files / "free.c3d")]) == 0
+    said = " ".join(capfd.readouterr().out.split())
+    assert "Checked as" in said
+    assert "movement, without a static trial" in said
+    assert main(["markers", "check", "oxford24", str(files / "static.c3d")]) == 0
+    assert "-0" not in capfd.readouterr().out.split()

@@ -145,7 +145,7 @@ def test_missing_empty_and_folder_are_refused(tmp_path, suffix):
     assert "found an empty file" in refused(path)
     path.unlink()
     path.mkdir()
-    assert "found a folder" in refused(path)
+    assert "this is a folder; give one recording" in refused(path)
 
 
 @pytest.mark.parametrize("name", ["trial.mat", "trial"])

@@ -93,7 +93,7 @@ def test_a_clean_person_passes():
     alone = check_recordings([reaching(), standing()])
     assert not alone.findings
     assert [kind for _, kind in alone.judged] == [
-        "movement, by itself",
+        "movement, without a static trial",
         "static trial",
     ]
 

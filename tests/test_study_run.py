@@ -214,7 +214,7 @@ def test_a_study_of_people_and_one_that_is_not_there_are_not_run(
     people = make(tmp_path / "people", study={"name": "real", "simulated": False})
     with pytest.raises(InvalidInput, match="found one of people"):
         run_study(people)
-    with pytest.raises(FileError, match="nowhere: expected the file of a study"):
+    with pytest.raises(FileError, match="nowhere: there is no such folder"):
         run_study(tmp_path / "nowhere")
 
 

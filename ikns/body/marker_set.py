@@ -98,10 +98,12 @@ class MarkerSet:
             raise FileError(
                 f"{path}: cannot be read as a marker set: {plain(error)}."
             ) from None
-        if table.get("format") != _FORMAT:
+        if "format" not in table:
+            raise FileError(f"{path}: the line `format = {_FORMAT}` is missing.")
+        if table["format"] != _FORMAT:
             raise FileError(
                 f"{path}: expected marker-set format {_FORMAT}, "
-                f"found {table.get('format')}."
+                f"found {table['format']}."
             )
         try:
             markers = tuple(_read_marker(k, v) for k, v in table["markers"].items())

@@ -83,7 +83,7 @@ def check(
     show(
         found.as_dict(),
         table(
-            "Judged",
+            "Checked as",
             {"recording": "s", "as": "s"},
             [[Path(name).name, kind] for name, kind in found.judged],
         ),

@@ -34,4 +34,4 @@ def followed_sentence(movement: Path | None, residual: float) -> str:
 
 def millimeters(values: tuple[float, float, float]) -> str:
     """Return a place for a table."""
-    return " ".join(f"{1000 * value:.0f}" for value in values)
+    return " ".join(f"{1000 * value:z.0f}" for value in values)

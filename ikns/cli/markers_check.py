@@ -152,7 +152,7 @@ def _posture_table(found: SetCheck) -> Any:
             [
                 j.joint,
                 math.degrees(j.angle),
-                f"{math.degrees(j.lower):.0f} .. {math.degrees(j.upper):.0f}",
+                f"{math.degrees(j.lower):z.0f} .. {math.degrees(j.upper):z.0f}",
                 "held" if j.held else "",
             ]
             for j in found.joints

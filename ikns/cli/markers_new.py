@@ -72,7 +72,7 @@ def new(
     answers = (
         ask_sites(frames.labels, guess=guess, moving=seen)
         if sites is None
-        else read_name_pairs(sites)
+        else read_name_pairs(sites, form="LABEL=PLACE")
     )
     with naming(str(static if sites is None else sites), str(static)):
         made = own_marker_set(

@@ -77,8 +77,19 @@ def table(title: str, columns: Mapping[str, str], rows: Iterable[Sequence[Any]])
         made.add_column(header, justify="left" if form == "s" else "right")
     for row in rows:
         cells = zip(row, columns.values(), strict=True)
-        made.add_row(*("-" if _missing(x) else format(x, form) for x, form in cells))
+        made.add_row(*(_cell(value, form) for value, form in cells))
     return made
+
+
+def _cell(value: Any, form: str) -> str:
+    """Return the text of a cell; what rounds to zero has no sign.
+
+    >>> _cell(-0.2, ".0f"), _cell(-0.2, ".1f"), _cell(None, ".1f")
+    ('0', '-0.2', '-')
+    """
+    if _missing(value):
+        return "-"
+    return format(value, f"z{form}" if form.endswith("f") else form)
 
 
 def _missing(value: Any) -> bool:

@@ -63,6 +63,13 @@ def refuse_input_folder(folder: Path, inputs: Iterable[Path | str | None]) -> No
             )
 
 
+def found_there(path: Path) -> str:
+    """Say what is where a folder of some kind was expected: nothing, or another."""
+    if path.is_dir():
+        return "another folder"
+    return "a file" if path.exists() else "nothing there"
+
+
 def _given(inputs: Iterable[Path | str | None]) -> Iterator[Path]:
     """Yield the inputs that exist; a missing one is reported by who reads it."""
     for source in inputs:

@@ -72,8 +72,10 @@ def unused_names(labels: Iterable[str], names: Mapping[str, str]) -> list[str]:
     return [old for old in names if old.strip().casefold() not in known]
 
 
-def name_pairs(texts: Iterable[str], *, where: str) -> dict[str, str]:
-    """Read ``OLD=NEW`` from each text; `where` names their source in errors.
+def name_pairs(
+    texts: Iterable[str], *, where: str, form: str = "OLD=NEW"
+) -> dict[str, str]:
+    """Read ``OLD=NEW`` from each text; errors name the source `where`, and the `form`.
 
     >>> name_pairs(["RELBL=RELB", " Elbow med = RMEP "], where="--rename")
     {'RELBL': 'RELB', 'Elbow med': 'RMEP'}
@@ -83,23 +85,27 @@ def name_pairs(texts: Iterable[str], *, where: str) -> dict[str, str]:
         old, equals, new = (part.strip() for part in text.partition("="))
         if not (old and equals and new) or "=" in new:
             shown = text.strip()[:40].encode("utf-8", "backslashreplace").decode()
-            raise InvalidInput(f"{where}: expected OLD=NEW, found '{shown}'.")
+            raise InvalidInput(f"{where}: expected {form}, found '{shown}'.")
         if old in pairs:
             raise InvalidInput(f"{where}: expected one new name for {old}, found two.")
         pairs[old] = new
     return pairs
 
 
-def read_name_pairs(path: Path) -> dict[str, str]:
-    """Read a text file with a line ``OLD=NEW`` for each marker; # starts a comment."""
+def read_name_pairs(path: Path, *, form: str = "OLD=NEW") -> dict[str, str]:
+    """Read a text file with a line ``OLD=NEW`` for each marker; # starts a comment.
+
+    Errors call such a line by its `form`.
+    """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"{path}: cannot be read as text: {plain(error)}.") from None
     lines = [line.partition("#")[0] for line in lines]
     if not any(line.strip() for line in lines):
-        raise FileError(f"{path}: expected a line OLD=NEW for each marker, found none.")
+        raise FileError(f"{path}: expected a line {form} for each marker, found none.")
     try:
-        return name_pairs((line for line in lines if line.strip()), where=str(path))
+        given = (line for line in lines if line.strip())
+        return name_pairs(given, where=str(path), form=form)
     except InvalidInput as error:
         raise FileError(str(error)) from None

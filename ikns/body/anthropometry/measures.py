@@ -55,8 +55,9 @@ def checked_measure(what: str, value: ArrayLike) -> Array:
         ) from None
     plausible = (number >= low) & (number <= high)  # false for NaN
     if not plausible.all():
+        wrong = float(number[~plausible].flat[0])
         raise InvalidInput(
-            f"{what} is {number[~plausible].flat[0]:g} {unit}, expected {low:g} to "
-            f"{high:g} {unit}; {hint}"
+            f"{what} is {wrong:g} {unit}, expected {low:g} to {high:g} {unit}"
+            f"{f'; {hint}' if wrong > 0 else '.'}"
         )
     return number

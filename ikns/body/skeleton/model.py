@@ -29,8 +29,8 @@ def read_urdf(path: Path) -> str:
         raise FileError(f"{path}: cannot be read as a URDF: {reason}.") from None
     except UnicodeDecodeError as error:
         raise FileError(
-            f"{path}: expected a URDF as text in UTF-8, found other bytes at "
-            f"{error.start}."
+            f"{path}: this is not a text file (byte {error.start} is no UTF-8); a URDF "
+            "is one."
         ) from None
 
 

@@ -145,7 +145,9 @@ def check_recordings(
             judged.append((recording.source, "static trial"))
             continue
         findings += judge_exploration(recording, worn, body, skeleton=skeleton)
-        known = "by itself" if skeleton is None else "with the person's body"
+        known = (
+            "without a static trial" if skeleton is None else "with the person's body"
+        )
         judged.append((recording.source, f"movement, {known}"))
     return Check(tuple(worst_first(findings)), tuple(judged))
 

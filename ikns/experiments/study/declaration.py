@@ -104,6 +104,10 @@ def read_study(study: str | Path) -> Study:
         When a key is unknown, or the design is impossible.
     """
     path = Path(study)
+    if not path.exists() and path.suffix != ".toml":
+        raise FileError(
+            f"{path}: there is no such folder; `ikns study init` makes one."
+        )
     path = path / FILE if path.is_dir() else path
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))

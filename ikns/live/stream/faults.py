@@ -43,11 +43,16 @@ class Faults:
 
     def __post_init__(self) -> None:
         """Check that these are probabilities and times."""
-        chances = [getattr(self, kind) for kind in self.KINDS]
-        if not (all(p >= 0 for p in chances) and sum(chances) <= 1):
+        chances = {kind: getattr(self, kind) for kind in self.KINDS}
+        for kind, p in chances.items():
+            if not 0 <= p <= 1:
+                raise InvalidInput(
+                    f"{kind}={p:g}: a probability must be between 0 and 1."
+                )
+        if sum(chances.values()) > 1:
+            given = ", ".join(f"{kind}={p:g}" for kind, p in chances.items() if p)
             raise InvalidInput(
-                f"expected probabilities from 0 to 1 that add up to 1 at most, found "
-                f"{', '.join(f'{p:g}' for p in chances)}."
+                f"{given}: probabilities must not add up to more than 1."
             )
         for seconds in (self.late_seconds, self.freeze_seconds):
             if not 0 <= seconds < np.inf:

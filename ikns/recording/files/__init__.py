@@ -14,7 +14,7 @@ from pathlib import Path
 from ikns.errors import FileError, RecordingWarning
 from ikns.recording.files.c3d import read_c3d
 from ikns.recording.files.c3d_write import write_c3d
-from ikns.recording.files.conversion import existing_file
+from ikns.recording.files.conversion import existing_file, refuse_folder
 from ikns.recording.files.file_events import event_time
 from ikns.recording.files.marker_csv import read_marker_csv
 from ikns.recording.files.qualisys_tsv import read_qualisys_tsv
@@ -131,6 +131,7 @@ def check_marker_file(path: str | Path) -> None:
 
 def _reader(path: Path) -> Callable[[Path], Recording]:
     reader = _READERS.get(path.suffix.lower())
+    refuse_folder(path)
     if reader is None:
         raise FileError(
             f"{path}: expected a marker file that ends in "

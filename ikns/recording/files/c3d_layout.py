@@ -69,8 +69,8 @@ def read_layout(path: Path) -> C3dLayout:
         head = file.read(BLOCK)
         if len(head) < 2 or head[1] != _KEY or head[0] == 0:
             raise FileError(
-                f"{path}: expected a C3D file, whose second byte is 0x50, found a file "
-                f"that starts with {head[:4].hex(' ')}."
+                f"{path}: this is not a C3D file (it starts with the bytes "
+                f"{head[:4].hex(' ')}, and the second byte of a C3D file is 50)."
             )
         section_start = (head[0] - 1) * BLOCK
         if len(head) < BLOCK or section_start + 4 > size:

@@ -54,8 +54,7 @@ def existing_file(path: Path) -> int:
     """Return the size in bytes of a regular, readable, non-empty file."""
     if "\0" in str(path):
         raise FileError(f"{shown(str(path))}: this is not a file name.")
-    if path.is_dir():
-        raise FileError(f"{path}: expected a marker file, found a folder.")
+    refuse_folder(path)
     if not path.is_file():
         raise FileError(f"{path}: expected a marker file, found no file there.")
     try:
@@ -66,6 +65,12 @@ def existing_file(path: Path) -> int:
     if size == 0:
         raise FileError(f"{path}: expected a marker file, found an empty file.")
     return size
+
+
+def refuse_folder(path: Path) -> None:
+    """Refuse the folder of recordings where one of them is meant."""
+    if path.is_dir():
+        raise FileError(f"{path}: this is a folder; give one recording.")
 
 
 def shown(text: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from ikns.errors import FileError, InvalidInput
 from ikns.output.file import write_csv
 from ikns.recording.files import READABLE, WRITABLE, read, write
+from ikns.recording.files.conversion import refuse_folder
 from ikns.recording.files.joint_angles import read_angle_table
 from ikns.recording.files.storage import (
     STORAGE,
@@ -103,6 +104,7 @@ def convert_file(
 def holds_angles(path: Path) -> bool:
     """Whether a file is one of joint angles, by its ending and its first words."""
     ending = path.suffix.lower()
+    refuse_folder(path)
     if ending not in (*READABLE, *STORAGE):
         raise FileError(
             f"{path}: expected a file that ends in {', '.join((*READABLE, *STORAGE))}, "

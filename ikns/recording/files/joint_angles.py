@@ -116,12 +116,15 @@ def _number_table(path: Path) -> tuple[list[str], Array]:
         if uneven:
             raise ValueError(f"line {uneven[0]} does not have {len(header)} cells")
         table = np.array([[float(cell or "nan") for cell in row] for row in rows])
+    except UnicodeDecodeError:
+        raise FileError(f"{path}: this is not a text file.") from None
     except (OSError, ValueError) as error:
         raise FileError(
             f"{path}: cannot be read as a table of numbers: {plain(error)}."
         ) from None
     if len(rows) < 2:
         raise FileError(
-            f"{path}: expected a header and two rows or more, found {len(rows)} rows."
+            f"{path}: expected a header and at least 2 rows, found {len(rows)} "
+            f"row{'s' * (len(rows) != 1)}."
         )
     return header, table
