@@ -109,7 +109,7 @@ def test_no_help_text_shows_a_type_of_python(
             "demo --quick=1",
             "expected no value after --quick, found one; see `ikns demo",
         ),
-        ("study dance", "(init, run, plan), found dance; see `ikns study --help`."),
+        ("study dance", "(init, run, plan), found 'dance'; see `ikns study --help`."),
     ],
 )
 def test_a_wrong_line_is_told_what_was_expected_and_which_help_to_read(

@@ -44,11 +44,11 @@ def test_control_says_what_a_subject_has(files, old, tmp_path, capsys):
 def test_a_method_that_an_old_folder_lacks_is_named(
     command, files, old, tmp_path, capfd
 ):
-    recording, out = str(files / "free.c3d"), str(tmp_path / "new")
+    recording, out = str(files / "free.c3d"), str(tmp_path / "new.")
     argv = {
-        "control": ["control", recording, "--subject", str(old), "--out", out],
+        "control": ["control", recording, "--subject", str(old), "--out", f"{out}csv"],
         "compare": ["compare", recording, "--subject", str(old)],
-        "view": ["view", str(old), recording, "--out", out],
+        "view": ["view", str(old), recording, "--out", f"{out}html"],
     }[command]
     sentence = check_refused([*argv, "--method", "intent"], tmp_path, capfd, names=old)
     assert "has the method paper, not proximal and intent; calibrate" in sentence

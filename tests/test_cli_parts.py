@@ -42,9 +42,10 @@ def test_converted_files_have_the_new_labels(
     target = tmp_path / "new.trc"
     argv = ["convert", str(renamed), str(target), "--rename", "wrist in=RWRA"]
     assert "elbow out" in answer(argv, capsys)["names"]
-    argv += ["--labels", str(mapping(tmp_path)), "--force", "--rename", "lost=RFIN"]
-    assert main(argv) == 0
+    argv += ["--labels", str(mapping(tmp_path)), "--force"]
+    assert main([*argv, "--rename", "lost=RFIN"]) == 2
     assert "label lost of --rename" in capsys.readouterr().err
+    assert main(argv) == 0
     assert read(target).labels == read(files / "points.c3d").labels
 
 

@@ -51,7 +51,7 @@ Frame#\tTime\tA\t\t
         ("replay:", "expected replay:FILE"),
         ("vicon:", "vicon:HOST"),
         ("replay:{}/none.c3d", "none.c3d"),
-        ("replay:{}/notes.c3d", "notes.c3d: expected"),
+        ("replay:{}/notes.c3d", "notes.c3d: this is not a C3D file"),
         ("replay:{}/notes.txt", "notes.txt: expected a marker file that ends in .c3d"),
         (
             "replay:{}/short.trc",

@@ -70,7 +70,7 @@ def read_layout(path: Path) -> C3dLayout:
         if len(head) < 2 or head[1] != _KEY or head[0] == 0:
             raise FileError(
                 f"{path}: this is not a C3D file (it starts with the bytes "
-                f"{head[:4].hex(' ')}, and the second byte of a C3D file is 50)."
+                f"{head[:4].hex(' ')})."
             )
         section_start = (head[0] - 1) * BLOCK
         if len(head) < BLOCK or section_start + 4 > size:
