@@ -118,7 +118,7 @@ def test_a_picture_is_only_overwritten_by_force(
 @pytest.mark.parametrize(
     ("rest", "said"),
     [
-        (["--figure", "picture.gif"], ".png, .svg, .pdf"),
+        (["--figure", "picture.gif"], ".png, .svg or .pdf"),
         (["--figure", "nowhere/picture.png"], "nowhere"),
         (["--intervals", "-1"], "--intervals"),
         (["--coordinates", "polar"], "polar"),

@@ -204,7 +204,7 @@ def test_ten_points_of_a_robot_whose_z_points_up(
         (["--from", "torso"], "has no link 'torso' to start from, but panda_link0"),
         (["--from", "panda_hand", "--frame", "panda_link1"], "'panda_link1' on 'panda"),
         (["--speed", "0"], "slower than 0 m/s, found none"),
-        (["--figure", "robot.gif"], "expected a picture"),
+        (["--figure", "robot.gif"], "expected a name that ends in .png"),
     ],
 )
 def test_bad_options_are_one_sentence(
@@ -220,7 +220,7 @@ def test_bad_options_are_one_sentence(
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "expected a header and two rows"),
+        ("", "expected a header and at least 2 rows"),
         ("time_s,panda_joint1_rad\n0,zero\n", "cannot be read as a table"),
         ("time_s,panda_joint1_rad\n0,0\n1,0\n", "found none for panda_joint2"),
         ("a,b\n1\n2,3\n", "cannot be read as a table"),

@@ -103,7 +103,7 @@ def test_c3d_cut_at_any_byte_is_refused(sound, folder):
     last = 512 * (block - 1) + 6 * len(LABELS) * 16  # after it only padding
     for end in range(last):
         path.write_bytes(sound["c3d"][:end])
-        with pytest.raises(IknsError, match=r"cut off|empty|0x50"):
+        with pytest.raises(IknsError, match=r"cut off|empty|not a C3D file"):
             read(path)
 
 

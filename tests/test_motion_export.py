@@ -253,7 +253,7 @@ def test_markers_that_a_recording_lacks_are_told(chain, lost):
 
 
 def test_an_unknown_ending_is_refused(tmp_path):
-    with pytest.raises(InvalidInput, match=r"\.c3d, \.osim, found"):
+    with pytest.raises(InvalidInput, match=r"\.c3d or \.osim, found"):
         write_motion(tmp_path / "motion.xlsx", motion(), SKELETON)
 
 
