@@ -4,6 +4,7 @@ Each is a process of its own, forked from this one after the imports that nearly
 them share: importing costs more than most of them compute.
 """
 
+import importlib
 import os
 import runpy
 import sys
@@ -12,15 +13,10 @@ import time
 from pathlib import Path
 from typing import BinaryIO
 
-import numba  # noqa: F401
-import pinocchio  # noqa: F401
-import scipy.stats  # noqa: F401
-import sklearn.cluster
-import sklearn.decomposition  # noqa: F401
-
 from ikns.live.warm_up import warm_up
 
 AT_ONCE = 2
+SHARED = "numba", "pinocchio", "scipy.stats", "sklearn.cluster", "sklearn.decomposition"
 Started = tuple[Path, float, BinaryIO]
 
 
@@ -39,6 +35,8 @@ def start(script: Path, said: BinaryIO) -> int:
 
 def main() -> None:
     """Print what each benchmark printed, in one piece, as soon as it has ended."""
+    for name in SHARED:
+        importlib.import_module(name)
     warm_up()
     # The longest is last in the alphabet.
     waiting = sorted((Path(__file__).parents[1] / "benchmarks").glob("*.py"))

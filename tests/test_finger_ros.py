@@ -105,7 +105,7 @@ def test_the_end_leaves_it_where_it_is(graph, robot):
         ("kill", 0.02, "the router at 127.0.0.1:{} went away"),
         ("pause", 1.0 + 0.05 + 0.02, "no answer from the router at 127.0.0.1:{}"),
         ("quiet", 1.0 + 0.02, "no feedback of joint 'finger' for 1 s"),
-        ("controller", 0.02, "nobody listens to /finger/commands any more"),
+        ("controller", 0.02, "no one listens to /finger/commands any more"),
     ],
 )
 def test_a_fault_makes_it_safe_in_the_stated_time(

@@ -110,7 +110,7 @@ class RosFinger:
         Raises
         ------
         FingerError
-            When there is no router, nobody listens to the topic, the joint is not in
+            When there is no router, no one listens to the topic, the joint is not in
             the feedback, or it is outside the range from open to closed.
         """
         with self._access:

@@ -105,7 +105,7 @@ class RosJoint:
         Raises
         ------
         FingerError
-            When nobody listens, the joint is not in the feedback, or is far outside.
+            When no one listens, the joint is not in the feedback, or is far outside.
         """
         target = self._target
         give_up = time.monotonic() + _WAIT
@@ -113,7 +113,7 @@ class RosJoint:
             if time.monotonic() > give_up:
                 gone = "" if self._node.connected else self.trouble(math.inf)
                 raise FingerError(
-                    f"{self._name}: {gone}." if gone else self._nobody_listens()
+                    f"{self._name}: {gone}." if gone else self._no_one_listens()
                 )
             time.sleep(0.01)
         if not target.feedback:
@@ -151,7 +151,7 @@ class RosJoint:
         if silent:
             return f"no answer from {router} for {timeout:g} s"
         if not self._publisher.heard:
-            return f"nobody listens to {target.address.name} any more"
+            return f"no one listens to {target.address.name} any more"
         if target.feedback and time.monotonic() - self._heard_of[0] > timeout:
             return f"no feedback of joint '{target.joint}' for {timeout:g} s"
         return ""
@@ -200,7 +200,7 @@ class RosJoint:
             self._on_measured(received, flexion)
             self._fresh.set()
 
-    def _nobody_listens(self) -> str:
+    def _no_one_listens(self) -> str:
         topic, wanted = self._target.address.name, _TYPES[self._target.command]
         others = sorted({e.type for e in self._node.subscribers(topic)} - {wanted})
         return (
