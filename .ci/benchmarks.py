@@ -1,5 +1,8 @@
 """Run every benchmark with ``--quick``, two at a time; exit 1 if one fails.
 
+``benchmarks.py FILE``: as soon as FILE exists, what tests need is installed. The few
+benchmarks that need it, too, wait for that.
+
 Each is a process of its own, forked from this one after the imports that nearly all of
 them share: importing costs more than most of them compute.
 """
@@ -16,6 +19,18 @@ from typing import BinaryIO
 from ikns.live.warm_up import warm_up
 
 AT_ONCE = 2
+#: They import what only the group `test` has, or start programs that do.
+WITH_TEST_PACKAGES = {
+    "endings",
+    "finger_faults",
+    "marker_ik",
+    "natural_neighbor",
+    "publishing",
+    "soak",
+    "stream_latency",
+    "study_cluster",
+    "virtual_picking",
+}
 SHARED = "numba", "pinocchio", "scipy.stats", "sklearn.cluster", "sklearn.decomposition"
 Started = tuple[Path, float, BinaryIO]
 
@@ -33,7 +48,14 @@ def start(script: Path, said: BinaryIO) -> int:
     sys.exit()
 
 
-def main() -> None:
+def possible(waiting: list[Path], installed: Path) -> list[Path]:
+    """Return which of the benchmarks can run now."""
+    if installed.exists():
+        return waiting
+    return [script for script in waiting if script.stem not in WITH_TEST_PACKAGES]
+
+
+def main(installed: Path) -> None:
     """Print what each benchmark printed, in one piece, as soon as it has ended."""
     for name in SHARED:
         importlib.import_module(name)
@@ -43,14 +65,20 @@ def main() -> None:
     running: dict[int, Started] = {}
     failed = []
     while waiting or running:
-        while waiting and len(running) < AT_ONCE:
-            script, said = waiting.pop(), tempfile.TemporaryFile()
+        while len(running) < AT_ONCE and (able := possible(waiting, installed)):
+            script, said = able[-1], tempfile.TemporaryFile()
+            waiting.remove(script)
             running[start(script, said)] = script, time.monotonic(), said
-        process, status = os.wait()
+        if not running:
+            time.sleep(1)
+            continue
+        process, status, usage = os.wait3(0)
         script, since, said = running.pop(process)
         said.seek(0)
         took = time.monotonic() - since
-        sys.stdout.write(f"\n--- {script.name} ({took:.0f} s)\n{said.read().decode()}")
+        busy = usage.ru_utime + usage.ru_stime
+        sys.stdout.write(f"\n--- {script.name} ({took:.0f} s, {busy:.0f} CPU s)\n")
+        sys.stdout.write(said.read().decode())
         said.close()
         if status:
             failed.append(script.name)
@@ -59,4 +87,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]))

@@ -247,6 +247,9 @@ def show(result: dict[str, Any]) -> None:
             f"| {'yes' if row['same_bits'] else 'NO: ' + row['files_that_differ'][0]} |"
         )
     rows = result["memory"]
+    if not rows:
+        print("\nThe killed run had done all before it could be killed.")
+        return
     print(
         f"\n| participants: {rows[0]['participants']} | running process, MB "
         "| largest worker, MB |\n|---|---|---|"

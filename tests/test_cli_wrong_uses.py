@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from command_line import contents, one_sentence
+from command_line import one_sentence, stamps
 from wrong_uses import ALL, options, undescribed
 
 from ikns.cli import main
@@ -135,7 +135,7 @@ def test_a_wrong_use_is_one_sentence(
 ) -> None:
     argv = [word.format(**places) for word in words]
     monkeypatch.chdir(tmp_path)
-    shelf = contents(Path(places["shelf"]))
+    shelf = stamps(Path(places["shelf"]))
     capfd.readouterr()
     began = time.monotonic()
     assert main(argv) == 2
@@ -148,4 +148,4 @@ def test_a_wrong_use_is_one_sentence(
     assert "Traceback" not in err
     assert len(err) < 1000
     assert list(tmp_path.iterdir()) == []
-    assert contents(Path(places["shelf"])) == shelf
+    assert stamps(Path(places["shelf"])) == shelf
