@@ -49,9 +49,12 @@ class Driven:
         wait_for(lambda: len(servo.events("goal")) > 5, 10)
 
     def stop(self, seconds):
+        """Stop it for a while; return what the servo's watchdog did meanwhile."""
         os.kill(self.process.pid, signal.SIGSTOP)
         time.sleep(seconds)
+        done = [event["tripped"] for event in self.servo.events("watchdog")]
         os.kill(self.process.pid, signal.SIGCONT)
+        return done
 
     def end(self):
         self.process.send_signal(signal.SIGINT)
@@ -68,9 +71,7 @@ def test_limp_means_that_the_register_of_the_torque_is_zero(
         tmp_path, model=model, answer_delay=delay, byte_time=byte_time
     ) as servo:
         driven = Driven(servo, model, "limp")
-        driven.stop(0.6)
-        tripped = [e["tripped"] for e in servo.events("watchdog")]
-        assert tripped == ([1] if model == "xl430" else [])
+        assert driven.stop(0.6) == ([1] if model == "xl430" else [])
         wait_for(lambda: not servo["torque_enable"], TIMEOUT + BUSY)
         # It stays so: a finger does not take itself up again.
         time.sleep(0.3)
