@@ -15,6 +15,7 @@ from ikns.nullspace.clustering.bounding_box import (
 )
 from ikns.nullspace.clustering.lloyd import inertia, lloyd, two_places
 from ikns.nullspace.clustering.nearest import nearest_center
+from ikns.nullspace.clustering.plus_plus import plus_plus
 from ikns.nullspace.estimator_base import EstimatorBase
 from ikns.numerics.distance import distances
 
@@ -196,10 +197,9 @@ class BoundingBoxKMeans(EstimatorBase):
             starts.append(("groups", np.vstack([means, spare]), False))
         elif len(means) == self.n_clusters:
             starts.append(("groups", means, True))
-        from sklearn.cluster import kmeans_plusplus  # takes a second to load
-
-        for seed in range(_STARTS):
-            drawn, _ = kmeans_plusplus(x, self.n_clusters, random_state=seed)
+        rng = np.random.default_rng(0)
+        for _ in range(_STARTS):
+            drawn = plus_plus(x, self.n_clusters, rng)
             starts.append(("k-means++", drawn, True))
         return starts
 
