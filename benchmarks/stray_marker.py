@@ -143,7 +143,8 @@ def counts(found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def real(folder: Path, *, quick: bool) -> list[dict]:
     """Worst distance of the chain's markers in real recordings, a row a trial, mm."""
     rows = []
-    for name in sorted(p.name for p in folder.iterdir() if p.is_dir()):
+    names = sorted(p.name for p in folder.iterdir() if p.is_dir())
+    for name in names[:1] if quick else names:
         static = read(folder / name / f"{name}_static.csv")
         skeleton, _ = scale(
             Skeleton.load(), static, marker_set="ue_adl", min_duration=0.15
