@@ -125,14 +125,15 @@ class BoundingBoxKMeans(EstimatorBase):
         self.box_ = minimum_bounding_box(x)
         on_box = box_surface_points(self.box_, self.n_clusters, up=self.up)
         found = lloyd(x, on_box, max_iter=self.max_iter)
-        self.start_, self.merged_ = "box", self._merged(x, found[1], known)
+        cut: dict[bytes, tuple[Array, Array] | None] = {}
+        self.start_, self.merged_ = "box", self._merged(x, found[1], known, cut)
         if self.merged_:
             # A centroid without samples is one more place that could be kept apart.
             idle = self.n_clusters - len(np.unique(found[1]))
             rows = []
             for name, start, moved in self._starts(x, on_box, known):
                 other = lloyd(x, start, max_iter=self.max_iter, move_empty=moved)
-                merged = self._merged(x, other[1], known)
+                merged = self._merged(x, other[1], known, cut)
                 size = inertia(x, *other[:2])
                 rows.append((len(merged), size, name, merged, other))
             # Who was told what is one place need not guess by inertia.
@@ -204,9 +205,16 @@ class BoundingBoxKMeans(EstimatorBase):
         return starts
 
     def _merged(
-        self, x: Array, labels: Indices, groups: Indices
+        self,
+        x: Array,
+        labels: Indices,
+        groups: Indices,
+        cut: dict[bytes, tuple[Array, Array] | None],
     ) -> list[tuple[int, Array, Array]]:
-        """Clusters that hold two places, and where these are."""
+        """Clusters that hold two places, and where these are.
+
+        `cut` remembers what clusters hold: most starts end with some of the same.
+        """
         least = max(2, int(_SHARE * len(x) / self.n_clusters))
         across = float(np.linalg.norm(np.ptp(x, axis=0)))
         # The cluster of a group is that of most of its samples.
@@ -217,7 +225,11 @@ class BoundingBoxKMeans(EstimatorBase):
             own = [mean for mean, h in zip(means, home, strict=True) if h == k]
             if len(own) > 1:
                 merged.append((k, own[0], own[1]))
-            elif both := two_places(x[labels == k], least=least, across=across):
+                continue
+            row = labels == k
+            if (name := row.tobytes()) not in cut:
+                cut[name] = two_places(x[row], least=least, across=across)
+            if both := cut[name]:
                 merged.append((k, *both))
         return merged
 
