@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 from natural_posture_people import BESIDE
-from null_space.floors import floors, with_the_hand
+from null_space.floors import floors
 from null_space.ladder import Person, scored, shown
 from null_space.methods import METHODS
 from null_space.people import Arm, real_arms
@@ -35,6 +35,7 @@ from null_space_bench import left_out
 LADDER: dict[str, tuple[str, str, bool]] = {
     "as shipped": ("tracked", "tracked", False),
     "nothing remembered of places": ("tracked", "tracked, smooth", False),
+    "the wrist alone": ("tracked", "tracked, wrist alone", False),
     "(a) true joint angles": ("true", "true", False),
     "(a) true joint angles, nothing remembered": ("true", "true, smooth", False),
     "(c) true ends": ("tracked", "tracked", True),
@@ -84,19 +85,20 @@ def print_floors(arms: list[Arm]) -> None:
 
 def print_methods(arms: list[Arm]) -> None:
     """Print what more knowledge gains."""
+    with_hand, without = left_out(arms), left_out(arms, hand=False)
+    smooth, places = METHODS["intent, no places"], METHODS["intent"]
     methods = {
-        "quadratic of the wrist": METHODS["intent, no places"],
-        "and places (shipped)": METHODS["intent"],
-        "wrist and hand": with_the_hand(arms, places=False),
-        "wrist, hand and places": with_the_hand(arms, places=True),
+        "quadratic of the wrist": (smooth, without),
+        "wrist and places": (places, without),
+        "wrist and hand": (smooth, with_hand),
+        "wrist, hand and places (shipped)": (places, with_hand),
     }
     print(
         "\n| natural posture by | tasks | change | > 0.2 | AUC 20, 10 deg "
         "| turned hand |"
     )
     print("|---|---|---|---|---|---|")
-    people = left_out(arms)
-    for words, method in methods.items():
+    for words, (method, people) in methods.items():
         for kind in ("same", "unseen"):
             row = summary(of_people(arms, people, method, kind))
             low, high = row["interval"]

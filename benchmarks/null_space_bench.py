@@ -28,7 +28,7 @@ import platform
 from pathlib import Path
 
 import numpy as np
-from natural_posture_people import moving, own_fit
+from natural_posture_people import moving, own_fit, turned
 from null_space.entered import entered
 from null_space.entrants import PACKAGE, SHIPPED, entrant
 from null_space.methods import METHODS
@@ -40,6 +40,8 @@ from null_space.virtual_table import (
     virtual_people,
     virtual_verdicts,
 )
+
+from ikns.nullspace.posture_terms import wrist_of
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 #: What was asked of intent: at most this change, and at least these AUCs.
@@ -58,15 +60,22 @@ REAL_ONLY = tuple(name for name in METHODS if name not in PACKAGE)
 UNLEARNED = ("swivel about down", "hinge swivel", "people alone")
 
 
-def left_out(arms: list[Arm]) -> dict[str, np.ndarray]:
-    """Mean coefficients of all other people, by person."""
-    rows = {id(arm): own_fit(*moving(arm)) for arm in arms}
-    return {
-        arm.person: np.mean(
-            [rows[id(other)] for other in arms if other.person != arm.person], axis=0
+def left_out(arms: list[Arm], *, hand: bool = True) -> dict[str, np.ndarray]:
+    """Mean coefficients of all other people, by person; without `hand` of the wrist."""
+    found = [moving(arm) for arm in arms]
+    usual = [turned(arm, q) for arm, (_, _, q) in zip(arms, found, strict=True)]
+    means = {}
+    for person in {arm.person for arm in arms}:
+        others = [k for k, arm in enumerate(arms) if arm.person != person]
+        price = np.mean([usual[k] for k in others], axis=0) if others else None
+        means[person] = np.mean(
+            [
+                own_fit(x if hand else wrist_of(x), s, price)
+                for x, s, _ in (found[k] for k in others)
+            ],
+            axis=0,
         )
-        for arm in arms
-    }
+    return means
 
 
 def verdicts(table: dict[tuple[str, str], dict]) -> list[str]:

@@ -31,7 +31,7 @@ from scipy.spatial.transform import Rotation
 from ikns.errors import IknsError
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.hinge_swivel import hinge_swivel, mirrored
-from ikns.nullspace.natural_posture import quadratic_terms
+from ikns.nullspace.posture_terms import quadratic_terms
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
 

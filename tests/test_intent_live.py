@@ -15,37 +15,46 @@ from ikns.live.control import FrameSolver
 from ikns.live.control.controller import Controller
 from ikns.live.control.intent import intent_numbers
 from ikns.live.control.settings import ControlSettings
-from ikns.nullspace.hinge_swivel import arm_swivel
 from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.nullspace.readout import IntentMap, Readout
+from ikns.nullspace.readout.coordinates import posture_samples
 
 CORNERS = 0.3 * np.array(list(np.ndindex(2, 2, 2))) + [0.1, -0.3, 0.0]
 
 
-def readout(side: str, *, guard: bool = True) -> Readout:
+def readout(side: str, *, guard: bool = True, hand: bool = True) -> Readout:
     rng = np.random.default_rng(1)
     wrist = rng.uniform([0.1, -0.3, 0], [0.4, 0.1, 0.4], (300, 3))
-    natural = NaturalPosture(guard=guard).fit(wrist, np.sin(5 * wrist).sum(axis=1))
+    way = rng.normal(size=(300, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    places = np.hstack([wrist, way]) if hand else wrist
+    swivel = np.sin(5 * wrist).sum(axis=1) + way @ [0.5, -0.4, 0.8]
+    natural = NaturalPosture(guard=guard).fit(places, swivel)
     learned = IntentMap.from_arrays(natural, CORNERS, np.full(8, -0.4), np.full(8, 0.7))
     return Readout("intent", f"{side}_arm", learned)
 
 
-@given(st.integers(0, 200), st.sampled_from(["right", "left"]), st.booleans())
+@given(
+    st.integers(0, 200),
+    st.sampled_from(["right", "left"]),
+    st.booleans(),
+    st.booleans(),
+)
 @settings(max_examples=25, deadline=None)
-def test_the_kernel_is_the_formula(seed, side, guard):
+def test_the_kernel_is_the_formula(seed, side, guard, hand):
     rng, body = np.random.default_rng(seed), Skeleton.load()
-    one = readout(side, guard=guard)
+    one = readout(side, guard=guard, hand=hand)
     angles = rng.uniform(body.lower, body.upper)
     work = np.empty((1, 2, 3, 3)), np.empty((1, 2, 3)), np.empty(10)
     c, taught = intent_signal(*intent_numbers(body, one), angles[None], *work)
-    wrist, swivel = arm_swivel(body, angles, one.chain)
-    expected = one.map.control_signal(swivel[..., None], wrist)
+    place, swivel = posture_samples(body, angles[None], one.chain, "intent")
+    expected = one.map.control_signal(swivel, place)[0]
     # Some 100 terms of order 1 to 10; near a full turn both may differ by one.
     turn = 2 * np.pi / (one.map.ends_[1] - one.map.ends_[0])
     off = (c - float(expected)) / turn
     assert np.isnan(c) == np.isnan(expected)
     assert np.isnan(c) or abs(off - round(off)) * turn < 1e-9
-    assert taught == one.map.inside(wrist)
+    assert taught == one.map.inside(place)[0]
 
 
 def test_frames_of_a_recording_give_what_the_motion_gives():

@@ -47,12 +47,13 @@ def test_changes_are_those_of_what_control_writes(moved):
         assert np.isclose(row["natural"], by_hand.mean(), atol=1e-9)
 
 
-def test_a_turned_hand_moves_the_paper_s_c_and_nothing_else(moved):
+def test_a_turned_hand_moves_the_paper_s_c_most(moved):
     rows = method_summary(moved[0], [])["methods"]
     assert rows["paper"]["turned_hand"] > 0.1
     # The upper arm does not turn; places of the hand move by millimeters.
     assert rows["proximal"]["turned_hand"] < 0.05
-    assert rows["intent"]["turned_hand"] == 0.0
+    # As far as the natural posture follows where the hand points.
+    assert 0 < rows["intent"]["turned_hand"] < 0.1
 
 
 def test_the_report_judges_movement_by_what_the_rest_of_it_taught(moved):

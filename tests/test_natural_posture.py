@@ -10,8 +10,9 @@ from sklearn.model_selection import GridSearchCV
 
 from ikns.errors import InvalidInput
 from ikns.nullspace.local_posture import REACH
-from ikns.nullspace.natural_posture import NaturalPosture, quadratic_terms
+from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.nullspace.people_posture import natural_posture_people
+from ikns.nullspace.posture_terms import quadratic_terms
 
 LOW, HIGH = np.array([0.1, -0.4, 0.0]), np.array([0.45, 0.1, 0.4])
 
@@ -32,7 +33,7 @@ def test_terms_are_the_quadratic_of_the_formula():
 
 def test_it_is_a_ridge_toward_the_people_that_ship():
     wrist, s = movement(1)
-    people = natural_posture_people().mean
+    people = natural_posture_people().wrist_alone
     phi = quadratic_terms(wrist)
     # Scikit-learn's ridge has a free intercept too; its penalty is N times ours.
     other = Ridge(alpha=0.03 * len(s)).fit(phi[:, 1:], s - phi @ people)
@@ -40,6 +41,46 @@ def test_it_is_a_ridge_toward_the_people_that_ship():
     at, _ = movement(2, n=50)
     expected = quadratic_terms(at) @ people + other.predict(quadratic_terms(at)[:, 1:])
     assert np.allclose(own.swivel(at), expected, rtol=0, atol=1e-10)
+
+
+def with_hand(seed, *, n=400):
+    """Places with a hand that points about forward, and swivels that follow it."""
+    wrist, s = movement(seed, n=n)
+    rng = np.random.default_rng([seed, 1])
+    way = [1.0, -0.3, 0.1] + rng.normal(scale=0.5, size=(n, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    return np.hstack([wrist, way]), s + way @ [0.3, -0.2, 0.4]
+
+
+@given(st.integers(0, 100))
+@settings(max_examples=10, deadline=None)
+def test_a_turned_hand_costs_what_it_does_to_the_posture(seed):
+    places, s = with_hand(seed)
+    known, n = natural_posture_people(), len(s)
+    phi = np.hstack([quadratic_terms(places[:, :3]), places[:, 3:]])
+    # Least squares on rows: those of the penalty, and of what turns do, meet zero.
+    size, turns = np.linalg.eigh(known.turned)
+    price = np.sqrt(0.03) * np.eye(13)[1:]
+    turned = np.hstack([np.zeros((3, 10)), np.sqrt(size)[:, None] * turns.T])
+    rows = np.vstack([phi / np.sqrt(n), price, turned])
+    aims = np.r_[(s - phi @ known.mean) / np.sqrt(n), np.zeros(15)]
+    beyond = np.linalg.lstsq(rows, aims, rcond=None)[0]
+    own = NaturalPosture(guard=False, local_penalty=None).fit(places, s)
+    assert np.allclose(own.coefficients_, known.mean + beyond, rtol=0, atol=1e-9)
+    assert np.allclose(own.swivel(places), phi @ own.coefficients_, atol=1e-9)
+
+
+def test_the_hand_has_no_say_in_where_was_taught_and_what_is_remembered():
+    places, s = with_hand(1)
+    own = NaturalPosture().fit(places, s)
+    turned = places * [1, 1, 1, -1, -1, -1]
+    assert np.array_equal(own.taught(turned), own.taught(places))
+    follows = places[:, 3:] @ own.coefficients_[10:]
+    change = own.swivel(turned) - own.swivel(places)
+    assert np.allclose(change, -2 * follows, atol=1e-12)
+    alone = NaturalPosture().fit(places[:, :3], s)
+    assert np.array_equal(alone.swivel(turned), alone.swivel(places[:, :3]))
+    assert NaturalPosture.of_people(hand=True).swivel(places).shape == (400,)
 
 
 @given(st.integers(0, 100), st.floats(-1.0, 1.0))
@@ -140,6 +181,9 @@ def test_people_name_source_and_license_and_are_a_population():
     # Rounded to 1e-6.
     assert np.linalg.eigvalsh(people.covariance).min() > -1e-5
     assert np.allclose(people.covariance, people.covariance.T)
+    # Turns by 29, 20 and 20 deg move a unit vector across them by as much at most.
+    size = np.linalg.eigvalsh(people.turned)
+    assert 0 < size.min() < size.sum() <= (np.radians([29, 20, 20]) ** 2).sum()
 
 
 def test_it_can_be_chosen_by_cross_validation():

@@ -20,6 +20,7 @@ from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.live.control.recorded import control_table, jump_sentence
 from ikns.motion.motion import Motion
+from ikns.nullspace.hinge_swivel import arm_swivel
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.nullspace.map.smooth import SmoothField
 from ikns.nullspace.natural_posture import NaturalPosture
@@ -187,7 +188,7 @@ def test_every_method_follows_the_elbow_of_a_simulated_person():
             assert np.corrcoef(c[own], true[own])[0, 1] > 0.9, (method, k)
 
 
-def test_a_turned_hand_moves_the_paper_s_c_alone():
+def test_a_turned_hand_moves_the_paper_s_c_most():
     subject, motion = small_person.subject(), small_person.subject().motions[0]
     joints = ("right_forearm_pronation",)
     moved = turned(motion, joints, np.radians(20.0))
@@ -201,7 +202,30 @@ def test_a_turned_hand_moves_the_paper_s_c_alone():
         for method in METHODS
     }
     assert change["paper"] > 0.1
-    assert change["proximal"] == change["intent"] == 0.0
+    assert change["proximal"] == 0.0
+    # As much as the natural posture follows the hand's direction, which turns by no
+    # more than the hand.
+    readout = subject.readout("intent")
+    follows = np.linalg.norm(readout.map.natural_.coefficients_[10:])
+    a, b = readout.map.ends_
+    assert 0 < change["intent"] <= follows * np.radians(20.0) / (b - a)
+
+
+def test_a_map_of_before_reads_the_wrist_alone():
+    subject, motion = small_person.subject(), small_person.subject().motions[0]
+    table = subject.readout("intent").table()
+    for name in ("coefficients_rad", "people_rad"):
+        table["natural_posture"][name] = table["natural_posture"][name][:10]
+    before = Readout.from_table(table)
+    moved = turned(motion, ("right_wrist_flexion",), np.radians(20.0))
+    one, other = (before.control_signal(subject.skeleton, m) for m in (motion, moved))
+    np.testing.assert_array_equal(one, other)
+    wrist = readout_samples(subject.skeleton, motion, "right_arm", "intent")[0][:, :3]
+    known = np.isfinite(wrist).all(axis=1)
+    c = before.map.control_signal(
+        arm_swivel(subject.skeleton, motion.angles, "right_arm")[1][:, None], wrist
+    )
+    np.testing.assert_array_equal(c[known], one[known])
 
 
 def test_a_loaded_subject_reads_the_same_with_every_method(folder):

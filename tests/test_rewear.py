@@ -90,8 +90,8 @@ def test_a_posture_that_is_off_everywhere_is_shifted_by_what_is_known_of_it():
     readout = subject.readouts["intent"]
     held = readout.map.natural_
     tilted = NaturalPosture.from_arrays(
-        held.coefficients_ + 0.1 * np.eye(10)[0],
-        held.people_ + 0.1 * np.eye(10)[0],
+        held.coefficients_ + 0.1 * np.eye(13)[0],
+        held.people_ + 0.1 * np.eye(13)[0],
         held.leverage_,
         taught_leverage=held.taught_leverage_,
         offset=held.offset_,

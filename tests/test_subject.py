@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 
 from ikns.calibration.subject import Subject
 from ikns.calibration.subject_files import FILES
+from ikns.calibration.subject_tables import read_readout, write_readout
 from ikns.errors import FileError, IknsError, InvalidInput
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.readout import Readout
 
 
 @pytest.fixture(scope="module")
@@ -204,10 +206,24 @@ def test_a_missing_file_is_named(folder: Path, tmp_path: Path, name: str) -> Non
         Subject.load(tmp_path / "person")
 
 
-def test_what_remembers_places_is_refused_by_those_who_know_of_none(folder: Path):
+def test_what_an_earlier_version_would_misread_it_refuses(
+    folder: Path, tmp_path: Path
+) -> None:
     table = json.loads((folder / "intent.json").read_text())
-    assert table["natural_posture"]["heights_rad"]
-    assert table["format"] == 2
+    assert len(table["natural_posture"]["coefficients_rad"]) == 13
+    assert table["format"] == 3
+    # Maps of before, of the wrist alone: with places remembered, and without.
+    natural = table["natural_posture"]
+    for name in ("coefficients_rad", "people_rad"):
+        natural[name] = natural[name][:10]
+    for version, heights in ((2, natural["heights_rad"]), (1, [])):
+        natural["heights_rad"] = heights
+        natural["places_m"] = natural["places_m"][: len(heights)]
+        before = Readout.from_table(table)
+        write_readout(tmp_path / "intent.json", before)
+        assert json.loads((tmp_path / "intent.json").read_text())["format"] == version
+        again = read_readout(tmp_path / "intent.json", "intent", "right_arm")
+        assert again.table() == before.table()
     for name in ("map.json", "calibration.json", "proximal.json"):
         assert json.loads((folder / name).read_text())["format"] == 1
 
@@ -215,7 +231,7 @@ def test_what_remembers_places_is_refused_by_those_who_know_of_none(folder: Path
 @pytest.mark.parametrize(
     "name", ["map.json", "calibration.json", "proximal.json", "intent.json"]
 )
-@pytest.mark.parametrize("version", [0, 3, "1", None])
+@pytest.mark.parametrize("version", [0, 4, "1", None])
 def test_an_unknown_version_is_refused(
     folder: Path, tmp_path: Path, name: str, version: object
 ) -> None:

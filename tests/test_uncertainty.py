@@ -1,5 +1,6 @@
 """What c is worth: its standard deviation by formula, and its errors on a person."""
 
+import dataclasses
 import inspect
 
 import numpy as np
@@ -22,8 +23,9 @@ from ikns.live.control.intent import intent_numbers
 from ikns.live.control.recorded import control_table
 from ikns.live.control.settings import ControlSettings
 from ikns.motion.marker_ik import PRIOR, MarkerIK
-from ikns.nullspace.hinge_swivel import arm_swivel
 from ikns.nullspace.map import NullSpaceMap
+from ikns.nullspace.readout import Readout
+from ikns.nullspace.readout.coordinates import posture_samples
 
 RATE = 50
 #: The solver's noise of a marker, m: what the pull to the pose before assumes.
@@ -42,8 +44,8 @@ def test_the_gradient_of_intent_is_its_finite_difference(seed, side, guard):
     for j in range(len(angles)):
         ends = np.stack([angles, angles])
         ends[:, j] += step, -step
-        wrist, swivel = arm_swivel(body, ends, one.chain)
-        up, down = one.map.control_signal(swivel[..., None], wrist)
+        place, swivel = posture_samples(body, ends, one.chain, "intent")
+        up, down = one.map.control_signal(swivel, place)
         differences[j] = (up - down) / (2 * step)
     # Rounding of c, of order 1 to 10, over the step: 1e-15 / 1e-6; next to where the
     # swivel is undefined gradients are large, and so is what is left of third order.
@@ -130,13 +132,29 @@ def test_hidden_markers_move_c_little_or_it_is_held(person, method, labels):
     assert np.mean((error > 0.05) & ~held) < 0.02
 
 
-def test_intent_does_not_need_the_hand(person):
+def test_intent_of_the_wrist_alone_does_not_need_the_hand(person):
+    subject, markers = person
+    table = subject.readout("intent").table()
+    for name in ("coefficients_rad", "people_rad"):
+        table["natural_posture"][name] = table["natural_posture"][name][:10]
+    alone = dataclasses.replace(subject, readouts={"intent": Readout.from_table(table)})
+    whole, _ = signals(alone, markers, "intent")
+    markers = markers.copy()
+    markers[50:, columns_of(subject, "RFIN")] = np.nan
+    c, _ = signals(alone, markers, "intent", MAX_UNCERTAINTY)
+    assert np.abs(c - whole).max() < 0.02
+
+
+def test_intent_knows_what_a_hand_that_stays_hidden_leaves_open(person):
     subject, markers = person
     whole, _ = signals(subject, markers, "intent")
     markers = markers.copy()
     markers[50:, columns_of(subject, "RFIN")] = np.nan
-    c, _ = signals(subject, markers, "intent", MAX_UNCERTAINTY)
-    assert np.abs(c - whole).max() < 0.02
+    c, deviation = signals(subject, markers, "intent")
+    assert deviation[52] < deviation[60] < deviation[74]
+    # As where markers are hidden for 0.3 s, above.
+    error, held = np.abs(c - whole)[50:], deviation[50:] > MAX_UNCERTAINTY
+    assert np.mean((error > 0.05) & ~held) < 0.02
 
 
 @pytest.mark.parametrize("method", ["paper", "intent"])

@@ -4,26 +4,23 @@ from collections.abc import Iterator
 
 import numpy as np
 from natural_posture_people import moving as moving_of
-from natural_posture_people import own_fit
-from posture_habits_people import ends_of, hand
+from posture_habits_people import ends_of
 
-from ikns.nullspace.hinge_swivel import arm_swivel
-from ikns.nullspace.local_posture import fit_local, nearness
-from ikns.nullspace.natural_posture import quadratic_terms
-from null_space.methods import RANGE, Method, Signal, own_movement
-from null_space.people import GATE, Arm, ArmTrial
+from ikns.nullspace.posture_terms import quadratic_terms, ridge, wrist_of
+from null_space.methods import RANGE
+from null_space.people import Arm, ArmTrial
 
 Array = np.ndarray
 #: Places within this are one place, m.
 NEAR = 0.03
-#: As the package's: penalties of the quadratic and of what is remembered of places.
-PENALTY, LOCAL = 0.03, 0.01
+#: Of a quadratic of all that one arm did.
+RIDGE = 1e-3
 
 
 def rests_of(arm: Arm) -> list[tuple[ArmTrial, Array, Array, Array]]:
     """Trial, wrists (2, 3), and swivels (2,) beyond a quadratic, of each reach."""
-    wrist, swivel = moving_of(arm)
-    fit = own_fit(wrist, swivel)
+    places, swivel, _ = moving_of(arm)
+    fit = ridge(quadratic_terms(wrist_of(places)), swivel, RIDGE)
     found = []
     for trial in arm.trials:
         for ends in ends_of(trial):
@@ -56,46 +53,3 @@ def floors(arms: list[Arm]) -> dict[str, Array]:
                     kind = "one task" if alike else "two tasks"
                     found[kind].append(abs(sa[i] - sb[j]) / RANGE)
     return {kind: np.array(values) for kind, values in found.items()}
-
-
-def knows_the_hand(arm: Arm, angles: Array) -> Array:
-    """Terms (N, 13): the quadratic of the wrist, and the direction of the hand."""
-    _, wrist, _, axis = hand(arm, angles)
-    return np.hstack([quadratic_terms(wrist), axis])
-
-
-def with_the_hand(arms: list[Arm], *, places: bool) -> Method:
-    """Ridge toward the mean of other people, on wrist and hand."""
-
-    def moved(arm: Arm) -> tuple[Array, Array]:
-        rows = [trial.known & (trial.speed >= GATE) for trial in arm.trials]
-        both = list(zip(arm.trials, rows, strict=True))
-        angles = np.concatenate([trial.angles[row] for trial, row in both])
-        return knows_the_hand(arm, angles), np.concatenate(
-            [trial.swivel[row] for trial, row in both]
-        )
-
-    def fit(phi: Array, s: Array, toward: Array, ridge: float) -> Array:
-        free = ridge * np.diag(np.r_[0.0, np.ones(phi.shape[1] - 1)])
-        n = len(s)
-        left = phi.T @ (s - phi @ toward) / n
-        return toward + np.linalg.solve(phi.T @ phi / n + free, left)
-
-    each = {id(arm): fit(*moved(arm), np.zeros(13), 1e-3) for arm in arms}
-
-    def method(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
-        others = [each[id(one)] for one in arms if one.person != arm.person]
-        wrist, s, angles = own_movement(trials)
-        phi = knows_the_hand(arm, angles)
-        own = fit(phi, s, np.mean(others, axis=0), PENALTY)
-        at, high = fit_local(wrist, s - phi @ own, LOCAL)
-        high = high if places else 0 * high
-
-        def signal(postures: Array) -> Array:
-            w, swivel = arm_swivel(arm.skeleton, postures, arm.chain)
-            natural = knows_the_hand(arm, postures) @ own + nearness(w, at) @ high
-            return (swivel - natural) / RANGE
-
-        return signal
-
-    return method

@@ -8,7 +8,8 @@ import numpy as np
 from ikns.calibration.readouts import moving_samples
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import still_mask
-from ikns.nullspace.natural_posture import NaturalPosture, quadratic_terms
+from ikns.nullspace.natural_posture import NaturalPosture
+from ikns.nullspace.posture_terms import quadratic_terms
 from ikns.nullspace.readout import IntentMap, readout_samples
 from ikns.nullspace.readout.ends import swept_ends_of
 from null_space.virtual_arm import pose
@@ -70,10 +71,8 @@ def shown(seed: int) -> Person:
     body = found.subject.skeleton
 
     def tracked(motion: Motion) -> Seen:
-        wrist, swivel = readout_samples(body, motion, CHAIN, "intent")
-        way = body.link_in_thorax(motion.angles, "right_knuckle")[0] - wrist
-        axis = way / np.linalg.norm(way, axis=1, keepdims=True)
-        return Seen(wrist, swivel[:, 0], axis)
+        place, swivel = readout_samples(body, motion, CHAIN, "intent")
+        return Seen(place[:, :3], swivel[:, 0], place[:, 3:])
 
     points = found.subject.motions[0]
     (_, _, between), (_, _, after) = moving_samples(
@@ -159,12 +158,15 @@ def natural_of(person: Person, how: str) -> Callable[[Seen], Array]:
         smooth = one.natural(moved.wrist, moved.axis, rough=False)
         fit = np.linalg.lstsq(quadratic_terms(moved.wrist), smooth, rcond=None)[0]
         return lambda at: quadratic_terms(at.wrist) @ fit
-    name, near = (
-        (how[:-8], {"local_penalty": None}) if how.endswith(", smooth") else (how, {})
-    )
+    name, _, part = how.partition(", ")
+    near = {"local_penalty": None} if part == "smooth" else {}
     moved = person.moved[name]
-    learned = NaturalPosture(**near).fit(moved.wrist, moved.swivel)
-    return lambda at: learned.swivel(at.wrist)
+
+    def places(at: Seen) -> Array:
+        return at.wrist if part == "wrist alone" else np.hstack([at.wrist, at.axis])
+
+    learned = NaturalPosture(**near).fit(places(moved), moved.swivel)
+    return lambda at: learned.swivel(places(at))
 
 
 def scored(

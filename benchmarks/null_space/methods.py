@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 
 from ikns.body.chains import chain_joints
 from ikns.calibration import elbow_reference
-from ikns.nullspace.hinge_swivel import arm_swivel
+from ikns.nullspace.hinge_swivel import arm_swivel, hand_direction
 from ikns.nullspace.map import MapWarning, NullSpaceMap
 from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.nullspace.readout.coordinates import (
@@ -134,7 +134,8 @@ def hinge(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
 def _beyond(arm: Arm, natural: NaturalPosture) -> Signal:
     def signal(angles: Array) -> Array:
         wrist, swivel = arm_swivel(arm.skeleton, angles, arm.chain)
-        return (swivel - natural.swivel(wrist)) / RANGE
+        direction = hand_direction(arm.skeleton, angles, arm.chain)
+        return (swivel - natural.swivel(np.hstack([wrist, direction]))) / RANGE
 
     return signal
 
@@ -155,9 +156,12 @@ def people_alone(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
 def intent(
     arm: Arm, trials: list[ArmTrial], people: Array, **parameters: Any
 ) -> Signal:
-    """Hinge swivel less the natural posture."""
-    wrist, swivel, _ = own_movement(trials)
-    natural = NaturalPosture(**parameters).fit(wrist, swivel, people=people)
+    """Hinge swivel less the natural posture; of the wrist alone by ten of `people`."""
+    wrist, swivel, angles = own_movement(trials)
+    places = np.hstack([wrist, hand_direction(arm.skeleton, angles, arm.chain)])
+    if len(people) == 10:
+        places = wrist
+    natural = NaturalPosture(**parameters).fit(places, swivel, people=people)
     return _beyond(arm, natural)
 
 

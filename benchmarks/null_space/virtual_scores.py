@@ -20,6 +20,7 @@ from ikns.live.control.settings import ControlSettings
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import still_mask
+from ikns.nullspace.posture_terms import wrist_of
 from ikns.nullspace.readout import Readout, readout_samples
 from ikns.recording.recording import Recording
 from null_space.entrants import entrant
@@ -174,7 +175,8 @@ def signal(
     reads = {"joints": "paper", "swivel": "intent"}[getattr(what, "reads", "joints")]
 
     def samples(motion: Motion) -> tuple[Array, Array]:
-        return readout_samples(subject.skeleton, motion, CHAIN, reads)
+        place, coordinate = readout_samples(subject.skeleton, motion, CHAIN, reads)
+        return wrist_of(place), coordinate
 
     gates = [still_mask(motion, CHAIN) for motion in subject.motions]
     each = [samples(motion) for motion in subject.motions]

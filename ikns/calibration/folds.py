@@ -73,7 +73,9 @@ class Folds:
         for part in range(_PARTS):
             others = row & (parts != part)
             posture = NaturalPosture(penalty=learned.natural_.penalty)
-            self.postures.append(posture.fit(w[others], s[others]))
+            # Of a map that knows the wrist alone, no more is learned.
+            known = w[others, : learned.n_features_in_]
+            self.postures.append(posture.fit(known, s[others]))
 
     def signal(
         self,

@@ -23,6 +23,7 @@ from ikns.errors import IknsError, NotEnoughData
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import MapWarning, NullSpaceMap
+from ikns.nullspace.posture_terms import wrist_of
 from ikns.nullspace.readout import IntentMap, Readout, readout_samples
 from ikns.nullspace.readout.coordinates import elbow_height_gradient, mean_orientation
 from ikns.nullspace.readout.ends import swept_ends
@@ -210,7 +211,7 @@ def _natural_samples(
     *,
     max_hand_speed: float,
 ) -> tuple[Array, Array] | None:
-    """Wrist centers and swivels of ordinary movement; None where there is too little.
+    """Places and swivels of ordinary movement; None where there is too little.
 
     In the explorations these are the frames away from every held place.
     """
@@ -226,7 +227,9 @@ def _natural_samples(
         max_hand_speed=max_hand_speed,
     )
     if natural:
-        check_covered(np.concatenate([w[row] for w, _, row in found[-len(natural) :]]))
+        check_covered(
+            np.concatenate([wrist_of(x[row]) for x, _, row in found[-len(natural) :]])
+        )
     motions = [*(motion for motion, _ in explorations), *natural]
     seconds = sum(
         float(row.sum() * np.median(np.diff(motion.time)))
@@ -234,9 +237,9 @@ def _natural_samples(
     )
     if seconds < LEAST_NATURAL:
         return None
-    wrist = np.concatenate([w[row] for w, _, row in found])
+    places = np.concatenate([x[row] for x, _, row in found])
     swivel = np.concatenate([s[row] for _, s, row in found])
-    return wrist, swivel
+    return places, swivel
 
 
 def moving_samples(
@@ -248,19 +251,20 @@ def moving_samples(
     *,
     max_hand_speed: float,
 ) -> list[tuple[Array, Array, Mask]]:
-    """Wrist (T, 3), swivel (T,), and the frames of ordinary movement, of each motion.
+    """Place, swivel (T,), and the frames of ordinary movement, of each motion.
 
+    Places (T, 6) are those of intent, :func:`ikns.nullspace.readout.readout_samples`.
     In the explorations these are frames with a moving hand away from every held place.
     """
     found = []
     for motion, away in [(motion, True) for motion in explorations] + [
         (motion, False) for motion in natural
     ]:
-        wrist, swivel = readout_samples(skeleton, motion, chain, "intent")
-        row = np.isfinite(wrist).all(axis=1) & np.isfinite(swivel[:, 0])
+        place, swivel = readout_samples(skeleton, motion, chain, "intent")
+        row = np.isfinite(place).all(axis=1) & np.isfinite(swivel[:, 0])
         row &= motion.hand_speed(chain) >= max_hand_speed
         if away:
             hand = motion.task_position(chain)[row]
             row[row] = nearest_center(hand, learned.centers_, radius=ONE_PLACE)[0] < 0
-        found.append((wrist, swivel[:, 0], row))
+        found.append((place, swivel[:, 0], row))
     return found

@@ -29,6 +29,7 @@ from ikns.calibration.report import exploration_report, static_report
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion.motion import Motion
+from ikns.nullspace.posture_terms import wrist_of
 from ikns.nullspace.readout import IntentMap, Readout
 from ikns.nullspace.readout.intent import wrapped
 from ikns.recording.recording import Recording
@@ -163,11 +164,11 @@ def _zeroed(
         subject.chain,
         max_hand_speed=subject.gate["max_hand_speed"],
     )
-    wrist = np.concatenate([w[row] for w, _, row in samples])
+    place = np.concatenate([x[row] for x, _, row in samples])
     swivel = np.concatenate([s[row] for _, s, row in samples])
-    check_covered(wrist)
+    check_covered(wrist_of(place))
     dt = float(np.median(np.diff(motions[0].time)))
-    seconds = len(wrist) * dt
+    seconds = len(place) * dt
     if seconds < LEAST_NATURAL:
         raise NotEnoughData(
             f"expected at least {LEAST_NATURAL:g} s of natural movement, found a hand "
@@ -179,8 +180,8 @@ def _zeroed(
             "shift_rad": None,
             "why": "the natural posture is that of other people",
         }
-    beyond = wrapped(swivel - learned.natural_.swivel(wrist))
-    taught = learned.natural_.taught(wrist)
+    beyond = wrapped(swivel - learned.natural_.swivel(place))
+    taught = learned.natural_.taught(place)
     if taught.mean() > 0.5:
         beyond = beyond[taught]
     stretches = max(len(beyond) * dt / _STRETCH, 1.0)

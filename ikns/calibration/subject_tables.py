@@ -19,6 +19,8 @@ FORMAT = 1
 #: Version of a map of intent that remembers places: what does not know of them would
 #: read another c off it.
 WITH_PLACES = 2
+#: Version of one whose natural posture knows the hand's direction too.
+WITH_HAND = 3
 
 #: Columns of the still samples: hand position, m in the thorax frame, and number of the
 #: PCA point, from 1; 0 for none.
@@ -67,7 +69,7 @@ def chain_of_map(table: dict[str, Any]) -> ChainLike:
 
 def read_readout(path: Path, method: str, chain: ChainLike) -> Readout:
     """Read the map of a method beside the paper's."""
-    newer = (WITH_PLACES,) if method == "intent" else ()
+    newer = (WITH_PLACES, WITH_HAND) if method == "intent" else ()
     table = read_json(path, (FORMAT, *newer))
     try:
         if (table["method"], table["chain"]) != (method, str(chain)):
@@ -103,5 +105,8 @@ def read_json(path: Path, known: tuple[int, ...] = (FORMAT,)) -> dict[str, Any]:
 def write_readout(path: Path, readout: Readout) -> None:
     """Write the map of a method beside the paper's."""
     table = readout.table()
-    remembers = bool(table.get("natural_posture", {}).get("heights_rad"))
-    write_json(path, {"format": WITH_PLACES if remembers else FORMAT} | table)
+    natural = table.get("natural_posture", {})
+    version = WITH_PLACES if natural.get("heights_rad") else FORMAT
+    if len(natural.get("coefficients_rad", ())) > 10:
+        version = WITH_HAND
+    write_json(path, {"format": version} | table)

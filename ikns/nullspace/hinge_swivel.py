@@ -146,3 +146,17 @@ def arm_swivel(
     wrist, _ = skeleton.link_in_thorax(q, f"{side}_hand")
     swivel = hinge_swivel(shoulder, wrist, rotation[..., :, 2], side=side)
     return mirrored(wrist, side), swivel
+
+
+def hand_direction(skeleton: Skeleton, q: ArrayLike, chain: ChainLike) -> Array:
+    """Return unit vectors from wrist to knuckle of a chain with one arm, (..., 3).
+
+    In the thorax frame, of a left arm mirrored to the right; `q` and `Raises` as of
+    :func:`arm_swivel`.
+    """
+    if reason := no_swivel(chain):
+        raise InvalidInput(reason)
+    (side,) = whole_arms(chain)
+    wrist = skeleton.link_in_thorax(q, f"{side}_hand")[0]
+    way = skeleton.link_in_thorax(q, f"{side}_knuckle")[0] - wrist
+    return mirrored(way / np.linalg.norm(way, axis=-1, keepdims=True), side)

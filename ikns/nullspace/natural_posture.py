@@ -1,8 +1,9 @@
-"""Where the elbow would be at this place of the wrist if the person meant nothing.
+"""Where the elbow would be with the hand like this if the person meant nothing.
 
-A quadratic in the wrist center, learned from ordinary movement and drawn toward what
-other people do, and what this person does at particular places beyond it. What departs
-from it is what a person means (posture is not intent).
+A quadratic in the wrist center and a linear function of the hand's direction, learned
+from ordinary movement and drawn toward what other people do, and what this person does
+at particular places beyond it. What departs from it is what a person means (posture is
+not intent).
 """
 
 from __future__ import annotations
@@ -18,40 +19,39 @@ from ikns.nullspace.estimator_base import EstimatorBase
 from ikns.nullspace.local_posture import fit_local, local_swivel
 from ikns.nullspace.map.checks import checked_rows
 from ikns.nullspace.people_posture import natural_posture_people
-
-#: Middle of the work space, m, and the unit of length, m: the quadratic terms are then
-#: of order 1 wherever a hand goes (ISB thorax, right arm).
-MIDDLE, UNIT = np.array([0.25, -0.15, 0.20]), 0.2
-#: What of the taught places counts as taught.
-_TAUGHT = 0.99
-
-
-def quadratic_terms(wrist_in_thorax: ArrayLike) -> Array:
-    """Terms 1, x_i, x_i^2 and x_i x_j of positions, (..., 10) for three dimensions.
-
-    Positions (..., 3) in m count from (0.25, -0.15, 0.20) m, in units of 0.2 m; of
-    other dimensions they count from zero.
-    """
-    w = np.asarray(wrist_in_thorax, dtype=np.float64)
-    x = (w - MIDDLE if w.shape[-1] == 3 else w) / UNIT
-    i, j = np.triu_indices(w.shape[-1], 1)
-    return np.concatenate([np.ones((*x.shape[:-1], 1)), x, x**2, x[..., i] * x[..., j]],
-                          axis=-1)  # fmt: skip
+from ikns.nullspace.posture_terms import (
+    HAND,
+    TERMS,
+    WRIST,
+    leverage_of,
+    natural_terms,
+    quadratic_terms,
+    ridge,
+    wrist_of,
+)
 
 
 class NaturalPosture(EstimatorBase):
-    """Ridge regression of the hinge swivel on the wrist center, toward a population.
+    """Ridge regression of the hinge swivel on wrist and hand, toward a population.
 
-    ``s_nat(w) = phi(w) . beta`` with the terms of :func:`quadratic_terms` and ::
+    ``s_nat(w, l) = phi(w, l) . beta`` for the wrist center w and the hand's direction l
+    with the terms of :func:`ikns.nullspace.posture_terms.natural_terms` and ::
 
-        beta = argmin mean_t (s_t - phi(w_t) . beta)^2 + penalty |beta - beta_people|^2
+        beta = argmin mean_t (s_t - phi_t . beta)^2 + |beta - beta_people|^2_P
+        |v|^2_P = penalty |v|^2 + v_l' D v_l
 
-    in which the constant term is free of the penalty. Where the wrist is in none of the
-    places that were taught (its leverage ``h = phi (Phi'Phi / N + penalty)^-1 phi``
-    exceeds the 99th percentile h99 of the taught ones), the difference from the
-    population fades to its mean by ``h99 / h``: there, other people's data predict
-    better than an extrapolated quadratic. Directions that the penalty decides do not
-    count.
+    in which the constant term is free of the penalty. A turned hand is no wish, and a
+    posture that follows l makes c follow a turned hand: ``v_l' D v_l`` is the mean
+    square of what usual turns of the hand do to it (:class:`People`). The population is
+    fitted with the same price.
+
+    Where the wrist is in none of the places that were taught (its leverage
+    ``h = phi (Phi'Phi / N + penalty)^-1 phi``, of the terms of w, exceeds the 99th
+    percentile h99 of the taught ones), the difference from the population in these
+    terms fades to its mean by ``h99 / h``: there, other people's data predict better
+    than an extrapolated quadratic. Directions that the penalty decides do not count.
+
+    Fitted to wrist centers alone, (N, 3), it is the quadratic without the hand.
 
     What the quadratic leaves at places that were visited is remembered as well
     (:mod:`ikns.nullspace.local_posture`): people come back to them in the same posture.
@@ -76,8 +76,8 @@ class NaturalPosture(EstimatorBase):
         beta_people, rad; zeros unless `X` has three columns.
     offset_ : float
         Mean difference from the population over the taught places, rad.
-    leverage_ : (K, K) array
-        Matrix of the leverage, and of the normal equations.
+    leverage_ : (10, 10) array
+        Matrix of the leverage of the wrist's terms.
     taught_leverage_ : float
         h99.
     places_ : (M, D) array
@@ -86,14 +86,13 @@ class NaturalPosture(EstimatorBase):
         How much, rad; see :func:`ikns.nullspace.local_posture.fit_local`.
     coverage_ : dict
         What was taught: ``frames``, ``low_m`` and ``high_m`` (1st and 99th percentile
-        of each coordinate), ``residual_rad`` (root mean square).
+        of the wrist's coordinates), ``residual_rad`` (root mean square).
 
     Examples
     --------
     >>> share = np.random.default_rng(0).uniform(size=(500, 3))
     >>> wrist = [0.1, -0.4, 0.0] + share * [0.3, 0.5, 0.4]
-    >>> people = natural_posture_people()
-    >>> swivel = quadratic_terms(wrist) @ people.mean + 0.2
+    >>> swivel = NaturalPosture.of_people().predict(wrist) + 0.2
     >>> own = NaturalPosture().fit(wrist, swivel)
     >>> bool(np.allclose(own.predict(wrist), swivel)), round(own.offset_, 6)
     (True, 0.2)
@@ -113,15 +112,17 @@ class NaturalPosture(EstimatorBase):
         self.local_penalty = local_penalty
 
     @classmethod
-    def of_people(cls, **parameters: Any) -> Self:
+    def of_people(cls, *, hand: bool = False, **parameters: Any) -> Self:
         """Return the population's natural posture, not fitted to a person's movement.
 
-        Parameters are those of the constructor.
+        With `hand`, of wrist and hand, (N, 6), else of the wrist alone. Other
+        parameters are those of the constructor.
         """
         people = natural_posture_people()
+        mean = people.mean if hand else people.wrist_alone
         return cls.from_arrays(
-            people.mean,
-            people.mean,
+            mean,
+            mean,
             people.leverage,
             taught_leverage=people.taught_leverage,
             **parameters,
@@ -141,7 +142,9 @@ class NaturalPosture(EstimatorBase):
         coverage: dict[str, Any] | None = None,
         **parameters: Any,
     ) -> Self:
-        """Make one from its attributes, as from a file; rad, in the wrist's space.
+        """Make one from its attributes, as from a file; rad.
+
+        Ten coefficients are of the wrist alone, thirteen of wrist and hand.
 
         Raises
         ------
@@ -149,7 +152,6 @@ class NaturalPosture(EstimatorBase):
             When shapes disagree or values are not finite.
         """
         made = cls(**parameters)
-        made.n_features_in_ = 3
         made.coefficients_ = np.array(coefficients, dtype=np.float64)
         made.people_ = np.array(people, dtype=np.float64)
         made.leverage_ = np.array(leverage, dtype=np.float64)
@@ -163,15 +165,18 @@ class NaturalPosture(EstimatorBase):
                 "expected places (M, 3) and their heights (M,), found "
                 f"{made.places_.shape} and {made.heights_.shape}."
             )
-        arrays = (made.coefficients_, made.people_, made.leverage_)
-        if [array.shape for array in arrays] != [(10,), (10,), (10, 10)]:
+        arrays: tuple[Array, ...] = (made.coefficients_, made.people_, made.leverage_)
+        shapes = [array.shape for array in arrays]
+        if shapes not in [[(k,), (k,), (10, 10)] for k in TERMS.values()]:
             raise InvalidInput(
-                "expected 10 coefficients, those of other people and a leverage "
-                f"(10, 10), found {', '.join(str(a.shape) for a in arrays)}."
+                "expected 10 or 13 coefficients, those of other people and a leverage "
+                f"(10, 10), found {', '.join(str(shape) for shape in shapes)}."
             )
-        more = (made.places_, made.heights_, [made.offset_])
-        numbers = np.concatenate([*map(np.ravel, arrays), *map(np.ravel, more)])
-        if not np.isfinite([*numbers, made.taught_leverage_]).all():
+        made.n_features_in_ = WRIST if len(made.people_) == 10 else HAND
+        more = (made.places_, made.heights_)
+        numbers = np.concatenate([np.ravel(array) for array in (*arrays, *more)])
+        alone = (made.offset_, made.taught_leverage_)
+        if not np.isfinite([*numbers, *alone]).all():
             raise InvalidInput("expected a natural posture of finite numbers.")
         if not made.taught_leverage_ > 0:
             raise InvalidInput("expected a taught leverage above 0.")
@@ -184,8 +189,9 @@ class NaturalPosture(EstimatorBase):
 
         Parameters
         ----------
-        X : (N, 3) array
-            Wrist centers in the thorax frame, m; of a left arm mirrored to the right.
+        X : (N, 6) or (N, 3) array
+            Wrist centers in the thorax frame, m, and unit vectors from wrist to
+            knuckle; of a left arm mirrored to the right. Or wrist centers alone.
         y : (N,) array
             Hinge swivel, rad, without jumps of a full turn.
         people : (K,) array, optional
@@ -196,19 +202,20 @@ class NaturalPosture(EstimatorBase):
         InvalidInput, ValueError
             When the penalty is not above 0, or samples are not finite or do not match.
         """
-        w, s = self._validated(X, y, y_numeric=True, dtype=np.float64)
+        X, s = self._validated(X, y, y_numeric=True, dtype=np.float64)
         near = self.local_penalty
         for penalty in (self.penalty, 1.0 if near is None else near):
             if not 0 < penalty < np.inf:
                 raise InvalidInput(f"expected a penalty above 0, found {penalty}.")
         s = np.asarray(s, dtype=np.float64)
-        phi = quadratic_terms(w)
+        w, phi = wrist_of(X), natural_terms(X)
+        terms = quadratic_terms(w)
         others = _people(phi.shape[1], people)
         beyond = s - phi @ others
-        self.leverage_, self.taught_leverage_ = leverage_of(phi, self.penalty)
-        own = self.leverage_ @ phi.T @ beyond / len(w)
+        own = ridge(phi, beyond, self.penalty)
+        self.leverage_, self.taught_leverage_ = leverage_of(terms, self.penalty)
         self.people_, self.coefficients_ = others, others + own
-        self.offset_ = float((phi @ own).mean())
+        self.offset_ = float((terms @ own[: terms.shape[1]]).mean())
         left = beyond - phi @ own
         places, heights = w[:0], s[:0]
         if near is not None:
@@ -224,20 +231,24 @@ class NaturalPosture(EstimatorBase):
         }
         return self
 
-    def swivel(self, wrist_in_thorax: ArrayLike) -> Array:
-        """Natural swivel at wrist centers (..., 3) m, (...) rad; NaN where unknown."""
+    def swivel(self, X: ArrayLike) -> Array:
+        """Natural swivel of rows as for :meth:`fit` (..., 6), (...) rad; NaN for NaN.
+
+        What was fitted to the wrist alone takes rows with the hand too.
+        """
         self._check_fitted()
-        rows = checked_rows(wrist_in_thorax, self.n_features_in_, "wrist centers")
-        phi = quadratic_terms(rows)
-        own = phi @ (self.coefficients_ - self.people_)
+        rows = self._rows(X)
+        phi, k = natural_terms(rows), len(self.leverage_)
+        own = self.coefficients_ - self.people_
+        smooth, turned = phi[..., :k] @ own[:k], phi[..., k:] @ own[k:]
         if self.guard:
-            beyond = np.maximum(self._leverage(phi) / self.taught_leverage_, 1.0)
-            own = self.offset_ + (own - self.offset_) / beyond
-        near = local_swivel(rows, self.places_, self.heights_)
-        return np.asarray(phi @ self.people_ + own + near)
+            beyond = self._leverage(phi[..., :k]) / self.taught_leverage_
+            smooth = self.offset_ + (smooth - self.offset_) / np.maximum(beyond, 1.0)
+        near = local_swivel(wrist_of(rows), self.places_, self.heights_)
+        return np.asarray(phi @ self.people_ + smooth + turned + near)
 
     def predict(self, X: ArrayLike) -> Array:
-        """Return :meth:`swivel` at wrist centers (N, 3), all of them finite, (N,)."""
+        """Return :meth:`swivel` of rows (N, 6) or (N, 3), all of them finite, (N,)."""
         self._check_fitted()
         return self.swivel(self._validated(X, dtype=np.float64, reset=False))
 
@@ -252,31 +263,27 @@ class NaturalPosture(EstimatorBase):
         return 1.0 - float(np.var(rest)) / total if total > 0 else 0.0
 
     def taught(self, X: ArrayLike) -> Mask:
-        """Whether wrist centers (..., 3) m lie where movement was taught, (...)."""
+        """Whether the wrists of rows (..., 6) lie where movement was taught, (...)."""
         self._check_fitted()
-        phi = quadratic_terms(checked_rows(X, self.n_features_in_, "wrist centers"))
+        phi = quadratic_terms(wrist_of(self._rows(X)))
         return np.asarray(self._leverage(phi) <= self.taught_leverage_)
+
+    def _rows(self, X: ArrayLike) -> Array:
+        rows: Any = np.asarray(X, dtype=np.float64)
+        if self.n_features_in_ == WRIST and rows.ndim:
+            rows = wrist_of(rows)
+        return checked_rows(rows, self.n_features_in_, "wrist centers")
 
     def _leverage(self, phi: Array) -> Array:
         return np.einsum("...i,ij,...j->...", phi, self.leverage_, phi)
 
 
-def leverage_of(phi: Array, penalty: float) -> tuple[Array, float]:
-    """Matrix of the leverage of terms (N, K), (K, K), and its 99th percentile.
-
-    The first term is the constant, which has no penalty.
-    """
-    k = phi.shape[1]
-    free = np.diag(np.r_[0.0, np.full(k - 1, float(penalty))])
-    matrix = np.linalg.inv(phi.T @ phi / len(phi) + free)
-    levels = np.einsum("ni,ij,nj->n", phi, matrix, phi)
-    return matrix, float(np.quantile(levels, _TAUGHT))
-
-
 def _people(terms: int, given: ArrayLike | None) -> Array:
-    """Return other people's coefficients; zeros for other than 3 dimensions."""
+    """Return other people's coefficients; zeros where there are no other people."""
     if given is None:
-        return natural_posture_people().mean if terms == 10 else np.zeros(terms)
+        known = natural_posture_people()
+        shipped = {len(mean): mean for mean in (known.mean, known.wrist_alone)}
+        return shipped.get(terms, np.zeros(terms))
     people = np.array(given, dtype=np.float64)
     if people.shape != (terms,) or not np.isfinite(people).all():
         raise InvalidInput(

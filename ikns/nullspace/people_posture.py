@@ -14,18 +14,33 @@ from ikns.errors import FileError
 
 _PEOPLE = Path(__file__).with_name("natural_posture_people.toml")
 
+_KEYS = {
+    "mean": "mean_rad",
+    "covariance": "covariance_rad2",
+    "wrist_alone": "wrist_alone_rad",
+    "turned": "turned",
+    "leverage": "leverage",
+}
+_SHAPES = [(13,), (13, 13), (10,), (3, 3), (10, 10)]
+
 
 class People(NamedTuple):
-    """Natural posture of a population: quadratics in the wrist center.
+    """Natural posture of a population, in wrist and hand.
 
     Parameters
     ----------
-    mean : (10,) array
-        Coefficients of :func:`ikns.nullspace.natural_posture.quadratic_terms`, rad.
-    covariance : (10, 10) array
+    mean : (13,) array
+        Coefficients of :func:`ikns.nullspace.posture_terms.natural_terms`, rad.
+    covariance : (13, 13) array
         Between arms of different people, rad^2.
+    wrist_alone : (10,) array
+        Coefficients without the hand's direction, rad.
+    turned : (3, 3) array
+        D: mean outer product of what a turn of the forearm by 29 deg (as for a glass
+        that is emptied) does to the hand's direction, and turns of the wrist by 20 deg
+        about both of its axes, the elbow still.
     leverage : (10, 10) array
-        Matrix of the leverage over all their movements.
+        Matrix of the leverage of the wrist's terms over all their movements.
     taught_leverage : float
         99th percentile of the leverage over all their movements.
     arms : int
@@ -35,6 +50,8 @@ class People(NamedTuple):
 
     mean: Array
     covariance: Array
+    wrist_alone: Array
+    turned: Array
     leverage: Array
     taught_leverage: float
     arms: int
@@ -55,19 +72,17 @@ def natural_posture_people() -> People:
     """
     try:
         table = tomllib.loads(_PEOPLE.read_text(encoding="utf-8"))
-        mean = np.array(table["mean_rad"], dtype=np.float64)
-        covariance = np.array(table["covariance_rad2"], dtype=np.float64)
-        leverage = np.array(table["leverage"], dtype=np.float64)
-        if {mean.shape * 2, covariance.shape, leverage.shape} != {(10, 10)}:
-            raise ValueError(f"{mean.shape}, {covariance.shape}, {leverage.shape}")
+        arrays = {
+            name: np.array(table[key], dtype=np.float64) for name, key in _KEYS.items()
+        }
+        if (found := [array.shape for array in arrays.values()]) != _SHAPES:
+            raise ValueError(f"arrays {found}")
         return People(
-            mean,
-            covariance,
-            leverage,
-            float(table["taught_leverage"]),
-            int(table["arms"]),
-            table["source"],
-            table["license"],
+            **arrays,
+            taught_leverage=float(table["taught_leverage"]),
+            arms=int(table["arms"]),
+            source=table["source"],
+            license=table["license"],
         )
     except (OSError, ValueError, LookupError, TypeError) as error:
         raise FileError(f"{_PEOPLE}: cannot be read: {error!r}.") from None

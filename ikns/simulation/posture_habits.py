@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from ikns.errors import FileError
-from ikns.nullspace.natural_posture import MIDDLE, UNIT, quadratic_terms
+from ikns.nullspace.posture_terms import MIDDLE, UNIT, quadratic_terms
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def habit_people() -> HabitPeople:
 def habit_terms(wrist_in_thorax: ArrayLike, hand_axis: ArrayLike) -> Array:
     """Quadratic terms (..., 28) of a wrist center and the hand's long axis.
 
-    As :func:`ikns.nullspace.natural_posture.quadratic_terms`, with six dimensions:
+    As :func:`ikns.nullspace.posture_terms.quadratic_terms`, with six dimensions:
     ``(w - middle) / 0.2 m`` (..., 3), and a unit vector from wrist to knuckle (..., 3);
     thorax frame, of a left arm mirrored to the right.
     """

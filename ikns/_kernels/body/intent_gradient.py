@@ -1,8 +1,9 @@
 """Gradient over the joints of the control signal of the method intent.
 
 The swivel s turns with the shoulder p, the wrist w and the hinge axis z; the natural
-posture with the wrist alone. With n = unit(w - p), e = -z x n, the reference u carried
-to n, b = -n x u and k = f x n (see :mod:`ikns.nullspace.hinge_swivel`),
+posture with the wrist and the hand's direction. With n = unit(w - p), e = -z x n, the
+reference u carried to n, b = -n x u and k = f x n (see
+:mod:`ikns.nullspace.hinge_swivel`),
 
     ds = (e . u d(e . b) - e . b d(e . u)) / |e|^2
 
@@ -16,9 +17,11 @@ import math
 import numpy as np
 
 from ikns._kernels.body.intent_signal import (
+    DIRECTION,
     DOWN,
     FORWARD,
     GUARD,
+    HAND,
     LOWER,
     MIDDLE,
     MIRROR,
@@ -53,6 +56,12 @@ def intent_gradient(
     by_axis, by_wrist, natural = np.empty(3), np.empty(3), np.empty(3)
     swivel_gradient(numbers, upper_arm, p, w, by_axis, by_wrist)
     natural_gradient(numbers, leverage, w, natural)
+    direction, by_turn = np.empty(3), np.empty(3)
+    for i in range(3):
+        direction[i] = 0.0
+        for j in range(3):
+            direction[i] += turned[i, j] * numbers[HAND + j]
+    _cross(direction, numbers[DIRECTION : DIRECTION + 3], by_turn)
     width = numbers[UPPER] - numbers[LOWER]
     for i in range(len(gradient)):
         gradient[i] = 0.0
@@ -70,6 +79,7 @@ def intent_gradient(
         else:
             total = (by_wrist[0] - natural[0]) * vx + (by_wrist[1] - natural[1]) * vy
             total += (by_wrist[2] - natural[2]) * vz
+            total -= x * by_turn[0] + y * by_turn[1] + z * by_turn[2]
         gradient[paths.joint[k, 1]] += total / width
 
 

@@ -1,10 +1,11 @@
 """The control signal of the method intent for one posture.
 
-    c = (s - s_nat(w) - a) / (b - a)
+    c = (s - s_nat(w, l) - a) / (b - a)
 
 with the hinge swivel s (:mod:`ikns.nullspace.hinge_swivel`) and the natural posture
-s_nat at the wrist center w (:mod:`ikns.nullspace.natural_posture`), whose constants are
-handed in. What is remembered of particular places is added up one by one.
+s_nat for the wrist center w and the hand's direction l
+(:mod:`ikns.nullspace.natural_posture`), whose constants are handed in. What is
+remembered of particular places is added up one by one.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ MIRROR = 25  # -1 for a left arm, else 1
 MIDDLE, UNIT = 26, 29  # of the quadratic terms, 3 and 1, m
 FORWARD, DOWN = 30, 33  # where the swivel's reference starts, and it there, 3 each
 REACH = 36  # of a bump around a place, m
-SIZE = 37  # places and heights follow, m and rad, 4 for each
+HAND = 37  # direction from wrist to knuckle in the hand's frame, 3
+DIRECTION = 40  # its 3 coefficients in the thorax frame of this arm, not mirrored, rad
+SIZE = 43  # places and heights follow, m and rad, 4 for each
 
 
 @compiled
@@ -82,6 +85,10 @@ def intent_signal(
         own = numbers[OFFSET] + (own - numbers[OFFSET]) / beyond
     z = numbers[MIRROR] * position[0, 1, 2]
     near = _near(numbers, position[0, 1, 0], position[0, 1, 1], z)
+    for i in range(3):
+        for j in range(3):
+            turned = rotation[0, 1, i, j] * numbers[HAND + j]
+            near += numbers[DIRECTION + i] * turned
     rest = s - people - own - near
     rest -= 2 * math.pi * math.floor((rest + math.pi) / (2 * math.pi))
     width = numbers[UPPER] - numbers[LOWER]

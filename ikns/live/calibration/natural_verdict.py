@@ -107,18 +107,18 @@ def natural_of(
 ) -> NaturalPosture:
     """Return the natural posture by what was accepted; without enough, of people."""
     if len(whole_arms(chain)) != 1:
-        return NaturalPosture.of_people()
-    wrists, swivels, seconds = [], [], 0.0
+        return NaturalPosture.of_people(hand=True)
+    places, swivels, seconds = [], [], 0.0
     for skeleton, motion in motions:
-        wrist, swivel = readout_samples(skeleton, motion, chain, "intent")
-        row = np.isfinite(wrist).all(axis=1) & np.isfinite(swivel[:, 0])
+        place, swivel = readout_samples(skeleton, motion, chain, "intent")
+        row = np.isfinite(place).all(axis=1) & np.isfinite(swivel[:, 0])
         row &= motion.hand_speed(chain) >= max_hand_speed
-        wrists.append(wrist[row])
+        places.append(place[row])
         swivels.append(swivel[row, 0])
         seconds += float(row.sum() * np.median(np.diff(motion.time)))
     if seconds < LEAST_NATURAL:
-        return NaturalPosture.of_people()
-    return NaturalPosture().fit(np.concatenate(wrists), np.concatenate(swivels))
+        return NaturalPosture.of_people(hand=True)
+    return NaturalPosture().fit(np.concatenate(places), np.concatenate(swivels))
 
 
 def ends_beyond(
@@ -131,11 +131,11 @@ def ends_beyond(
     """Return the ends of s - s_nat while the hand is still, rad; None if unknown."""
     if len(whole_arms(chain)) != 1:
         return None
-    wrist, swivel = readout_samples(skeleton, motion, chain, "intent")
-    row = gate & np.isfinite(wrist).all(axis=1) & np.isfinite(swivel[:, 0])
+    place, swivel = readout_samples(skeleton, motion, chain, "intent")
+    row = gate & np.isfinite(place).all(axis=1) & np.isfinite(swivel[:, 0])
     if row.sum() < 2:
         return None
-    beyond = wrapped(swivel[row, 0] - natural.swivel(wrist[row]))
+    beyond = wrapped(swivel[row, 0] - natural.swivel(place[row]))
     low, high, _ = swept_ends(np.unwrap(beyond), motion.time[row])
     return low, high
 

@@ -11,7 +11,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.nullspace.hinge_swivel import DOWN, FORWARD
 from ikns.nullspace.local_posture import REACH
-from ikns.nullspace.natural_posture import MIDDLE, UNIT
+from ikns.nullspace.posture_terms import MIDDLE, UNIT
 from ikns.nullspace.readout import IntentMap, Readout
 
 
@@ -38,17 +38,27 @@ def intent_numbers(skeleton: Skeleton, readout: Readout) -> IntentNumbers:
     paths = skeleton.paths((f"{side}_upper_arm", f"{side}_hand"))
     natural = learned.natural_
     remembered = np.column_stack([natural.places_, natural.heights_])
+    # What knows of no hand has no coefficients of its direction.
+    direction = np.zeros(3)
+    direction[: len(natural.coefficients_) - 10] = natural.coefficients_[10:]
+    coefficients, people = natural.coefficients_[:10], natural.people_[:10]
+    mirror = -1.0 if side == "left" else 1.0
+    angles = np.zeros(len(skeleton.joint_names))
+    wrist, rotation = skeleton.link_in_thorax(angles, f"{side}_hand")
+    way = (skeleton.link_in_thorax(angles, f"{side}_knuckle")[0] - wrist) @ rotation
     numbers = np.empty(kernel.SIZE + remembered.size)
     for start, values in (
-        (kernel.OWN, natural.coefficients_ - natural.people_),
-        (kernel.PEOPLE, natural.people_),
+        (kernel.OWN, coefficients - people),
+        (kernel.PEOPLE, people),
         (kernel.OFFSET, [natural.offset_, natural.taught_leverage_]),
         (kernel.GUARD, [float(natural.guard)]),
         (kernel.LOWER, learned.ends_),
-        (kernel.MIRROR, [-1.0 if side == "left" else 1.0]),
+        (kernel.MIRROR, [mirror]),
         (kernel.MIDDLE, [*MIDDLE, UNIT]),
         (kernel.FORWARD, [*FORWARD, *DOWN]),
         (kernel.REACH, [REACH]),
+        (kernel.HAND, way / np.linalg.norm(way)),
+        (kernel.DIRECTION, direction * [1.0, 1.0, mirror]),
         (kernel.SIZE, remembered.ravel()),
     ):
         numbers[start : start + len(values)] = values

@@ -3,7 +3,7 @@
 - ``paper``: hand position, joint angles of the chain;
 - ``proximal``: hand position; rotation vector of the upper arm about a reference, and
   elbow flexion. A turned hand moves neither pronation nor wrist into c;
-- ``intent``: wrist center, hinge swivel.
+- ``intent``: wrist center and the hand's direction; hinge swivel.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ikns.body.chains import ChainLike, chain_joints, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
-from ikns.nullspace.hinge_swivel import arm_swivel
+from ikns.nullspace.hinge_swivel import arm_swivel, hand_direction
 
 Method = Literal["paper", "proximal", "intent"]
 METHODS: tuple[Method, ...] = ("paper", "proximal", "intent")
@@ -51,7 +51,8 @@ def readout_samples(
     Returns
     -------
     x : (T, 3) array
-        m in the thorax frame; of ``"intent"`` and a left arm mirrored to the right.
+        m in the thorax frame. Of ``"intent"`` (T, 6): the wrist, and the unit vector
+        from wrist to knuckle; of a left arm mirrored to the right.
     y : (T, k) array
         rad; NaN, as `x`, where the chain is not in sight.
     """
@@ -76,7 +77,8 @@ def posture_samples(
     """Place and coordinate of postures (T, 18), as of :func:`readout_samples`."""
     if method == "intent":
         wrist, swivel = arm_swivel(skeleton, angles, chain)
-        return wrist, swivel[:, None]
+        direction = hand_direction(skeleton, angles, chain)
+        return np.hstack([wrist, direction]), swivel[:, None]
     hand = skeleton.chain_ends(angles, chain)[0].mean(axis=1)
     if method == "paper":
         return hand, angles[:, [*map(skeleton.joint_names.index, chain_joints(chain))]]

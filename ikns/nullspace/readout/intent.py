@@ -1,15 +1,15 @@
 """The control signal that measures what a person means, not how the arm is held.
 
-    c = (s - s_nat(w) - a) / (b - a)
+    c = (s - s_nat(w, l) - a) / (b - a)
 
-s is the hinge swivel (:mod:`ikns.nullspace.hinge_swivel`), s_nat the natural posture at
-the wrist center w (:mod:`ikns.nullspace.natural_posture`), and a and b come from the
-lower and upper ends of s - s_nat at the held places: their middle is a robust mean over
-the places, their distance the mean width. Two numbers for the whole range: fields
-through ends that scatter would put this scatter back into c. A place at which the
-natural posture is far off, or that was half explored, has no say. Where times
-are known, the ends are those of the motion without its noise
-(:mod:`ikns.nullspace.readout.ends`).
+s is the hinge swivel (:mod:`ikns.nullspace.hinge_swivel`), s_nat the natural posture
+with the wrist center at w and the hand in the direction l
+(:mod:`ikns.nullspace.natural_posture`), and a and b come from the lower and upper ends
+of s - s_nat at the held places: their middle is a robust mean over the places, their
+distance the mean width. Two numbers for the whole range: fields through ends that
+scatter would put this scatter back into c. A place at which the natural posture is far
+off, or that was half explored, has no say. Where times are known, the ends are those of
+the motion without its noise (:mod:`ikns.nullspace.readout.ends`).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.estimator_base import EstimatorBase
 from ikns.nullspace.map.checks import MapWarning, checked_rows, format_point
 from ikns.nullspace.natural_posture import NaturalPosture
+from ikns.nullspace.posture_terms import wrist_of
 from ikns.nullspace.readout.ends import checked_times, robust_mean, swept_ends_of
 
 #: A place whose ends are off the mean by more than this share of the range is named.
@@ -121,9 +122,10 @@ class IntentMap(EstimatorBase):
 
         Parameters
         ----------
-        X : (N, 3) array
-            Wrist centers of samples whose hand is still, thorax frame, m; of a left
-            arm mirrored to the right.
+        X : (N, 6) or (N, 3) array
+            Wrist centers of samples whose hand is still, thorax frame, m, and unit
+            vectors from wrist to knuckle; of a left arm mirrored to the right. Or wrist
+            centers alone.
         y : (N,) or (N, 1) array
             Hinge swivel there, rad.
         groups : (N,) integer array, optional
@@ -132,8 +134,8 @@ class IntentMap(EstimatorBase):
         time : (N,) array, optional
             When each sample was taken, s, increasing; the ends of each place are then
             those of :func:`ikns.nullspace.readout.ends.swept_ends`.
-        natural_X, natural_y : (K, 3) and (K,) array, optional
-            Wrist centers and swivels of ordinary movement; without them the natural
+        natural_X, natural_y : (K, 6) or (K, 3), and (K,) arrays, optional
+            Places as `X` and swivels of ordinary movement; without them the natural
             posture is that of other people.
 
         Raises
@@ -152,7 +154,7 @@ class IntentMap(EstimatorBase):
         least = self._least(len(w))
         found = BoundingBoxKMeans(
             self.n_points, max_iter=self.max_iter, radius=self.radius
-        ).fit(w, groups=groups)
+        ).fit(wrist_of(w), groups=groups)
         used = np.flatnonzero(found.counts_ >= least)
         if not used.size:
             raise NotEnoughData(
@@ -208,7 +210,7 @@ class IntentMap(EstimatorBase):
         if not finite or (m > M).any():
             raise InvalidInput("expected finite ends with lower <= upper.")
         made = cls(**{**parameters, "n_points": len(places)})
-        made.n_features_in_ = places.shape[1]
+        made.n_features_in_ = natural.n_features_in_
         made.natural_, made.centers_, made.lower_, made.upper_ = natural, places, m, M
         made.counts_ = np.full(len(places), counts, dtype=np.int64)
         made._finish()
@@ -221,8 +223,8 @@ class IntentMap(EstimatorBase):
         ----------
         q : (..., 1) array
             Hinge swivel, rad.
-        x : (..., 3) array
-            Wrist centers, m.
+        x : (..., 6) or (..., 3) array
+            As for :meth:`fit`; what was fitted to the wrist alone takes both.
 
         Returns
         -------
@@ -231,12 +233,11 @@ class IntentMap(EstimatorBase):
         """
         self._check_fitted()
         s = checked_rows(q, 1, "swivels")[..., 0]
-        w = checked_rows(x, self.n_features_in_, "wrist centers")
         a, b = self.ends_
-        return np.asarray((wrapped(s - self.natural_.swivel(w)) - a) / (b - a))
+        return np.asarray((wrapped(s - self.natural_.swivel(x)) - a) / (b - a))
 
     def inside(self, x: ArrayLike) -> Mask:
-        """Whether natural movement was taught at wrist centers (..., 3), (...)."""
+        """Whether natural movement was taught at the wrists of rows (..., 6), (...)."""
         self._check_fitted()
         return self.natural_.taught(x)
 
@@ -248,6 +249,7 @@ class IntentMap(EstimatorBase):
         self._check_fitted()
         w = self._validated(X, dtype=np.float64, reset=False)
         c = self.control_signal(np.reshape(y, (len(w), 1)), w)
+        w = wrist_of(w)
         terms = np.column_stack([np.ones(len(w)), w - w.mean(axis=0)])
         rest = c - terms @ np.linalg.lstsq(terms, c, rcond=None)[0]
         total = float(np.var(c))
@@ -273,8 +275,8 @@ class IntentMap(EstimatorBase):
         natural = NaturalPosture(penalty=self.penalty)
         if X is not None and y is not None:
             return natural.fit(X, y)
-        if width == 3:
-            return NaturalPosture.of_people(penalty=self.penalty)
+        if width in (3, 6):
+            return NaturalPosture.of_people(hand=width == 6, penalty=self.penalty)
         # There are no other people in another space.
         return natural.fit(np.zeros((1, width)), [0.0])
 
