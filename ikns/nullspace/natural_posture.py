@@ -202,13 +202,13 @@ class NaturalPosture(EstimatorBase):
         InvalidInput, ValueError
             When the penalty is not above 0, or samples are not finite or do not match.
         """
-        X, s = self._validated(X, y, y_numeric=True, dtype=np.float64)
+        rows, s = self._validated(X, y, y_numeric=True, dtype=np.float64)
         near = self.local_penalty
         for penalty in (self.penalty, 1.0 if near is None else near):
             if not 0 < penalty < np.inf:
                 raise InvalidInput(f"expected a penalty above 0, found {penalty}.")
         s = np.asarray(s, dtype=np.float64)
-        w, phi = wrist_of(X), natural_terms(X)
+        w, phi = wrist_of(rows), natural_terms(rows)
         terms = quadratic_terms(w)
         others = _people(phi.shape[1], people)
         beyond = s - phi @ others
@@ -269,7 +269,7 @@ class NaturalPosture(EstimatorBase):
         return np.asarray(self._leverage(phi) <= self.taught_leverage_)
 
     def _rows(self, X: ArrayLike) -> Array:
-        rows: Any = np.asarray(X, dtype=np.float64)
+        rows = np.array(X, dtype=np.float64)
         if self.n_features_in_ == WRIST and rows.ndim:
             rows = wrist_of(rows)
         return checked_rows(rows, self.n_features_in_, "wrist centers")
