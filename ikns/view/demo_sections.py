@@ -109,8 +109,9 @@ def methods_section(
             "the paper's c follows posture. `paper` reads all joints of the chain, so "
             "turning the hand changes it; `proximal` reads the upper arm and elbow "
             "flexion only; `intent` reads the elbow's swivel minus what is usual for "
-            "this person with the hand there and pointing so. No method knows what a person wants: "
-            "even `intent` only says how far the elbow departs from the usual.",
+            "this person with the hand there and pointing so. No method knows what a "
+            "person wants: even `intent` only says how far the elbow departs from the "
+            "usual.",
             f"Recommended for this subject: {found['recommended']}, as {found['why']}.",
         ],
         [
