@@ -42,8 +42,9 @@ class NaturalPosture(EstimatorBase):
 
     in which the constant term is free of the penalty. A turned hand is no wish, and a
     posture that follows l makes c follow a turned hand: ``v_l' D v_l`` is the mean
-    square of what usual turns of the hand do to it (:class:`People`). The population is
-    fitted with the same price.
+    square of what usual turns of the hand do to it
+    (:class:`ikns.nullspace.people_posture.People`). The population is fitted with the
+    same price.
 
     Where the wrist is in none of the places that were taught (its leverage
     ``h = phi (Phi'Phi / N + penalty)^-1 phi``, of the terms of w, exceeds the 99th
@@ -73,9 +74,10 @@ class NaturalPosture(EstimatorBase):
     coefficients_ : (K,) array
         beta, rad.
     people_ : (K,) array
-        beta_people, rad; zeros unless `X` has three columns.
+        beta_people, rad; zeros unless `X` has three or six columns.
     offset_ : float
-        Mean difference from the population over the taught places, rad.
+        Mean difference from the population over the taught places, in the wrist's
+        terms, rad.
     leverage_ : (10, 10) array
         Matrix of the leverage of the wrist's terms.
     taught_leverage_ : float
