@@ -36,8 +36,9 @@ def find_steps(apart: Array, pairs: Indices) -> list[tuple[int, int, float]]:
     if len(apart) < 2 * _BESIDE or not len(pairs):
         return []
     with np.errstate(invalid="ignore"):
-        sudden = np.abs(np.diff(apart, axis=0)) > _STEP
-    found = []
+        jump = np.abs(np.diff(apart, axis=0))
+        sudden = jump > _STEP
+    found: list[tuple[int, int, float]] = []
     for t in (np.flatnonzero(sudden.any(axis=1)) + 1).tolist():
         if not _BESIDE <= t <= len(apart) - _BESIDE:
             continue
@@ -52,7 +53,13 @@ def find_steps(apart: Array, pairs: Indices) -> list[tuple[int, int, float]]:
         if change.max() <= _STEP:
             continue
         total = np.bincount(pairs[own[seen]].ravel(), np.repeat(change, 2))
-        found.append((t, int(total.argmax()), float(change.max())))
+        step = (t, int(total.argmax()), float(change.max()))
+        if found and step[1] == found[-1][1] and t - found[-1][0] < _BESIDE:
+            # Noise can make another jump next to it: the larger one is the step.
+            if np.nanmax(jump[t - 1]) <= np.nanmax(jump[found[-1][0] - 1]):
+                continue
+            found.pop()
+        found.append(step)
     return found
 
 
