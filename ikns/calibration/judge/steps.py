@@ -54,13 +54,18 @@ def find_steps(apart: Array, pairs: Indices) -> list[tuple[int, int, float]]:
             continue
         total = np.bincount(pairs[own[seen]].ravel(), np.repeat(change, 2))
         step = (t, int(total.argmax()), float(change.max()))
-        if found and step[1] == found[-1][1] and t - found[-1][0] < _BESIDE:
+        if found and t - found[-1][0] < _BESIDE and _same(pairs, step[1], found[-1][1]):
             # Noise can make another jump next to it: the larger one is the step.
             if np.nanmax(jump[t - 1]) <= np.nanmax(jump[found[-1][0] - 1]):
                 continue
             found.pop()
         found.append(step)
     return found
+
+
+def _same(pairs: Indices, a: int, b: int) -> bool:
+    """Whether two markers sit on one segment."""
+    return a == b or bool(((pairs == a) | (pairs == b)).all(axis=1).any())
 
 
 def judge_steps(
