@@ -48,18 +48,25 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
+def browser_arguments() -> list[str]:
+    from ikns.view.scene.picture import browser_options
+
+    return browser_options()
+
+
+@pytest.fixture(scope="module")
+def chromium(browser_arguments: list[str]) -> Iterator[Any]:
     """A browser without a window, driven by playwright."""
     from playwright.sync_api import sync_playwright
 
-    from ikns.view.scene.picture import HOW_TO_GET_ONE, browser_options, find_browser
+    from ikns.view.scene.picture import HOW_TO_GET_ONE, find_browser
 
     browser = find_browser()
     if browser is None:
         pytest.skip(HOW_TO_GET_ONE)
     with sync_playwright() as driver:
         chromium = driver.chromium.launch(
-            executable_path=browser, args=browser_options()
+            executable_path=browser, args=browser_arguments
         )
         yield chromium
         chromium.close()

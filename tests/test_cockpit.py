@@ -35,6 +35,7 @@ from ikns.experiments.picking import pick_schedule
 from ikns.experiments.tracking import measure, schedule
 from ikns.experiments.visits import read_visit, tracking_record
 from ikns.finger import Safety, SimulatedFinger
+from ikns.view.scene.picture import browser_options
 
 NEXT_WHILE_TRACKING = (
     "The participant follows the line. Abort if something went wrong; the trial comes "
@@ -64,6 +65,12 @@ LINES = """() => [...document.querySelectorAll("#facts dt")].map(name => {
 })"""
 #: How much time passes at once, s: less than a signal may be old, which is 0.2 s.
 STEP = 0.15
+
+
+@pytest.fixture(scope="module")
+def browser_arguments() -> list[str]:
+    """As for any page, but for 3-D: without it a browser computes half as much."""
+    return ["--disable-gpu", *(o for o in browser_options() if o == "--no-sandbox")]
 
 
 class Clock:
