@@ -255,11 +255,17 @@ def _read_marker(label: str, table: Mapping[str, Any]) -> Marker:
     )
 
 
+def _in_mm(meters: float) -> float:
+    """Return millimeters as people write them: 82.2, not 82.19999999999999."""
+    plain = round(1000 * meters, 9)
+    return plain if plain / 1000 == meters else 1000 * meters
+
+
 def _write_marker(marker: Marker) -> dict[str, object]:
     table: dict[str, object] = {
         "link": marker.link,
-        "position_mm": [1000 * value for value in marker.position],
-        "placement_sd_mm": [1000 * value for value in marker.placement_sd],
+        "position_mm": [_in_mm(value) for value in marker.position],
+        "placement_sd_mm": [_in_mm(value) for value in marker.placement_sd],
     }
     if marker.static_only:
         table["static_only"] = True

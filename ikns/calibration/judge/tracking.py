@@ -206,6 +206,8 @@ def _residual(
     worst = int(off.argmax())
     if residual <= MOST_RESIDUAL and off[worst] <= _MOST_MARKER:
         return []
+    all_of_them = residual > MOST_RESIDUAL
+    limit = MOST_RESIDUAL if all_of_them else _MOST_MARKER
     return [
         Finding(
             "residual",
@@ -213,7 +215,8 @@ def _residual(
             where,
             f"markers and body are {1000 * residual:.0f} mm apart, {labels[worst]} "
             f"{1000 * off[worst]:.0f} mm",
-            f"expected at most {1000 * MOST_RESIDUAL:.0f} mm with the static trial of "
+            f"expected at most {1000 * limit:.0f} mm "
+            f"{'' if all_of_them else 'for one marker '}with the static trial of "
             "this person and session: a marker moved, or has another marker's name",
             (labels[worst],),
         )

@@ -82,7 +82,8 @@ def convert_file(
     if target.suffix.lower() not in WRITABLE:
         raise InvalidInput(
             f"{target}: expected a name that ends in {', '.join(WRITABLE)} for "
-            f"markers, found {target.suffix or 'no ending'}."
+            f"markers, found {target.suffix or 'no ending'}; joint angles come from "
+            "`ikns ik --out`."
         )
     recording = read(
         source, subject_prefix=subject_prefix, start=start, end=end, stream=stream
