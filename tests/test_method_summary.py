@@ -6,7 +6,7 @@ import small_person
 
 from ikns.calibration.method_summary import method_summary, no_range_learned
 from ikns.calibration.subject import Subject
-from ikns.cli.calibration_tables import calibration_parts
+from ikns.cli.calibration_tables import calibration_parts, methods_parts
 from ikns.live.control.recorded import control_table
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
@@ -75,11 +75,25 @@ def test_a_method_is_recommended_for_live_use(moved):
     (other,) = cost.keys() - {best}
     # What decides is printed first, also where one of the two says the opposite.
     first, rest = found["why"].split(" (")
-    assert f"moves by {cost[best] / 2:.2f} on average" in first
+    assert f"changes by {cost[best] / 2:.2f} on average" in first
     assert f"that of {other} by {cost[other] / 2:.2f}" in first
-    for cause, name in (("natural", "natural reach"), ("turned_hand", "turned hand")):
+    for cause, name in (("natural", "natural reach"), ("turned_hand", "hand turned")):
         a, b = rows[best][cause], rows[other][cause]
-        assert f"{a:.2f} and {b:.2f} with a {name}" in rest
+        assert f"{name}: {a:.2f} and {b:.2f}" in rest
+    # The table may show proximal as the best: why it takes no part is said.
+    assert "proximal is shown for comparison only" in rest
+
+
+def test_without_enough_reaches_no_method_is_recommended(moved):
+    """A turned hand alone would speak for intent, whatever its reaches do."""
+    subject = moved[0]
+    found = method_summary(subject, [])
+    assert found["recommended"] is None
+    text = str(
+        methods_parts({"methods": {**subject.report["methods"], "summary": found}})
+    )
+    assert "No method is recommended yet: 0 reaches between points and" in text
+    assert "at least 5 of one kind are needed" in text
 
 
 def test_a_range_smaller_than_a_reach_s_change_is_no_range(moved):

@@ -16,7 +16,11 @@ def _axes(body: dict[str, Any]) -> list[str]:
         f"about {name[-1].upper()} (sd {math.degrees(body['tilt_sd_rad'][name]):.1f})"
         for name in body.get("tilts_shown", [])
     ]
-    return [f"Axes against the generic body's, deg: {', '.join(told)}."] if told else []
+    return (
+        [f"Joint axes relative to the generic body's, deg: {', '.join(told)}."]
+        if told
+        else []
+    )
 
 
 def calibration_parts(report: dict[str, Any]) -> list[Any]:
@@ -61,7 +65,7 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
                 "up\nmm": ".0f",
                 "right\nmm": ".0f",
                 "still\nsamples": "d",
-                "ends off\n% of range": ".0f",
+                "end error\n% of range": ".0f",
                 "verdict": "s",
             },
             [
@@ -88,7 +92,7 @@ def calibration_parts(report: dict[str, Any]) -> list[Any]:
 
 
 def methods_parts(report: dict[str, Any]) -> list[Any]:
-    """Say which methods were learned, and what c of each does where nothing is meant.
+    """Say which methods were learned, and what c of each does without intent.
 
     A folder of before has nothing to say of them.
     """
@@ -98,53 +102,64 @@ def methods_parts(report: dict[str, Any]) -> list[Any]:
     lost = methods["without"]
     known = [name for name in ("paper", "proximal", "intent") if name not in lost]
     parts = [f"Methods learned: {', '.join(known)}."]
-    parts += [f"Not {name}: {reason.rstrip('.')}." for name, reason in lost.items()]
+    parts += [
+        f"{name} was not learned: {reason.rstrip('.')}."
+        for name, reason in lost.items()
+    ]
     if "intent" not in lost:
         taught = methods["natural_posture"]
         parts.append(
-            f"Natural posture of {taught['frames']} frames of this person's movement."
+            f"Natural posture: of {taught['frames']} frames of this person's movement."
             if taught["frames"]
-            else "Natural posture of other people, as there was too little ordinary "
-            "movement; add some with --natural."
+            else "Natural posture: that of other people, as there was too little "
+            "ordinary movement; add some with --natural."
         )
     found = methods.get("summary")
-    if found is None:
-        return [" ".join(parts)]
-    counts = found["reaches"]
+    return parts if found is None else [_changes(found), *parts, _advice(found)]
+
+
+def _advice(found: dict[str, Any]) -> str:
+    """Say which method is recommended, and why."""
     from ikns.calibration.method_summary import no_range_learned
 
     if no_range_learned(found):
-        parts.append("No method is recommended: c has no range that means anything.")
-    else:
-        parts.append(f"Recommended: --method {found['recommended']}; {found['why']}.")
-    return [
-        table(
-            "Change of c when nothing is intended (mean; 1 is the whole range)",
-            {
-                "method": "s",
-                f"{counts['between_places']} reaches\nbetween points": ".2f",
-                f"{counts['natural']} natural\nreaches": ".2f",
-                "% of reaches\nabove 0.2": ".0f",
-                f"hand turned\nby {found['turned_deg']:.0f} deg": ".2f",
-            },
+        return "No method is recommended: c has no range that means anything."
+    if found["recommended"] is None:
+        return f"No method is recommended yet: {found['why']}."
+    return f"Recommended: --method {found['recommended']}; {found['why']}."
+
+
+def _changes(found: dict[str, Any]) -> Any:
+    """Return what c of each method does without intent."""
+    from ikns.calibration.method_summary import counted_reaches
+
+    counts = found["reaches"]
+    natural = counts["natural"]
+    return table(
+        "Change of c without intent (mean; 1 is the whole range)",
+        {
+            "method": "s",
+            f"{counted_reaches(counts['between_places'])}\nbetween points": ".2f",
+            f"{natural} natural\n{'reach' if natural == 1 else 'reaches'}": ".2f",
+            "% of reaches\nabove 0.2": ".0f",
+            f"hand turned\nby {found['turned_deg']:.0f} deg": ".2f",
+        },
+        [
             [
-                [
-                    name,
-                    *(
-                        math.nan if value is None else scale * value
-                        for scale, value in (
-                            (1, row["between_places"]),
-                            (1, row["natural"]),
-                            (100, row["above_0.2"]),
-                            (1, row["turned_hand"]),
-                        )
-                    ),
-                ]
-                for name, row in found["methods"].items()
-            ],
-        ),
-        " ".join(parts),
-    ]
+                name,
+                *(
+                    math.nan if value is None else scale * value
+                    for scale, value in (
+                        (1, row["between_places"]),
+                        (1, row["natural"]),
+                        (100, row["above_0.2"]),
+                        (1, row["turned_hand"]),
+                    )
+                ),
+            ]
+            for name, row in found["methods"].items()
+        ],
+    )
 
 
 def _verdict(row: dict[str, Any], least: int, n_dof: int) -> str:

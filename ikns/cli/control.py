@@ -154,7 +154,8 @@ def _methods(method: str, calibrated: ikns.Subject) -> str:
     from ikns.calibration.method_summary import no_range_learned
 
     summary = calibrated.report.get("methods", {}).get("summary") or {}
-    best = summary.get("recommended", method)
+    # None where too few reaches were recorded to tell.
+    best = summary.get("recommended") or method
     if summary and no_range_learned(summary):
         best = method
     advice = "" if best == method else f"; its calibration recommends {best}"

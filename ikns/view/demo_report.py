@@ -199,7 +199,7 @@ def _key_numbers(summary: Mapping[str, Any]) -> list[KeyNumber]:
                 f"{method} {change:.2f}"
                 for method, change in reach_changes(summary["methods"]).items()
             ),
-            "Mean change of c while nothing is intended; ideally 0.",
+            "Mean change of c without intent; ideally 0.",
         ),
         KeyNumber(
             "segment lengths",

@@ -112,7 +112,10 @@ def methods_section(
             "this person with the hand there and pointing so. No method knows what a "
             "person wants: even `intent` only says how far the elbow departs from the "
             "usual.",
-            f"Recommended for this subject: {found['recommended']}, as {found['why']}.",
+            f"No method is recommended yet: {found['why']}."
+            if found["recommended"] is None
+            else f"Recommended for this subject: {found['recommended']}; "
+            f"{found['why']}.",
         ],
         [
             Picture(
@@ -135,7 +138,7 @@ def methods_section(
                     [method, *(row[name] for name in _reach_columns(found))]
                     for method, row in found["methods"].items()
                 ],
-                "Mean change of c while nothing is intended; the forearm turns by "
+                "Mean change of c without intent; the forearm turns by "
                 f"{found['turned_deg']:.0f} deg.",
             )
         ],
