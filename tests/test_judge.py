@@ -313,8 +313,48 @@ def test_real_people_pass_and_their_wrong_recordings_do_not(data):
     found = check_recordings(
         [read(lifts[1])], static=neutral, marker_set="plug_in_gait"
     )
-    assert not found.findings
+    # Nobody wore markers on the forearms, in the static trial neither: said once.
+    assert [(f.kind, f.severity, f.markers) for f in found.findings] == [
+        ("unseen", "note", ("RFRM", "LFRM"))
+    ]
     assert ikns.check_recordings is check_recordings
+
+
+@pytest.mark.parametrize(
+    ("label", "found", "right"),
+    [
+        ("RELBOW", ", but Ann:RELBOW, which", "add --rename Ann:RELBOW=RELB"),
+        ("X1", "; oxford24 does not have Ann:X1", "if one of these is meant"),
+        (None, "", "look whether it was worn"),
+    ],
+)
+def test_a_marker_that_is_in_no_frame_is_a_note(label, found, right):
+    recording = reaching()
+    column = recording.labels.index("Ann:RELB")
+    labels = list(recording.labels)
+    markers = np.array(recording.markers)
+    if label is None:
+        markers[:, column] = np.nan
+    else:
+        labels[column] = f"Ann:{label}"
+    cut = Recording(recording.time, markers, labels, "reach.c3d")
+    checked = check(cut)
+    (told,) = checked.findings
+    assert checked.usable
+    assert (told.kind, told.severity, told.markers) == ("unseen", "note", ("RELB",))
+    assert told.found.startswith("RELB is in no frame" + found)
+    assert right in told.right
+
+
+def test_an_arm_without_any_marker_was_left_out_on_purpose():
+    recording = reaching()
+    kept = [
+        i for i, x in enumerate(recording.labels) if not x.startswith(("L", "Ann:L"))
+    ]
+    one_armed = Recording(
+        recording.time, recording.markers[:, kept], [recording.labels[i] for i in kept]
+    )
+    assert check(one_armed).findings == ()
 
 
 LEFT_RIGHT = {"Ann:R": "Ann:L", "Ann:L": "Ann:R"}

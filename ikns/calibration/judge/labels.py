@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 
-from ikns.body.marker_set import MarkerSet
+from ikns.body.marker_set import MarkerSet, label_keys
 from ikns.body.set_choice import better_set, match_set
-from ikns.calibration.judge.finding import Finding
+from ikns.calibration.judge.finding import Finding, say_markers
+from ikns.motion.unseen import unseen_labels, unseen_words
+from ikns.recording.recording import Recording
 
 #: With less than this share of a set it is another one.
 _ANOTHER = 0.5
+#: More labels than this that a set does not have are those of other segments.
+_FEW = 4
 
 
 def judge_labels(
@@ -35,3 +40,51 @@ def judge_labels(
             else f"use --marker-set {best.name}",
         )
     ]
+
+
+def judge_unseen(recording: Recording, worn: MarkerSet) -> list[Finding]:
+    """Say which markers of a set are in no frame, and what may be their labels.
+
+    An arm of which nothing is in any frame was left out on purpose. Nothing where
+    another set fits better.
+    """
+    if better_set(worn, recording.labels) is not None:
+        return []
+    lost = set(unseen_labels(worn, recording))
+    for side in ("left_", "right_"):
+        arm = {m.label for m in worn.markers if m.link.startswith(side)}
+        lost -= arm if arm <= lost else set()
+    if not lost:
+        return []
+    named = [label for label in worn.labels if label in lost]
+    others = _unknown(recording.labels, worn)
+    found, right = unseen_words(named), "look whether it was worn and labeled"
+    alike = {name: _alike(name, others) for name in named}
+    meant = [f"--rename {other}={name}" for name, other in alike.items() if other]
+    if meant:
+        known = ", ".join(filter(None, alike.values()))
+        found += f", but {known}, which {worn.name} does not have"
+        right = f"if they are the same, add {' '.join(meant)}"
+    elif 0 < len(others) <= _FEW:
+        found += f"; {worn.name} does not have {say_markers(others)}"
+        right = "if one of these is meant, rename it with --rename OLD=NEW"
+    return [Finding("unseen", "note", recording.source, found, right, tuple(named))]
+
+
+def _unknown(labels: Sequence[str], worn: MarkerSet) -> list[str]:
+    """Labels of a recording that no marker of a set has."""
+    # A person's set is without the markers that were taken off after the static trial.
+    whole = MarkerSet.load(worn.name) if worn.name in MarkerSet.names() else worn
+    known = {
+        name.casefold()
+        for m in (*worn.markers, *whole.markers)
+        for name in (m.label, *m.aliases)
+    }
+    return [label for label in labels if not label_keys([label]) & known]
+
+
+def _alike(name: str, labels: Sequence[str]) -> str:
+    """Return the label that is spelled nearly as a marker; empty for none."""
+    keys = {label.rsplit(":", 1)[-1].casefold(): label for label in labels}
+    near = get_close_matches(name.casefold(), keys, n=1, cutoff=0.75)
+    return keys[near[0]] if near else ""

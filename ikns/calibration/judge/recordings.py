@@ -14,7 +14,7 @@ from ikns.body.set_choice import better_set, set_advice
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
-from ikns.calibration.judge.labels import judge_labels
+from ikns.calibration.judge.labels import judge_labels, judge_unseen
 from ikns.calibration.judge.static import STILL_MARKERS, marker_displacement
 from ikns.calibration.judge.subjects import other_session
 from ikns.calibration.scaling import judge_static
@@ -126,6 +126,7 @@ def check_recordings(
         _require_markers(static, worn)
         found = judge_static(body, static, marker_set=worn, min_duration=0.0)
         findings += [*found.findings, *too_short(static, min_static)]
+        findings += judge_unseen(static, worn)
         judged.append((static.source, "static trial"))
         skeleton = None if refused(found.findings) else found.skeleton
     for recording in recordings:
@@ -142,9 +143,12 @@ def check_recordings(
         elif skeleton is None and _still(recording, worn):
             found = judge_static(body, recording, marker_set=worn, min_duration=0.0)
             findings += [*found.findings, *too_short(recording, min_static)]
+            findings += judge_unseen(recording, worn)
             judged.append((recording.source, "static trial"))
             continue
         findings += judge_exploration(recording, worn, body, skeleton=skeleton)
+        own = worn if skeleton is None else skeleton.marker_set
+        findings += judge_unseen(recording, own.without_static())
         known = (
             "without a static trial" if skeleton is None else "with the person's body"
         )
