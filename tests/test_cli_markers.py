@@ -12,6 +12,7 @@ from ikns.body.marker_set import MarkerSet
 from ikns.cli import main
 from ikns.recording.files import read
 from ikns.recording.labels import renamed
+from ikns.recording.recording import Recording
 
 
 def test_sets_and_places_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -108,6 +109,24 @@ def test_a_movement_says_what_is_static_only_and_how_well_it_is_followed(
     )
     assert main(words) == 0
     assert "mm apart in the median frame" in capfd.readouterr().out
+
+
+def test_a_mirror_image_is_named_before_what_follows_from_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    static = small_person.protocol().static.recording
+    image = Recording(
+        static.time, static.markers * [1.0, 1.0, -1.0], static.labels, "image.c3d"
+    )
+    path = str(small_person.write(tmp_path, "image", image))
+    assert main(["markers", "check", "oxford24", path]) == 2
+    out, err = capfd.readouterr()
+    assert err.startswith(f"ikns: {path}: the body is a mirror image")
+    assert "misplaced" not in out
+    assert "beyond" in out
+    assert main(["markers", "check", "oxford24", path, "--json"]) == 2
+    (told,) = json.loads(capfd.readouterr().out)["notes"]
+    assert told in err
 
 
 def test_nothing_to_answer_with_is_one_sentence(

@@ -270,6 +270,11 @@ def test_the_command_exits_with_2_only_for_what_must_not_be_used(tmp_path, capsy
     assert "do not use" in out
     assert err.count("\n") == 1
     assert "swap RELB and RMEP" in err
+    assert err.startswith(f"ikns: {paths['wrong']}: ")
+    # A script that reads the error alone learns that there is more.
+    both = ["check", str(paths["wrong"]), "--static", str(paths["wrong"])]
+    assert main(both) == 2
+    assert capsys.readouterr().err.startswith("ikns: 2 problems; first: ")
     assert main([*wrong, "--json"]) == 2
     result = json.loads(capsys.readouterr().out)
     assert result["usable"] is False

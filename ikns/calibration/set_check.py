@@ -10,12 +10,12 @@ import numpy as np
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
-from ikns.calibration.judge.finding import Finding
-from ikns.calibration.judge.static import refuse_moving
+from ikns.calibration.judge.finding import Finding, refused
 from ikns.calibration.judge.tracking import followed
-from ikns.calibration.scaling import scale
+from ikns.calibration.scaling import judge_static, scale
 from ikns.calibration.size_fit import fit_sizes, size_factors
 from ikns.calibration.static_trial import seen_markers, static_posture
+from ikns.errors import MarkerMismatch
 from ikns.recording.recording import Recording
 
 
@@ -47,6 +47,7 @@ class SetCheck(NamedTuple):
     joints: tuple[CheckedJoint, ...]
     lengths: dict[str, float]  # m
     converged: bool
+    findings: tuple[Finding, ...]  # what the judge says of the static trial
 
 
 class FollowedSet(NamedTuple):
@@ -93,13 +94,18 @@ def check_marker_set(
 ) -> SetCheck:
     """Fit the body to a static trial, and compare the markers with their set.
 
-    Arguments and errors are those of :func:`ikns.scale`.
+    Arguments and errors are those of :func:`ikns.scale`, but a trial to which a body
+    can be fitted is compared even where the judge refuses it: see ``findings``.
     """
+    judged = judge_static(
+        generic, static, marker_set=marker_set, min_duration=min_duration
+    )
+    if judged.skeleton is None:
+        raise MarkerMismatch(refused(judged.findings)[0].sentence)
     reference, target, _ = static_posture(
         generic, static, marker_set=marker_set, min_duration=min_duration
     )
     worn = reference.marker_set
-    refuse_moving(static, worn)
     fit = fit_sizes(reference, target)
     sized = reference.resized(size_factors(fit.log_sizes))
     offsets = fit.positions - sized.marker_positions
@@ -126,4 +132,10 @@ def check_marker_set(
             sized.joint_names, angles, sized.lower, sized.upper, strict=True
         )
     )
-    return SetCheck(markers, joints, sized.segment_lengths, fit.converged)
+    return SetCheck(
+        markers,
+        joints,
+        sized.segment_lengths,
+        fit.converged,
+        tuple(judged.findings),
+    )

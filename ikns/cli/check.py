@@ -57,7 +57,7 @@ def check(
     refuse_repeated(recordings)
     check_inputs([*recordings, static], subject)
 
-    from ikns.calibration.judge.finding import refused
+    from ikns.calibration.judge.finding import refusal, refused
 
     found = ikns.check_recordings(
         [read(path, start=from_, end=to) for path in recordings],
@@ -97,4 +97,4 @@ def check(
         as_json=as_json,
     )
     if faults := refused(found.findings):
-        raise MarkerMismatch(faults[0].sentence)
+        raise MarkerMismatch(refusal(faults))

@@ -15,10 +15,10 @@ from ikns.cli.marker_options import (
 from ikns.cli.options import AsJson, MinStatic
 from ikns.cli.output import notes, show, table
 from ikns.cli.reading import Read, reads_markers
-from ikns.errors import naming
+from ikns.errors import MarkerMismatch, naming
 
 if TYPE_CHECKING:
-    from ikns.calibration.set_check import FollowedSet, SetCheck
+    from ikns.calibration.set_check import CheckedJoint, FollowedSet, SetCheck
 
 #: A marker this many placement deviations from its nominal place is pointed out.
 _FAR = 3.0
@@ -37,14 +37,24 @@ def check(
 
     How far each marker is from where the set expects it, in millimeters and in
     placement deviations, and the joint angles in which the person stands; with
-    --movement, how far the markers are from the body that follows them.
+    --movement, how far the markers are from the body that follows them. Exits with 2
+    when the static trial must not be used, as of a mirror image.
     """
+    from ikns.calibration.judge.finding import refusal, refused
     from ikns.calibration.set_check import check_marker_set, follow_movement
 
     frames = read(static)
     worn = ikns.MarkerSet.load(marker_set)
+    with naming(str(static)):
+        found = check_marker_set(
+            ikns.Skeleton.load(),
+            frames,
+            marker_set=worn,
+            min_duration=min_static,
+        )
+    faults = refused(found.findings)
     moved = None
-    if movement is not None:
+    if movement is not None and not faults:
         moved = follow_movement(
             ikns.Skeleton.load(),
             frames,
@@ -53,13 +63,6 @@ def check(
             min_duration=min_static,
         )
     in_motion = {} if moved is None else moved.markers
-    with naming(str(static)):
-        found = check_marker_set(
-            ikns.Skeleton.load(),
-            frames,
-            marker_set=worn,
-            min_duration=min_static,
-        )
     remarks = _remarks(found, moved)
     show(
         {
@@ -88,14 +91,22 @@ def check(
         _marker_table(found, moved, f"{marker_set} in {static}"),
         _posture_table(found),
         *([] if moved is None else [followed_sentence(movement, moved.residual)]),
-        *notes(remarks),
+        # What the error says is not said twice.
+        *notes(remarks[min(len(faults), 1) :]),
         as_json=as_json,
     )
+    if faults:
+        raise MarkerMismatch(refusal(faults))
 
 
 def _remarks(found: SetCheck, moved: FollowedSet | None) -> list[str]:
     """Say what is unusual about the markers, the posture and the movement."""
+    told = [f.sentence for f in found.findings]
+    if any(f.severity == "refuse" for f in found.findings):
+        # What follows from it is in the tables.
+        return told
     return [
+        *told,
         *(
             f"{m.label} is {m.offset_sd:.1f} standard deviations from its place: "
             "misplaced, swapped, or from another set."
@@ -106,11 +117,16 @@ def _remarks(found: SetCheck, moved: FollowedSet | None) -> list[str]:
         *(
             f"{j.joint} is at {math.degrees(j.angle):.0f} deg, beyond its limits."
             for j in found.joints
-            if not j.lower <= j.angle <= j.upper
+            if _beyond(j)
         ),
         *([] if found.converged else ["the fit did not converge."]),
         *([] if moved is None else [one.sentence for one in moved.findings]),
     ]
+
+
+def _beyond(j: CheckedJoint) -> bool:
+    """Whether a joint is beyond its limits."""
+    return not j.lower <= j.angle <= j.upper
 
 
 def _marker_table(found: SetCheck, moved: FollowedSet | None, title: str) -> Any:
@@ -153,7 +169,7 @@ def _posture_table(found: SetCheck) -> Any:
                 j.joint,
                 math.degrees(j.angle),
                 f"{math.degrees(j.lower):z.0f} .. {math.degrees(j.upper):z.0f}",
-                "held" if j.held else "",
+                "held" if j.held else "beyond" if _beyond(j) else "",
             ]
             for j in found.joints
         ],

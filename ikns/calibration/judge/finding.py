@@ -70,6 +70,19 @@ def refused(findings: Iterable[Finding]) -> list[Finding]:
     return [finding for finding in findings if finding.severity == "refuse"]
 
 
+def refusal(faults: Sequence[Finding]) -> str:
+    """Say the first of what forbids the use of recordings, and how much there is.
+
+    >>> short = Finding("short", "refuse", "a.c3d", "it lasts 1 s", "record 3 s")
+    >>> refusal([short])
+    'a.c3d: it lasts 1 s; record 3 s.'
+    >>> refusal([short, short])
+    '2 problems; first: a.c3d: it lasts 1 s; record 3 s.'
+    """
+    count = f"{len(faults)} problems; first: " if len(faults) > 1 else ""
+    return count + faults[0].sentence
+
+
 def say_frames(mask: Mask, *, most: int = 3) -> str:
     """Say where a mask (T,) is true, counted from 1.
 
