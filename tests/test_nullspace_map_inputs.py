@@ -74,6 +74,15 @@ def test_too_few_points_with_samples_are_refused_and_all_named():
     assert sentence.count(" has ") == 5
 
 
+def test_a_radius_that_is_too_small_is_blamed_and_not_the_hand():
+    x, q = samples()
+    x = x + 1e-3 * rng.normal(size=x.shape)  # a held hand sways by millimeters
+    sentence = refused(NotEnoughData, x, q, radius=1e-7)
+    assert f"of {len(x)} samples are within the radius of 1e-07 m" in sentence
+    assert "give a larger radius" in sentence
+    assert "hand was not held" not in sentence
+
+
 def test_points_that_overlap_are_reported():
     x = rng.normal(scale=0.005, size=(800, 3))  # the hand never went anywhere
     q = rng.uniform(-0.5, 0.5, (800, 1)) * [1.0, 0.0, 0.0]

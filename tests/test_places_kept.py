@@ -124,7 +124,7 @@ def test_more_places_than_points_are_named():
 def test_fewer_places_than_points_are_not_blamed_on_short_rests():
     x, _ = held(np.random.default_rng(5), BOX[:8])
     q = np.random.default_rng(4).uniform(-0.5, 0.5, (len(x), 1)) * [0.8, 0.6]
-    with pytest.warns(MapWarning, match="has 0, as no hand was held there"):
+    with pytest.warns(MapWarning, match="2 have 0, as the hand was not held there"):
         learned = NullSpaceMap(10).fit(x, q)
     assert len(learned.centers_) == 8
 

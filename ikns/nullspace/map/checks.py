@@ -150,21 +150,14 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
     used = np.flatnonzero(counts >= need).tolist()
     few = [k for k in range(len(centers)) if k not in used]
     _warn_of_merged(found)
-    shared = [k for k, *_ in found.merged_]
-    listed = "; ".join(
-        f"{format_point(centers, k)} has {counts[k]}"
-        + ", as it lies between two places" * (k in shared)
-        + ", as no hand was held there" * (k not in shared and not counts[k])
-        for k in few
-    )
     sentence = (
         f"{len(few)} of {len(centers)} PCA points have fewer than {need} samples and "
-        f"are left out: {listed}"
+        f"are left out: {_too_few(found, few)}"
     )
     if len(used) < (4 if natural else 1):
         raise NotEnoughData(
             f"the map needs {'4 PCA points' if natural else 'a PCA point'}, but "
-            f"{sentence} (n_samples={counts.sum()}, n_features={centers.shape[1]})."
+            f"{sentence}."
         )
     if natural:
         spread = centers[used] - centers[used].mean(axis=0)
@@ -181,6 +174,32 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
     if few:
         warnings.warn(f"{sentence}.", MapWarning, stacklevel=3)
     return used
+
+
+def _too_few(found: BoundingBoxKMeans, few: list[int]) -> str:
+    """Say how many samples points have and why; empty ones together."""
+    centers, counts, total = found.cluster_centers_, found.counts_, len(found.labels_)
+    if 2 * counts.sum() < total:
+        return (
+            f"only {counts.sum()} of {total} samples are within the radius of "
+            f"{found.radius_:.2g} m; give a larger radius, or none"
+        )
+    shared = {k for k, *_ in found.merged_}
+    empty = [k for k in few if not counts[k] and k not in shared]
+    told = [
+        f"{format_point(centers, k)} has {counts[k]}"
+        + ", as it lies between two places" * (k in shared)
+        for k in few
+        if k not in empty
+    ]
+    if len(empty) == 1:
+        told.append(
+            f"{format_point(centers, empty[0])} has 0, as the hand was not held there"
+        )
+    elif empty:
+        told.append(f"{len(empty)} have 0, as the hand was not held there")
+    advice = f"; use {len(centers) - len(few)} points, or record more places"
+    return "; ".join(told) + advice * bool(empty)
 
 
 def _warn_of_merged(found: BoundingBoxKMeans) -> None:
