@@ -72,7 +72,7 @@ def commands() -> str:
     parts = [
         "# Commands\n",
         "Exit codes: 0 done, 1 something recorded is not on disk, 2 bad input, 3 the "
-        "finger never moved or ended in its safe state, 128 + n signal n.\n",
+        "finger was never active or ended in its safe state, 128 + n signal n.\n",
     ]
     for name in app.commands:
         parts += _command(app.commands[name], f"ikns {name}", 2)

@@ -14,10 +14,13 @@ import time
 import urllib.request
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from command_line import check_refused, contents
 
 from ikns.cli import main
+from ikns.cli.run_status import _line
+from ikns.live.runtime import LoopStatus
 from ikns.live.session import read_run
 from ikns.recording.files import read, write_c3d
 
@@ -40,6 +43,7 @@ def test_a_run_is_written_and_replays_bit_for_bit(files, tmp_path, capsys):
     assert main(run_argv(files, "--session", str(session), "--json")) == 0
     result = json.loads(capsys.readouterr().out)
     assert result["frames"] == 50
+    assert result["frames_held"] is None  # without --hold-speed
     assert result["source"]["dropped"] == 0
     assert result["transitions"][-1]["after"] == "disarmed"
     out = tmp_path / "run.csv"
@@ -64,10 +68,25 @@ def test_a_session_is_resumed_with_a_new_run(files, tmp_path, capsys):
 
 
 def test_a_table_for_people(files, capsys):
-    assert main(run_argv(files, "--dry-run")) == 0
+    assert main(run_argv(files, "--dry-run", "--hold-speed", "0.001")) == 0
     out, _ = capsys.readouterr()
     assert "receipt to command" in out
     assert "disarmed to armed" in out
+    # The hand never rests; the first frame has no speed.
+    held = re.search(r"frames held, hand faster than --hold-speed\W+(\d+)", out)
+    assert held
+    assert int(held[1]) == 49
+
+
+def test_a_finger_held_for_a_fast_hand_says_so_in_the_line():
+    status = LoopStatus(
+        *(1.0, 100.0, 100, 0, 1e-3, 1e-3, 2e-3, "", True, 0.5, 0.5, 0.5, 0.01),
+        state="active",
+        q=np.zeros(7),
+        too_fast=True,
+    )
+    assert "active   held: the hand is fast " in _line(status)
+    assert "held" not in _line(replace(status, too_fast=False))
 
 
 def on_a_terminal(argv, columns, code=0):

@@ -236,13 +236,14 @@ def test_flexion_holds_while_the_hand_travels(subject):
         controller(subject, hold_speed=speed, dead_band=0.0) for speed in (None, 0.15)
     )
     speed = trial.truth.hand_speed("right_arm")
-    changed = {"still": [], "moving": []}
+    changed, held = {"still": [], "moving": []}, {"still": [], "moving": []}
     before = {}
     for k, markers in enumerate(frames(subject, trial.recording)[:300]):
         for name, made in (("still", still), ("moving", moving)):
-            made.frame(markers, k / 50, k / 50)
+            valid = made.frame(markers, k / 50, k / 50).valid
             made.machine.activate(k / 50)
             changed[name].append(made.flexion != before.get(name))
+            held[name].append(made.too_fast or not valid)
             before[name] = made.flexion
     # Well above the gate: the filter of the speed lags by 1 / (2 pi 5 Hz) = 32 ms, two
     # frames, so only frames whose neighbors are fast too are looked at.
@@ -250,6 +251,9 @@ def test_flexion_holds_while_the_hand_travels(subject):
     assert fast.sum() > 10
     assert np.array(changed["still"])[fast].any()
     assert not np.array(changed["moving"])[fast].any()
+    assert np.array(held["moving"])[fast].all()
+    assert not all(held["moving"])
+    assert not still.too_fast  # without a limit
 
 
 @pytest.mark.parametrize(

@@ -193,3 +193,16 @@ def test_a_size_is_not_judged_by_what_is_hidden(tmp_path: Path, files: Path) -> 
     write_c3d(tmp_path / "few.c3d", replace(points, markers=markers))
     address = f"replay:{tmp_path / 'few.c3d'}"
     open_source(address, subject=small_person.subject()).close()
+
+
+def test_swapped_sides_are_not_replayed(tmp_path: Path, files: Path) -> None:
+    free = read(files / "free.c3d")
+    other = {"R": "L", "L": "R"}
+    swapped = [other.get(name[0], name[0]) + name[1:] for name in free.labels]
+    write_c3d(tmp_path / "swapped.c3d", replace(free, labels=tuple(swapped)))
+    subject, address = small_person.subject(), f"replay:{tmp_path / 'swapped.c3d'}"
+    with pytest.raises(MarkerMismatch, match="left and right are swapped"):
+        open_source(address, subject=subject)
+    # Two that may be exchanged leave the choice to each frame.
+    back = dict(zip(swapped, free.labels, strict=True))
+    open_source(address, subject=subject, names=back).close()

@@ -84,8 +84,8 @@ def run_command(argv: Sequence[str] | None = None) -> int:
     -------
     int
         0 on success, 1 when something recorded is not on disk, 2 on bad input, 3 when a
-        finger never moved or ended in its safe state, 128 + n when signal n ended the
-        command.
+        finger was never active or ended in its safe state, 128 + n when signal n ended
+        the command.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     with repairs() as repaired:

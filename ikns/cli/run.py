@@ -118,7 +118,7 @@ def run(
 ) -> None:
     """Drive a finger with the null space of a person's arm. Ctrl-C stops it.
 
-    Exits with 3 when it ran but the finger never moved, or ended in its safe state.
+    Exits with 3 when the finger was never active, or ended in its safe state.
     Without --finger a simulated finger moves. Whatever stops one of several fingers
     stops all.
 

@@ -69,6 +69,7 @@ def _result(report: Report) -> dict[str, Any]:
         "source": report.source,
         "problem": report.problem,
         "rejections": report.rejections,
+        "frames_held": report.held,
         "notices": report.notices,
         "transitions": [change._asdict() for change in report.transitions],
         "lost_rows": report.lost_rows,
@@ -82,6 +83,11 @@ def _rows(report: Report, published: dict[str, Any] | None) -> list[list[str]]:
         ["frames", str(report.frames)],
         ["seconds", f"{report.seconds:.1f}"],
         ["frames rejected", str(sum(report.rejections.values()))],
+        *(
+            []
+            if report.held is None
+            else [["frames held, hand faster than --hold-speed", str(report.held)]]
+        ),
         [
             "dropped, late, repeated, out of order",
             ", ".join(

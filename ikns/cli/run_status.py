@@ -71,8 +71,8 @@ def _line(s: LoopStatus) -> str:
     late = 1e3 * s.latency
     # Never wider, so that 80 columns hold the residual too.
     pace = f"{s.rate:4.0f}/s p99 {late:4.{2 if late < 9.995 else 0}f} ms"
-    if s.rejection:
-        return f"{drive} {s.rejection} {pace} misses {s.misses}"
+    if why := s.rejection or "held: the hand is fast" * s.too_fast:
+        return f"{drive} {why} {pace} misses {s.misses}"
     place = "inside" if s.inside else "OUTSIDE"
     return (
         f"{drive} {pace} {place:<7} residual {1e3 * s.residual:4.1f} mm "

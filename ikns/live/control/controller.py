@@ -85,6 +85,8 @@ class Controller:
         Commanded flexion of the first finger.
     flexions : list of d float
         Commanded flexion by freedom of the map; NaN where a freedom drives nothing.
+    too_fast : bool
+        Whether the last frame is valid, but the hand faster than `hold_speed`.
     smoothing_delay : float
         Delay of the first smoothed control signal at the last frame, s.
 
@@ -113,6 +115,7 @@ class Controller:
         self._speed = OneEuro(cutoff=_SPEED_CUTOFF, beta=0.0)
         self._device_time = -math.inf
         self._hand = (math.nan,) * 3
+        self.too_fast = False
         self._markers = b""
         self._why = _SILENCE
         self._columns = chain_columns(solver.skeleton, solver.chain)
@@ -162,7 +165,7 @@ class Controller:
         rejection = rejection_reason(
             self.solver, self.settings, markers, solved, new=new, exchanged=exchanged
         )
-        machine = self.machine
+        machine, self.too_fast = self.machine, False
         if rejection:
             self._why = rejection
             changes = machine.check(receive_time, rejection)
@@ -197,7 +200,8 @@ class Controller:
         self._hand = place
         settings, flexions = self.settings, self.flexions
         limit = settings.hold_speed
-        held = self.machine.state in ("holding", "safe") or (limit and speed > limit)
+        self.too_fast = limit is not None and speed > limit
+        held = self.too_fast or self.machine.state in ("holding", "safe")
         for k, smooth in self._axes:
             wanted = min(max(smooth.step(c[k], dt), 0.0), 1.0)
             now = flexions[k]

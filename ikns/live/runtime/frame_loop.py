@@ -83,7 +83,8 @@ class FrameLoop:
         self._on_notice = on_notice
         self._notices = Notices(source, self._notice)
         self._rejections = RejectionCount()
-        self.report = Report()
+        limit = controller.settings.hold_speed
+        self.report = Report(held=None if limit is None else 0)
 
     def arm(self) -> None:
         """Start the clock and arm the safety machine."""
@@ -149,6 +150,8 @@ class FrameLoop:
         self._notices.check(receive_time)
         report.frames += 1
         report.misses += done - received > self._period
+        if report.held is not None:
+            report.held += self._controller.too_fast
         report.stages["solve"].add(decided - began)
         report.stages["command"].add(done - decided)
         report.stages["total"].add(done - received)
@@ -222,6 +225,7 @@ class FrameLoop:
             residual=math.nan if last is None else last.solved.residual,
             worst_residual=math.nan if last is None else last.solved.worst_residual,
             rejection="" if last is None else last.rejection,
+            too_fast=self._controller.too_fast,
             inside=last is not None and last.solved.inside,
             c=axes[0].c,
             flexion=axes[0].flexion,

@@ -75,6 +75,8 @@ class LoopStatus:
         Why the finger is in its safe state; empty unless it is, or without a finger.
     axes : tuple of AxisStatus
         Each freedom that drives a finger.
+    too_fast : bool
+        Whether the finger is held because the hand is faster than ``hold_speed``.
     """
 
     time: float
@@ -94,6 +96,7 @@ class LoopStatus:
     q: NDArray[np.float64]
     stopped: str = ""
     axes: tuple[AxisStatus, ...] = ()
+    too_fast: bool = False
 
 
 @dataclass
@@ -129,6 +132,9 @@ class Report:
         that are missing on disk once it is closed.
     stopped : str
         Why the finger was in its safe state at the end; empty if it was not.
+    held : int, optional
+        Valid frames in which the finger was held because the hand was faster than
+        ``hold_speed``; None without such a limit.
     """
 
     frames: int = 0
@@ -148,6 +154,7 @@ class Report:
     source: dict[str, Any] = field(default_factory=dict)
     lost_rows: int = 0
     stopped: str = ""
+    held: int | None = None
 
     @property
     def problem(self) -> str:

@@ -19,6 +19,7 @@ from ikns.live.stream.lsl_search import Wanted
 from ikns.live.stream.renamed import RenamedFeed
 from ikns.live.stream.replay import Replay
 from ikns.live.stream.ros import RosFeed
+from ikns.live.stream.sides_check import check_sides
 from ikns.live.stream.size_check import check_size, first_frames
 from ikns.live.stream.source import Source
 from ikns.live.stream.subjects import SubjectFeed, check_one_subject, subjects_of
@@ -62,7 +63,8 @@ def open_source(
     subject : Subject, optional
         Who is tracked: like `needs` with its marker set, and distances within segments
         must not be ten times or a tenth of those at calibration. The frames of a live
-        source used for this check are not returned again.
+        source used for this check are not returned again. A recording must not have
+        left and right swapped.
     names : mapping, optional
         Other labels for markers of the source, new by old, as for
         :func:`ikns.recording.labels.renamed`.
@@ -86,7 +88,8 @@ def open_source(
         that the address could mean; an LSL stream is searched for one second longer
         than until the first answers. Also for a body of another size than `subject`.
     MarkerMismatch
-        When a marker of `needs` is missing, or they are those of several subjects.
+        When a marker of `needs` is missing, or they are those of several subjects, or
+        left and right are swapped in a recording.
 
     Examples
     --------
@@ -163,6 +166,7 @@ def _check_size(feed: Feed, options: Options, names: Names, subject: Subject) ->
     if isinstance(feed, Replay):  # looked at without starting its clock
         again = _chosen(Replay(feed.recording, speed=0), options, names)
         markers, labels = first_frames(again, _GLANCES), again.labels
+        check_sides(feed.recording, labels, markers[1:], subject)
     else:
         chosen = _chosen(feed, options, names)
         markers, labels = first_frames(chosen), chosen.labels
