@@ -63,6 +63,9 @@ def test_a_session_is_resumed_with_a_new_run(files, tmp_path, capsys):
     after = contents(session)
     assert all(after[name] == data for name, data in before.items())
     capsys.readouterr()
+    assert main([*again, "--participant", "02"]) == 2
+    assert "the session of participant 01, not of 02" in capsys.readouterr().err
+    assert contents(session) == after
     assert main(["replay", str(session), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["run"] == 2
 
@@ -241,6 +244,7 @@ def test_a_replay_that_differs_says_so(files, tmp_path, capsys):
         (["--resume"], "--resume needs the --session"),
         (["--hold-speed", "-1"], "for --hold-speed, found -1"),
         (["--session", "{tmp}/s", "--participant", "Jane Doe"], "letters and digits"),
+        (["--participant", "02"], "--participant needs the --session"),
         (["--session", "{tmp}"], "exists already; use --resume"),
         (["--session", "{tmp}/none", "--resume"], "that `ikns run` recorded"),
         (["--subject", "{tmp}/nobody"], "expected a folder"),

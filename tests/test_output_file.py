@@ -99,8 +99,9 @@ def test_a_disk_that_refuses_leaves_the_old_file(
         raise OSError(code, os.strerror(code))
 
     monkeypatch.setattr(module.os, "fsync", refuse)
-    with pytest.raises(OSError, match=os.strerror(code)):
+    with pytest.raises(OSError, match=os.strerror(code)) as refused:
         write_bytes(path, b"new", force=force)
+    assert refused.value.filename == str(path)  # not the part's
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"] * force
 
 

@@ -20,7 +20,7 @@ from ikns.cli.output import erase_loading
 from ikns.cli.repairs import repairs, tell
 from ikns.cli.usage import kind_of, usage_sentence
 from ikns.endings import BROKEN_PIPE, signal_exit_code
-from ikns.errors import DataLoss, InvalidInput
+from ikns.errors import DataLoss, InvalidInput, plain
 
 #: Commands by what they are for, in the order of the help.
 _GROUPS = {
@@ -116,8 +116,9 @@ def _run(given: list[str]) -> int:
     except BrokenPipeError:
         return BROKEN_PIPE
     except OSError as error:
-        where = "" if error.filename is None else f"{error.filename}: "
-        message = f"{where}{(error.strerror or str(error)).lower()}."
+        name = error.filename
+        where = "" if name is None else f"{name}: cannot be read or written: "
+        message = f"{where}{plain(error)}."
     except typer.Abort:
         return signal_exit_code() or 128 + signal.SIGINT
     else:

@@ -35,12 +35,13 @@ def live_session(
     configuration: dict[str, Any],
     *,
     rate: float,
-    participant: str,
+    participant: str | None,
     resume: bool,
     losses: list[str],
 ) -> Iterator[RunWriter]:
     """Open the next run of a session: a new one or, with `resume`, an existing one.
 
+    A new one is of the participant, 01 if none is given.
     A run without a frame is removed, and so is its session if it was begun with it: a
     start that failed does not stand in the way of the next one. What is missing on disk
     in the end is added to `losses`, a sentence per file.
@@ -61,7 +62,7 @@ def live_session(
         if (subject / name).is_file()
     }
     if not resume:
-        create_session(folder, participant=participant)
+        create_session(folder, participant=participant or "01")
     writer = None
     with session_lock(folder):
         if resume:
@@ -89,6 +90,18 @@ def live_session(
                 discard_run(folder, number, whole=not resume)
             else:
                 losses += writer.losses
+
+
+def check_participant(session: Path, participant: str | None) -> None:
+    """Refuse the session of another participant."""
+    from ikns.live.session import next_run
+
+    whose, _ = next_run(session)
+    if participant not in (None, whose):
+        raise InvalidInput(
+            f"{session}: this is the session of participant {whose}, not of "
+            f"{participant}; give another folder."
+        )
 
 
 @contextmanager

@@ -61,7 +61,10 @@ def pick(
     participant: Participant = None,
     number: Number = None,
     conditions: Annotated[
-        str | None, typer.Option(help="ikns, ring or both.", show_default="ikns,ring")
+        str | None,
+        typer.Option(
+            help="ikns, ring, separated by a comma.", show_default="ikns,ring"
+        ),
     ] = None,
     objects: Annotated[
         str | None,

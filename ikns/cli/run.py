@@ -15,6 +15,7 @@ import typer
 import ikns
 from ikns.calibration.subject_files import check_subject_folder
 from ikns.cli.live_session import (
+    check_participant,
     live_session,
     publishing,
     say,
@@ -66,8 +67,12 @@ def run(
         bool, typer.Option("--resume", help="Add a run to a session that exists.")
     ] = False,
     participant: Annotated[
-        str, typer.Option(help="Participant's code: letters and digits.")
-    ] = "01",
+        str | None,
+        typer.Option(
+            help="Participant's code for --session: letters and digits.",
+            show_default="01",
+        ),
+    ] = None,
     duration: Annotated[
         float | None,
         typer.Option(
@@ -124,7 +129,7 @@ def run(
 
     Research software, not a medical device.
     """
-    _check_options(subject, duration, session, resume=resume)
+    _check_options(subject, duration, session, participant, resume=resume)
     _check_machine(publish or [], realtime=realtime)
 
     from ikns.calibration.simulated import is_simulated, played_files
@@ -207,13 +212,22 @@ def run(
 
 
 def _check_options(
-    subject: Path, duration: float | None, session: Path | None, *, resume: bool
+    subject: Path,
+    duration: float | None,
+    session: Path | None,
+    participant: str | None,
+    *,
+    resume: bool,
 ) -> None:
     if duration is not None and not 0 < duration < math.inf:
         raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
     if resume and session is None:
         raise InvalidInput("--resume needs the --session to continue.")
+    if participant is not None and session is None:
+        raise InvalidInput("--participant needs the --session that names them.")
     check_subject_folder(subject)
+    if resume and session is not None:
+        check_participant(session, participant)
 
 
 def _check_machine(publish: list[str], *, realtime: bool) -> None:

@@ -64,7 +64,8 @@ def track(
     conditions: Annotated[
         str | None,
         typer.Option(
-            help="ikns, gamepad, keyboard, mouse, or virtual: a simulated operator.",
+            help="ikns, gamepad, keyboard, mouse, separated by commas; or virtual, a "
+            "simulated operator.",
             show_default="ikns,gamepad",
         ),
     ] = None,

@@ -14,7 +14,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import ikns
-from ikns.cli.live_session import publishing, say_undriven, software
+from ikns.cli.live_session import (
+    check_participant,
+    publishing,
+    say_undriven,
+    software,
+)
 from ikns.cli.output import show, table
 from ikns.cli.stop_notice import watch_stops
 from ikns.cli.visit_drivers import (
@@ -259,7 +264,7 @@ def _checked(
         for address in arm.publish:
             check_publish(address)
     check_port(pages.host, pages.port)
-    _check_session(arm.session)
+    _check_session(arm.session, identity.participant)
     simulated = virtual or (subject is not None and arm_is_simulated(subject, arm))
     if identity.study is not None and identity.study.simulated != simulated:
         words = {True: "simulated", False: "with people"}
@@ -270,9 +275,13 @@ def _checked(
     return subject, simulated
 
 
-def _check_session(session: Path | None) -> None:
+def _check_session(session: Path | None, participant: str) -> None:
     """Check that the live loop can keep its runs there."""
-    if session is None or session.is_dir():
+    if session is None:
+        return
+    if (session / "dataset_description.json").exists():
+        check_participant(session, participant)
+    if session.is_dir():
         return
     if session.exists() or not session.absolute().parent.is_dir():
         raise InvalidInput(

@@ -140,7 +140,8 @@ def resolve_design(
     unknown = [name for name in design["conditions"] if name not in inputs]
     if unknown:
         raise InvalidInput(
-            f"expected conditions of {', '.join(inputs)}, found '{unknown[0]}'."
+            f"expected --conditions among {', '.join(inputs)}, separated by commas, "
+            f"found '{unknown[0]}'."
         )
     return design
 

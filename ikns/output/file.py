@@ -188,6 +188,10 @@ def _write_part(path: Path, content: bytes) -> Path:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        # The hidden name tells nobody anything.
+        raise OSError(error.errno, error.strerror, str(path)) from None
     except BaseException:
         part.unlink(missing_ok=True)
         raise
