@@ -73,6 +73,20 @@ def plain(error: Exception) -> str:
     return str(error).rstrip(".")
 
 
+def unreadable(path: object, error: Exception, kind: str = "") -> FileError:
+    """Return the error of a file that cannot be read, as a `kind` of file say.
+
+    >>> str(unreadable("a.toml", FileNotFoundError(2, "No such file or directory")))
+    'a.toml: no such file.'
+    >>> str(unreadable("a.json", ValueError("line 1 is odd"), "JSON"))
+    'a.json: cannot be read as JSON: line 1 is odd.'
+    """
+    if isinstance(error, FileNotFoundError):
+        return FileError(f"{path}: no such file.")
+    as_kind = f" as {kind}" if kind else ""
+    return FileError(f"{path}: cannot be read{as_kind}: {plain(error)}.")
+
+
 @contextmanager
 def naming(source: str, *others: str) -> Iterator[None]:
     """Put the name of a file before the sentence of an error that names none of these.

@@ -155,7 +155,7 @@ def test_one_of_several_chains_needs_its_name(tmp_path):
     for name in ("", "leg", "two.tom", f"{path}x"):
         with pytest.raises(InvalidInput, match="known are right_arm, left_arm"):
             ikns.load_chain(name)
-    with pytest.raises(FileError, match="cannot be read as chains"):
+    with pytest.raises(FileError, match=r"none\.toml: no such file\."):
         ikns.load_chain(tmp_path / "none.toml")
 
 

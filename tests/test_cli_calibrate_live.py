@@ -269,7 +269,7 @@ def test_too_few_points_are_reported_and_recordings_stay(
     [
         (["--static", "a.c3d"], "--static"),
         (["--static", "a.c3d", "--exploration", "b.c3d"], "one or the other"),
-        (["--resume"], "found none"),
+        (["--resume"], "no live calibration to continue"),
         (["--recordings", "no/where"], "does not exist"),
         (["--recordings", "taken"], "--resume"),
         (["--points", "0"], "0"),

@@ -13,7 +13,10 @@ Refused = pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("convert {free} {free}", "one that is read as {free}"),
+        (
+            "convert {free} {free}",
+            "{free}: this file is read; give the output another name.",
+        ),
         ("check {free} {free}", "{free}: given twice; give each recording once."),
         ("ucm --subject {person} {free} {free}", "{free}: given twice"),
         ("study study", "found 'study'; see `ikns study --help`."),
@@ -160,8 +163,8 @@ ARM = (
         ("robot arm.urdf one.csv --frame tip", "at least 2 rows, found 1 row."),
         ("stream {static} --fault drop=2", "drop=2: a probability must be between"),
         ("stream {static} --fault drop=1,swap=1", "drop=1, swap=1: probabilities"),
-        ("replay file", "found a file."),
-        ("report file", "found a file."),
+        ("replay file", "file: this is a file; give a folder that `ikns run`"),
+        ("report file", "file: this is a file; give the folder of a study."),
         ("study run nowhere", "nowhere: there is no such folder; "),
         ("convert {static} no/such/new.trc", "the folder no/such does not exist"),
         (

@@ -247,7 +247,7 @@ def test_a_replay_that_differs_says_so(files, tmp_path, capsys):
         (["--participant", "02"], "--participant needs the --session"),
         (["--session", "{tmp}"], "exists already; use --resume"),
         (["--session", "{tmp}/none", "--resume"], "that `ikns run` recorded"),
-        (["--subject", "{tmp}/nobody"], "expected a folder"),
+        (["--subject", "{tmp}/nobody"], "nobody: no such folder; give one"),
     ],
 )
 def test_bad_input_is_one_sentence(files, tmp_path, capfd, more, says):

@@ -72,7 +72,7 @@ def test_a_run_names_whom_it_could_not_simulate(
 @pytest.mark.parametrize(
     ("tables", "options", "sentence"),
     [
-        (None, [], "expected the file of a study"),
+        (None, [], "no such file; `ikns study init`"),
         (
             {"cohort": {"people": 3}},
             [],

@@ -166,7 +166,7 @@ def test_input_that_cannot_be_split_is_refused_in_one_sentence(
         return check_refused(argv, tmp_path, capfd)
 
     assert "at least 8 trials for the 7 joints" in refused(command(reaches[:7], files))
-    assert "expected RECORDINGS, found none" in refused(command([], files))
+    assert "RECORDINGS is required" in refused(command([], files))
     still = small_person.write(
         tmp_path, "still", film(reach(np.zeros(7), 0.7)[:5].repeat(8, 0))
     )

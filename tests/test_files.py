@@ -140,9 +140,9 @@ def test_tables_that_are_no_nexus_export_are_refused(data, name):
 @pytest.mark.parametrize("suffix", [".c3d", ".trc", ".csv", ".C3D"])
 def test_missing_empty_and_folder_are_refused(tmp_path, suffix):
     path = tmp_path / f"trial{suffix}"
-    assert "found no file there" in refused(path)
+    assert ": no such file." in refused(path)
     path.touch()
-    assert "found an empty file" in refused(path)
+    assert ": this file is empty." in refused(path)
     path.unlink()
     path.mkdir()
     assert "this is a folder; give one recording" in refused(path)

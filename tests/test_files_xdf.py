@@ -184,4 +184,4 @@ def test_without_pyxdf_the_extra_is_named(tmp_path, monkeypatch):
 
 
 def test_an_empty_file_is_refused_before_the_library_is_asked(tmp_path):
-    assert "found an empty file" in refused(tmp_path, "", "xdf")
+    assert ": this file is empty." in refused(tmp_path, "", "xdf")

@@ -332,7 +332,7 @@ def test_redone_takes_stay_and_the_accepted_one_counts(tmp_path: Path):
 
 
 def test_a_folder_that_does_not_fit_is_refused(tmp_path: Path):
-    with pytest.raises(FileError, match="found none"):
+    with pytest.raises(FileError, match="no live calibration to continue"):
         RecordingsFolder(tmp_path / "r", {}, resume=True)
     RecordingsFolder(tmp_path / "r", {"rate": 100.0})
     with pytest.raises(InvalidInput, match="--resume"):

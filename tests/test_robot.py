@@ -120,7 +120,7 @@ def test_what_is_no_urdf_is_refused(text):
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(FileError, match=r"none\.urdf: cannot be read"):
+    with pytest.raises(FileError, match=r"none\.urdf: no such file\."):
         Robot.load(tmp_path / "none.urdf", "tool")
 
 

@@ -324,9 +324,7 @@ def test_a_participant_is_a_pseudonym(tmp_path, name):
 
 def test_what_is_no_session_is_refused(tmp_path):
     for use in (runs, read_run, check_session, mend_session, begun):
-        with pytest.raises(
-            FileError, match="expected a folder that `ikns run` recorded"
-        ):
+        with pytest.raises(FileError, match="not a session; give a folder that `ikns"):
             use(tmp_path)
 
 

@@ -172,7 +172,7 @@ def test_an_unknown_key_is_refused_with_the_nearest_known_one(
 
 
 def test_what_is_no_study_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"study\.toml: expected the file of a study"):
+    with pytest.raises(FileError, match=r"study\.toml: no such file; `ikns"):
         read_study(tmp_path)
     (tmp_path / "study.toml").write_text("[study\n")
     with pytest.raises(FileError, match=r"study\.toml: cannot be read as TOML"):

@@ -172,7 +172,7 @@ def test_visits_are_listed_without_and_then_with_variation(visit: Path) -> None:
     create_visit(study / "visits" / ".hidden" / "sub-01_tracking", ABOUT)
     (study / "visits" / "sub-04_tracking").mkdir()
     assert list_visits(study) == [visit, second, other]
-    with pytest.raises(FileError, match="expected the folder of a study"):
+    with pytest.raises(FileError, match="no such folder; give the folder of a study"):
         list_visits(study / "none")
 
 
@@ -219,9 +219,9 @@ def test_missing_and_damaged_files_are_named(visit: Path) -> None:
             read_visit(visit)
     (visit / "visit.json").unlink()
     assert list_visits(visit.parents[1]) == [visit]
-    with pytest.raises(FileError, match=r"expected a visit with visit\.json"):
+    with pytest.raises(FileError, match=r"visit\.json is missing"):
         read_visit(visit)
-    with pytest.raises(FileError, match=r"expected a visit with visit\.json"):
+    with pytest.raises(FileError, match=r"visit\.json is missing"):
         append_attempt(visit, attempt_row(4))
 
 

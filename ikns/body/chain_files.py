@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ikns.body.chain import FORMAT, Chain, ChainLike
 from ikns.body.model_file import urdf_folder
-from ikns.errors import FileError, IknsError, InvalidInput
+from ikns.errors import FileError, IknsError, InvalidInput, unreadable
 
 _KNOWN = {"joints", "ends", "base", "task", "extrinsic"}
 
@@ -90,8 +90,10 @@ def read_chains(path: str | Path) -> dict[str, Chain]:
 def _read(path: Path) -> dict[str, Chain]:
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        reason = (getattr(error, "strerror", None) or str(error)).rstrip(".")
+    except OSError as error:
+        raise unreadable(path, error, "chains") from None
+    except ValueError as error:
+        reason = str(error).rstrip(".")
         if isinstance(error, UnicodeDecodeError):
             reason = f"expected text in UTF-8, found other bytes at {error.start}"
         raise FileError(

@@ -17,7 +17,7 @@ import numpy as np
 
 from ikns.arrays import Array, Indices
 from ikns.body.model_file import urdf_folder
-from ikns.errors import FileError, MarkerMismatch, plain
+from ikns.errors import FileError, MarkerMismatch, unreadable
 
 #: Added to a label by a reader when a file gives it to several markers.
 _NUMBER = re.compile(r" #\d+$")
@@ -95,9 +95,7 @@ class MarkerSet:
         try:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise FileError(
-                f"{path}: cannot be read as a marker set: {plain(error)}."
-            ) from None
+            raise unreadable(path, error, "a marker set") from None
         if "format" not in table:
             raise FileError(f"{path}: the line `format = {_FORMAT}` is missing.")
         if table["format"] != _FORMAT:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ikns.errors import FileError
+from ikns.output.inputs import no_such_folder
 
 #: Files that every subject folder has.
 NEEDED = ("skeleton.urdf", "markers.toml", "map.json", "calibration.json")
@@ -24,16 +25,12 @@ def check_subject_folder(folder: str | Path) -> Path:
     FileError
         When there is no folder, or it lacks files.
     """
-    place = Path(folder)
+    place, kind = Path(folder), "a subject folder"
+    remedy = "one that `ikns calibrate` wrote"
     if not place.is_dir():
-        raise FileError(
-            f"{place}: expected a folder that `ikns calibrate` wrote, found "
-            f"{'a file' if place.exists() else 'nothing there'}."
-        )
+        raise FileError(no_such_folder(place, kind, remedy))
     missing = [name for name in NEEDED if not (place / name).is_file()]
     if missing:
-        raise FileError(
-            f"{place}: expected a subject folder with {', '.join(NEEDED)}, found "
-            f"no {', '.join(missing)}."
-        )
+        kind += f" ({', '.join(missing)} missing)"
+        raise FileError(no_such_folder(place, kind, remedy))
     return place

@@ -11,7 +11,7 @@ import numpy as np
 from ikns.arrays import Array
 from ikns.body.chain_files import chain_of_table
 from ikns.body.chains import ChainLike, as_chain
-from ikns.errors import FileError, IknsError, InvalidInput, plain
+from ikns.errors import FileError, IknsError, InvalidInput, plain, unreadable
 from ikns.nullspace.readout import Readout
 
 #: Version of the folder's layout and of the JSON files in it.
@@ -91,7 +91,7 @@ def read_json(path: Path, known: tuple[int, ...] = (FORMAT,)) -> dict[str, Any]:
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise FileError(f"{path}: cannot be read as JSON: {plain(error)}.") from None
+        raise unreadable(path, error, "JSON") from None
     version = table.get("format") if isinstance(table, dict) else None
     if version not in known:
         versions = " or ".join(map(str, known))

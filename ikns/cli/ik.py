@@ -124,7 +124,7 @@ def _check(
         refuse_overwriting(path, force=force, inputs=[recording, subject, static])
         check_motion_file(path)
     if len({path.resolve() for path in outputs}) < len(outputs):
-        raise InvalidInput("expected different files for each --out, found one twice.")
+        raise InvalidInput("each --out needs a file of its own, found one twice.")
     if (subject is None) == (static is None):
         raise InvalidInput(
             "expected --subject, a folder of `ikns calibrate`, or --static, a "

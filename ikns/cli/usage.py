@@ -38,11 +38,11 @@ def _wrong_words(error: typer.TyperException, message: str, argv: Sequence[str])
         message = f"`{command}` has no option {option}"
         message += f" (did you mean {meant}?)" if meant else ""
     elif kind == "MissingParameter":
-        message = f"expected {name_of(error.param)}, found none"  # type: ignore[attr-defined]
+        message = f"{name_of(error.param)} is required"  # type: ignore[attr-defined]
     elif option and message.endswith("requires an argument"):
-        message = f"expected a value after {option}, found none"
+        message = f"{option} needs a value"
     elif option and message.endswith("does not take a value"):
-        message = f"expected no value after {option}, found one"
+        message = f"{option} takes no value"
     elif message.startswith("No such command"):
         return _unknown_command(message, context, command)
     elif message.startswith("Got unexpected extra argument"):

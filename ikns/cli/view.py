@@ -188,11 +188,11 @@ def _check_files(
 
 def _check_without_recording(part: tuple[str | None, ...], method: Method) -> None:
     if part != (None, None):
-        raise InvalidInput("expected a recording for --from and --to, found none.")
+        raise InvalidInput("--from and --to need a recording.")
     if method != "paper":
         raise InvalidInput(
-            f"expected a recording to compute c from with --method {method}, "
-            "found none; without one, the map is the paper's."
+            f"--method {method} needs a recording to compute c from; without one, the "
+            "map is the paper's."
         )
 
 

@@ -108,8 +108,8 @@ def arm_subject(arm: ArmOptions) -> ikns.Subject:
     for name, value in (("--subject", arm.subject), ("--source", arm.source)):
         if value is None:
             raise InvalidInput(
-                f"the condition ikns needs {name}, found none; other --conditions need "
-                "nothing but a browser."
+                f"the condition ikns needs {name}; the other --conditions need only a "
+                "browser."
             )
     assert arm.subject is not None
     if arm.realtime:

@@ -94,9 +94,7 @@ def find_visit(
     place = resolve_option(number, stored, "participant_number", None)
     if place is None:
         if not who.isdigit() or int(who) < 1:
-            raise InvalidInput(
-                f"expected --number, from 0, for participant '{who}', found none."
-            )
+            raise InvalidInput(f"participant '{who}' needs --number, counted from 0.")
         place = int(who) - 1
     return VisitIdentity(visit, experiment, who, int(place), stored, declared)
 

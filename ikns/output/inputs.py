@@ -35,9 +35,9 @@ def refuse_input(path: Path, inputs: Iterable[Path | str | None]) -> None:
     for source in _given(inputs):
         held = source.rglob("*") if source.is_dir() else [source]
         if any(_identity(each) == own for each in held if not each.is_dir()):
+            name = "" if str(path) == str(source) else f" as {source}"
             raise InvalidInput(
-                f"{path}: expected another file to write, found one that is read as "
-                f"{source}; choose another name."
+                f"{path}: this file is read{name}; give the output another name."
             )
 
 
@@ -57,17 +57,22 @@ def refuse_input_folder(folder: Path, inputs: Iterable[Path | str | None]) -> No
         place = source.resolve()
         around = {_identity(each) for each in (place, *place.parents)}
         if own in around or (not source.is_dir() and _identity(source) in held):
-            raise InvalidInput(
-                f"{folder}: expected another folder to write, found one with {source}, "
-                "which is read; choose another name."
-            )
+            found = f"this folder holds {source}, which is read"
+            if str(folder) == str(source):
+                found = "this folder is read"
+            raise InvalidInput(f"{folder}: {found}; give the output another name.")
 
 
-def found_there(path: Path) -> str:
-    """Say what is where a folder of some kind was expected: nothing, or another."""
+def no_such_folder(path: Path, kind: str, remedy: str) -> str:
+    """Say that a path is no folder of some kind, and which one to give.
+
+    >>> no_such_folder(Path("none"), "a session", "one that `ikns run` recorded")
+    'none: no such folder; give one that `ikns run` recorded.'
+    """
+    found = "this is a file" if path.exists() else "no such folder"
     if path.is_dir():
-        return "another folder"
-    return "a file" if path.exists() else "nothing there"
+        found = f"this is not {kind}"
+    return f"{path}: {found}; give {remedy}."
 
 
 def _given(inputs: Iterable[Path | str | None]) -> Iterator[Path]:

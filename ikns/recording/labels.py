@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from ikns.errors import FileError, InvalidInput, plain
+from ikns.errors import FileError, InvalidInput, unreadable
 from ikns.recording.recording import Recording
 
 
@@ -100,7 +100,7 @@ def read_name_pairs(path: Path, *, form: str = "OLD=NEW") -> dict[str, str]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{path}: cannot be read as text: {plain(error)}.") from None
+        raise unreadable(path, error, "text") from None
     lines = [line.partition("#")[0] for line in lines]
     if not any(line.strip() for line in lines):
         raise FileError(f"{path}: expected a line {form} for each marker, found none.")

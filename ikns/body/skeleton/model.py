@@ -13,7 +13,7 @@ from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton.urdf import parse_urdf
-from ikns.errors import FileError, plain
+from ikns.errors import FileError, unreadable
 from ikns.numerics.rigid import turn_to
 
 #: Columns of a configuration and of its tangent that hold the free flyer.
@@ -25,8 +25,7 @@ def read_urdf(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        reason = plain(error)
-        raise FileError(f"{path}: cannot be read as a URDF: {reason}.") from None
+        raise unreadable(path, error, "a URDF") from None
     except UnicodeDecodeError as error:
         raise FileError(
             f"{path}: this is not a text file (byte {error.start} is no UTF-8); a URDF "

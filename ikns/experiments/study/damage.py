@@ -94,7 +94,7 @@ def _fault(visit: Path, study: Study, number: int) -> str:
                 f"{about.get('seed')}."
             )
         if not has_attempts(visit):
-            return f"{visit}: expected a visit with attempts, found none."
+            return f"{visit}: there are no attempts in this visit."
         if not check_sums(visit):
             read_visit(visit)  # by a version that wrote no checksums
     except FileError as error:

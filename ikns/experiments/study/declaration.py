@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, InvalidInput, naming, plain
+from ikns.errors import FileError, InvalidInput, naming, unreadable
 from ikns.experiments.picking.objects import OBJECT_IDS
 from ikns.experiments.study.design import Parameters, PickingDesign, TrackingDesign
 from ikns.experiments.study.tables import check_keys, choice, fill
@@ -113,11 +113,10 @@ def read_study(study: str | Path) -> Study:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise FileError(
-            f"{path}: expected the file of a study, found none; `ikns study init` "
-            "writes one."
+            f"{path}: no such file; `ikns study init` writes one."
         ) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FileError(f"{path}: cannot be read as TOML: {plain(error)}.") from None
+        raise unreadable(path, error, "TOML") from None
     with naming(str(path)):
         return study_from_table(table)
 

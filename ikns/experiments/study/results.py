@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, InvalidInput, plain
+from ikns.errors import FileError, InvalidInput, plain, unreadable
 from ikns.experiments.study.cells import Task, visit_name
 from ikns.experiments.study.declaration import FILE, Study
 from ikns.experiments.visits import EXPERIMENTS, list_visits
@@ -139,7 +139,7 @@ def _saved_declaration(folder: Path) -> dict[str, Any] | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise FileError(f"{place}: cannot be read: {plain(error)}.") from None
+        raise unreadable(place, error) from None
     except (ValueError, LookupError, TypeError):
         raise FileError(
             f"{place}: cannot be read as the declaration from before the first result; "

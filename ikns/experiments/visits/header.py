@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ikns.errors import FileError, plain
+from ikns.errors import FileError, unreadable
 from ikns.experiments.visits.rows import EXPERIMENTS
 
 #: Version of a visit's files.
@@ -44,11 +44,9 @@ def read_header(visit: Path) -> dict[str, Any]:
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise FileError(
-            f"{visit}: expected a visit with {HEADER}, found none."
-        ) from None
+        raise FileError(f"{visit}: this is no visit; {HEADER} is missing.") from None
     except OSError as error:
-        raise FileError(f"{file}: cannot be read: {plain(error)}.") from None
+        raise unreadable(file, error) from None
     except ValueError:
         raise FileError(f"{file}: cannot be read as JSON.") from None
     fault = "expected a table" if not isinstance(table, dict) else header_fault(table)

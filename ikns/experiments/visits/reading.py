@@ -10,7 +10,7 @@ from ikns.errors import FileError
 from ikns.experiments.visits.header import HEADER, read_header
 from ikns.experiments.visits.parquet import read_rows
 from ikns.experiments.visits.sums import check_sums
-from ikns.output.inputs import found_there
+from ikns.output.inputs import no_such_folder
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +99,7 @@ def has_attempts(visit: Path) -> bool:
 def _visit_folders(study: str | Path) -> list[Path]:
     top = Path(study)
     if not top.is_dir():
-        raise FileError(
-            f"{top}: expected the folder of a study, found {found_there(top)}."
-        )
+        raise FileError(no_such_folder(top, "a study", "the folder of a study"))
     visits = top / "visits"
     found = sorted(p for p in visits.glob("sub-*") if p.is_dir())
     return found + sorted(

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from ikns.errors import FileError, plain
+from ikns.errors import FileError, unreadable
 
 #: Name of the file.
 SUMS = "sums.sha256"
@@ -45,7 +45,7 @@ def check_sums(visit: Path) -> bool:
     except FileNotFoundError:
         return False
     except OSError as error:
-        raise FileError(f"{file}: cannot be read: {plain(error)}.") from None
+        raise unreadable(file, error) from None
     except UnicodeDecodeError:
         lines = [""]
     names = {line.partition("  ")[2] for line in lines}
@@ -60,11 +60,9 @@ def check_sums(visit: Path) -> bool:
         try:
             found = hashlib.sha256(path.read_bytes()).hexdigest()
         except FileNotFoundError:
-            raise FileError(
-                f"{visit}: expected a visit with {name}, found none."
-            ) from None
+            raise FileError(f"{visit}: {name} is missing.") from None
         except OSError as error:
-            raise FileError(f"{path}: cannot be read: {plain(error)}.") from None
+            raise unreadable(path, error) from None
         if found != digest:
             size = path.stat().st_size
             raise FileError(

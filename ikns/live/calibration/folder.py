@@ -153,8 +153,7 @@ class RecordingsFolder:
             self.accepted  # noqa: B018 - raises if the table is damaged
         except FileNotFoundError:
             raise FileError(
-                f"{self.path}: expected recordings of a live "
-                "calibration to continue, found none."
+                f"{self.path}: there is no live calibration to continue."
             ) from None
         except (OSError, ValueError, LookupError, TypeError) as error:
             raise FileError(

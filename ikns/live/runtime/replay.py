@@ -75,7 +75,7 @@ def replay_run(run: Run) -> Replayed:
     ...     open_run(session, configuration={}, **about).close()
     ...     replay_run(read_run(session))  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ikns.errors.FileError: ...run-01/subject: expected a folder that ...
+    ikns.errors.FileError: ...run-01/subject: no such folder; ...
     """
     subject = Subject.load(run.subject_folder)
     try:

@@ -21,7 +21,7 @@ from ikns.live.session.sidecars import (
     write_sidecars,
 )
 from ikns.live.session.writer import RunWriter
-from ikns.output.inputs import found_there
+from ikns.output.inputs import no_such_folder
 from ikns.output.lock import hold_lock
 
 #: Version of the standard that the files follow.
@@ -183,8 +183,7 @@ def next_run(session: str | Path) -> tuple[str, int]:
         version, participant = about["IknsFormat"], listed[1].removeprefix("sub-")
     except (OSError, ValueError, LookupError, TypeError):
         raise FileError(
-            f"{place}: expected a folder that `ikns run` recorded, found "
-            f"{found_there(place)}."
+            no_such_folder(place, "a session", "a folder that `ikns run` recorded")
         ) from None
     if version != FORMAT:
         raise FileError(

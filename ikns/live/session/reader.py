@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ikns.errors import FileError, plain
+from ikns.errors import FileError, plain, unreadable
 from ikns.live.session.dataset import next_run, run_files
 
 Array = NDArray[np.float64]
@@ -206,4 +206,4 @@ def _json(path: Path) -> dict[str, Any]:
     try:
         return dict(json.loads(path.read_text("utf-8")))
     except (OSError, ValueError, TypeError) as error:
-        raise FileError(f"{path}: cannot be read as JSON: {plain(error)}.") from None
+        raise unreadable(path, error, "JSON") from None

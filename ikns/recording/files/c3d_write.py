@@ -64,7 +64,7 @@ def write_c3d(path: str | Path, recording: Recording, *, force: bool = False) ->
     if path.suffix.lower() != ".c3d":
         raise FileError(f"{path}: expected a name that ends in .c3d.")
     if not path.parent.is_dir():
-        raise FileError(f"{path}: expected a folder to write into, found none there.")
+        raise FileError(f"{path}: the folder {path.parent} does not exist.")
     if path.is_dir():
         raise FileError(f"{path}: expected a file name, found a folder.")
     if path.exists() and not force:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ikns.arrays import Array, Mask
-from ikns.errors import FileError, InvalidInput, plain
+from ikns.errors import FileError, InvalidInput, unreadable
 from ikns.recording.recording import Recording
 
 #: Meters in one unit, by the spellings that cameras' software writes.
@@ -56,14 +56,14 @@ def existing_file(path: Path) -> int:
         raise FileError(f"{shown(str(path))}: this is not a file name.")
     refuse_folder(path)
     if not path.is_file():
-        raise FileError(f"{path}: expected a marker file, found no file there.")
+        raise FileError(f"{path}: no such file.")
     try:
         with path.open("rb") as file:
             size = file.seek(0, os.SEEK_END)
     except OSError as error:
-        raise FileError(f"{path}: cannot be read: {plain(error)}.") from None
+        raise unreadable(path, error) from None
     if size == 0:
-        raise FileError(f"{path}: expected a marker file, found an empty file.")
+        raise FileError(f"{path}: this file is empty.")
     return size
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.errors import FileError, plain
+from ikns.errors import FileError, unreadable
 from ikns.recording.files.storage import STORAGE, read_storage
 
 _RAD = 0.017453292519943295
@@ -119,9 +119,7 @@ def _number_table(path: Path) -> tuple[list[str], Array]:
     except UnicodeDecodeError:
         raise FileError(f"{path}: this is not a text file.") from None
     except (OSError, ValueError) as error:
-        raise FileError(
-            f"{path}: cannot be read as a table of numbers: {plain(error)}."
-        ) from None
+        raise unreadable(path, error, "a table of numbers") from None
     if len(rows) < 2:
         raise FileError(
             f"{path}: expected a header and at least 2 rows, found {len(rows)} "

@@ -99,7 +99,7 @@ def digest_visit(folder: Path) -> Digest | ExcludedVisit:
         with naming(str(folder)):
             visit = read_visit(folder)
             if not has_attempts(folder):
-                raise FileError("expected a visit with attempts, found none.")
+                raise FileError("there are no attempts in this visit.")
             if visit.about["experiment"] == "tracking":
                 return _tracking(visit)
             return _picking(visit)

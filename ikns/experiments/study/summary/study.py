@@ -96,7 +96,7 @@ def summarize(
         raise FileError(left_out[0].reason)
     if not paths:
         raise FileError(
-            f"{top}: expected a study with visits, or a visit, found none; "
+            f"{top}: there are no visits in it; "
             "`ikns study run` simulates them, `ikns track` and `ikns pick` make them."
         )
     groups: dict[tuple[bool, str], VisitAccumulator] = {}
@@ -167,7 +167,7 @@ def _digests(
 def _empty(folder: Path) -> list[ExcludedVisit]:
     """Name folders that are called like visits and hold none."""
     return [
-        ExcludedVisit(path, f"{path}: expected a visit with visit.json, found none.")
+        ExcludedVisit(path, f"{path}: this is no visit; visit.json is missing.")
         for path in empty_visits(folder)
     ]
 
