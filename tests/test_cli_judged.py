@@ -1,6 +1,7 @@
 """Commands that read a recording of a known person refuse one that must not be used."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -58,6 +59,25 @@ def wrong(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         kind: small_person.write(folder, kind.replace(" ", "_"), change(points))
         for kind, (change, _) in WRONG.items()
     }
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_another_person_than_in_the_subject_folder_is_told(
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    points, person = small_person.protocol().points.recording, small_person.subject()
+    ben = Recording(
+        points.time, points.markers, [f"Ben:{one}" for one in points.labels], "ben"
+    )
+    path = small_person.write(tmp_path, "ben", ben)
+    static = person.report["static"] | {"subjects": ["ann"]}
+    replace(person, report=person.report | {"static": static}).save("ann")
+    assert main([command, str(path), "--subject", "ann", *COMMANDS[command]]) == 0
+    assert "was calibrated as ann" in " ".join(capfd.readouterr().out.split())
 
 
 @pytest.mark.parametrize("kind", WRONG)

@@ -226,6 +226,37 @@ def test_another_persons_static_trial_is_told_by_distances_and_by_name():
     assert "ben" in found.found
 
 
+def test_another_person_than_the_one_who_was_calibrated_is_told():
+    # What a calibration keeps of the person: the name before the labels, and how far
+    # the markers are from the body, here the noise of `recorded`.
+    as_ann, as_ben = ({"static": {"subjects": [name]}} for name in ("ann", "ben"))
+    assert not check_recordings([reaching()], skeleton=person(), report=as_ann).findings
+    found = check_recordings([reaching()], skeleton=person(), report=as_ben)
+    assert [(one.kind, one.severity) for one in found.findings] == [
+        ("another person", "warn")
+    ]
+    assert "calibrated as ben" in found.findings[0].found
+    calm = {"explorations": [{"residual_median_m": 5e-4}]}
+    assert not check_recordings([reaching()], skeleton=person(), report=calm).findings
+    # Limbs a tenth longer, with what they wear.
+    longer = generic().resized(
+        {
+            f"{side}_{part}": 1.1
+            for side in ("right", "left")
+            for part in ("upper_arm", "forearm")
+        }
+    )
+    (told,) = check_recordings(
+        [reaching(longer)], skeleton=person(), report=calm
+    ).findings
+    assert told.kind == "another person"
+    assert "0 mm at calibration" in told.found
+    # After markers were put on again, what was measured then counts.
+    again = calm | {"rewear": {"natural": [{"residual_median_m": 0.05}]}}
+    rough = check_recordings([reaching(longer)], skeleton=person(), report=again)
+    assert "another person" not in [one.kind for one in rough.findings]
+
+
 def test_a_body_of_no_adult_is_told():
     tall = generic().resized(dict.fromkeys(generic().segment_lengths, 1.35))
     findings = judge_static(

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
-from ikns.calibration.judge.finding import Finding, refused
-from ikns.calibration.judge.subjects import other_session
+from ikns.calibration.judge.finding import Finding, refused, worst_first
+from ikns.calibration.judge.subjects import (
+    other_session,
+    other_than_calibrated,
+    usual_residual,
+)
 from ikns.errors import MarkerMismatch, naming
 from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.marker_ik.rejection import rejection_sentence
@@ -24,6 +29,7 @@ def judged_motion(
     chain: ChainLike | None = None,
     static: Recording | None = None,
     measured: bool = True,
+    report: Mapping[str, Any] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Motion, list[str]]:
     """Judge a recording, track it, and say what it lacks.
@@ -42,6 +48,9 @@ def judged_motion(
     measured : bool
         Whether the skeleton comes from a static trial; assumed distances between
         markers are not compared.
+    report : mapping, optional
+        Of the person's calibration, :attr:`ikns.Subject.report`: whose markers they
+        were, and how far from the body.
     progress : callable, optional
         Called with (frames done, frames in total).
 
@@ -65,7 +74,12 @@ def judged_motion(
     """
     shown = "both_arms" if chain is None else chain
     warned = require_usable(
-        skeleton, recording, chain=shown, static=static, measured=measured
+        skeleton,
+        recording,
+        chain=shown,
+        static=static,
+        measured=measured,
+        report=report,
     )
     warn_unseen(skeleton, recording, chain)
     motion = MarkerIK(skeleton).track(recording, chain=chain, progress=progress)
@@ -81,12 +95,15 @@ def require_usable(
     chain: ChainLike = "both_arms",
     static: Recording | None = None,
     measured: bool = True,
+    report: Mapping[str, Any] | None = None,
 ) -> list[str]:
     """Return the judge's warnings of a recording of a known person, or refuse it.
 
     Arguments and errors as for :func:`judged_motion`.
     """
-    findings = known_findings(skeleton, recording, chain=chain, measured=measured)
+    findings = known_findings(
+        skeleton, recording, chain=chain, measured=measured, report=report
+    )
     if static is not None:
         findings += other_session(static, recording, skeleton.marker_set)
     if faults := refused(findings):
@@ -100,16 +117,21 @@ def known_findings(
     *,
     chain: ChainLike = "both_arms",
     measured: bool = True,
+    report: Mapping[str, Any] | None = None,
 ) -> list[Finding]:
     """Judge a recording of a known person, the worst first, and refuse nothing.
 
     Arguments as for :func:`judged_motion`.
     """
+    of = report or {}
     with naming(recording.source):
-        return judge_exploration(
+        findings = judge_exploration(
             recording,
             skeleton.marker_set,
             skeleton,
             skeleton=skeleton if measured else None,
             chain=chain,
+            usual=usual_residual(of),
         )
+        others = other_than_calibrated(of, recording, skeleton.marker_set)
+    return worst_first([*others, *findings])

@@ -189,7 +189,7 @@ def calibrate(
         "marker_set": skeleton.marker_set.name,
         "settings": _settings(learned, max_hand_speed, min_rest),
         "methods": methods,
-        "static": static_report(static, measured.scaling),
+        "static": static_report(static, measured.scaling, skeleton.marker_set),
         "body": body_report(measured.fitted),
         "explorations": [
             exploration_report(recording, motion, gate, chain)

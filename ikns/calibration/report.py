@@ -10,8 +10,10 @@ import numpy as np
 from ikns.arrays import Mask
 from ikns.body.chains import ChainLike, chain_joints
 from ikns.body.joint_axes import TILTS
+from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.exploration_fit import BodyReport
+from ikns.calibration.judge.subjects import subject_names
 from ikns.calibration.scaling import ScalingReport
 from ikns.motion.marker_ik.rejection import count_rejections
 from ikns.motion.motion import Motion
@@ -19,10 +21,13 @@ from ikns.nullspace.map import NullSpaceMap
 from ikns.recording.recording import Recording
 
 
-def static_report(static: Recording | None, scaling: ScalingReport) -> dict[str, Any]:
+def static_report(
+    static: Recording | None, scaling: ScalingReport, worn: MarkerSet
+) -> dict[str, Any]:
     """Results of the static trial; without one, what is assumed of the body."""
     return {
         "source": None if static is None else static.source,
+        "subjects": [] if static is None else sorted(subject_names(static, worn)),
         "duration_s": scaling.duration,
         "converged": bool(scaling.converged),
         "lengths_m": scaling.lengths,

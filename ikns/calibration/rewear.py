@@ -123,7 +123,7 @@ def rewear(
         found, about = _zeroed(new, motions)
     report: dict[str, Any] = {
         **subject.report,
-        "static": static_report(static, measured.scaling),
+        "static": static_report(static, measured.scaling, measured.skeleton.marker_set),
         "rewear": about
         | {
             "natural": [

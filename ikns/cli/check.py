@@ -59,10 +59,12 @@ def check(
 
     from ikns.calibration.judge.finding import refusal, refused
 
+    person = None if subject is None else ikns.Subject.load(subject)
     found = ikns.check_recordings(
         [read(path, start=from_, end=to) for path in recordings],
         static=None if static is None else read(static),
-        skeleton=None if subject is None else ikns.Subject.load(subject).skeleton,
+        skeleton=None if person is None else person.skeleton,
+        report=None if person is None else person.report,
         marker_set=marker_set or "oxford24",
         min_static=min_static,
     )

@@ -230,6 +230,7 @@ def _tracked(
             frames,
             chain=subject.chain,
             measured=subject.measured,
+            report=subject.report,
             progress=partial(report, Path(frames.source).name),
         )
         motions.append(motion)

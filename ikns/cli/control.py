@@ -78,6 +78,7 @@ def control(
             frames,
             chain=calibrated.chain,
             measured=calibrated.measured,
+            report=calibrated.report,
             progress=partial(report, recording.name),
         )
     found = control_table(

@@ -71,11 +71,12 @@ def ik(
     from ikns.motion.table import limits_passed, motion_table
 
     left_out: list[str] = []
-    still, measured = None, True
+    still, measured, calibration = None, True, None
     if static is None:
         assert subject is not None
         person = ikns.Subject.load(subject)
         skeleton, measured = person.skeleton, person.measured
+        calibration = person.report
     else:
         still = read(static)
         skeleton, left_out = _scaled(still, marker_set, min_static)
@@ -86,6 +87,7 @@ def ik(
             frames,
             static=still,
             measured=measured,
+            report=calibration,
             progress=partial(report, "joint angles"),
         )
     told = [write_motion(path, motion, skeleton, force=force) for path in outputs]

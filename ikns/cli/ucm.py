@@ -90,6 +90,7 @@ def ucm(
                 read(path, start=from_, end=to),
                 chain=calibrated.chain,
                 measured=calibrated.measured,
+                report=calibrated.report,
                 progress=partial(report, path.name),
             )
             motions.append(motion)

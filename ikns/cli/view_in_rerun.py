@@ -85,7 +85,11 @@ def tell_faults(person: ikns.Subject, frames: ikns.Recording) -> list[str]:
     from ikns.calibration.judged_motion import known_findings
 
     found = known_findings(
-        person.skeleton, frames, chain=person.chain, measured=person.measured
+        person.skeleton,
+        frames,
+        chain=person.chain,
+        measured=person.measured,
+        report=person.report,
     )
     faults = [fault.sentence for fault in found if fault.severity != "note"]
     for fault in faults:

@@ -60,6 +60,7 @@ def judge_exploration(
     *,
     skeleton: Skeleton | None = None,
     chain: ChainLike = "both_arms",
+    usual: float | None = None,
 ) -> list[Finding]:
     """Judge a recording in which a person moves.
 
@@ -75,20 +76,27 @@ def judge_exploration(
     chain : str
         See :class:`ikns.Chain`; what is wrong with the other arm alone is
         left out.
+    usual : float, optional
+        How far the markers were from this body at calibration, m: see
+        :func:`ikns.calibration.judge.subjects.usual_residual`.
 
     Returns
     -------
     list of Finding
         The worst first.
     """
-    findings = _judge(recording, worn, generic, skeleton)
+    findings = _judge(recording, worn, generic, skeleton, usual)
     sides = ("thorax", *chain_sides(chain))
     own = {m.label for m in worn.markers if m.link.startswith(sides)}
     return worst_first(f for f in findings if not f.markers or own & set(f.markers))
 
 
 def _judge(
-    recording: Recording, worn: MarkerSet, generic: Skeleton, skeleton: Skeleton | None
+    recording: Recording,
+    worn: MarkerSet,
+    generic: Skeleton,
+    skeleton: Skeleton | None,
+    usual: float | None,
 ) -> list[Finding]:
     where = recording.source
     others = judge_labels(
@@ -135,7 +143,9 @@ def _judge(
         for a, b in exchanges:
             order[[a, b]] = order[[b, a]]
         seconds = recording.time[~spoiled]
-        findings += judge_tracking(where, skeleton, seconds, good[:, order])
+        findings += judge_tracking(
+            where, skeleton, seconds, good[:, order], usual=usual
+        )
     return findings
 
 

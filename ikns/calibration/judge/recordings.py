@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,11 @@ from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
 from ikns.calibration.judge.labels import judge_labels, judge_unseen
 from ikns.calibration.judge.static import STILL_MARKERS, marker_displacement
-from ikns.calibration.judge.subjects import other_session
+from ikns.calibration.judge.subjects import (
+    other_session,
+    other_than_calibrated,
+    usual_residual,
+)
 from ikns.calibration.scaling import judge_static
 from ikns.calibration.static_trial import too_short
 from ikns.errors import InvalidInput, MarkerMismatch, naming
@@ -64,6 +68,7 @@ def check_recordings(
     generic: Skeleton | None = None,
     marker_set: str | Path | MarkerSet = "oxford24",
     min_static: float = 1.0,
+    report: Mapping[str, Any] | None = None,
 ) -> Check:
     """Judge recordings of one person before they are used.
 
@@ -83,6 +88,9 @@ def check_recordings(
         The markers on the person; the skeleton's own where there is one.
     min_static : float
         Shortest static trial to accept, s.
+    report : mapping, optional
+        Of the calibration that the skeleton is from, :attr:`ikns.Subject.report`:
+        whose markers they were, and how far from the body.
 
     Returns
     -------
@@ -111,7 +119,7 @@ def check_recordings(
             "expected a static trial or a calibrated person to compare with, found "
             "both; give one."
         )
-    body = Skeleton.load() if generic is None else generic
+    body, of = Skeleton.load() if generic is None else generic, report or {}
     if skeleton is not None:
         worn = skeleton.marker_set
     else:
@@ -146,7 +154,10 @@ def check_recordings(
             findings += judge_unseen(recording, worn)
             judged.append((recording.source, "static trial"))
             continue
-        findings += judge_exploration(recording, worn, body, skeleton=skeleton)
+        findings += other_than_calibrated(of, recording, worn)
+        findings += judge_exploration(
+            recording, worn, body, skeleton=skeleton, usual=usual_residual(of)
+        )
         own = worn if skeleton is None else skeleton.marker_set
         findings += judge_unseen(recording, own.without_static())
         known = (

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from ikns.body.marker_set import MarkerSet
 from ikns.calibration.judge.finding import Finding
 from ikns.recording.recording import Recording
@@ -44,7 +47,7 @@ def other_subject(
     static: Recording, recording: Recording, worn: MarkerSet
 ) -> list[Finding]:
     """Say that two recordings name different subjects before their labels."""
-    names = [_prefixes(one, worn) for one in (static, recording)]
+    names = [subject_names(one, worn) for one in (static, recording)]
     if not all(names) or names[0] & names[1]:
         return []
     of, found = (" and ".join(sorted(name)) for name in names)
@@ -60,7 +63,50 @@ def other_subject(
     ]
 
 
-def _prefixes(recording: Recording, worn: MarkerSet) -> set[str]:
+def other_than_calibrated(
+    report: Mapping[str, Any], recording: Recording, worn: MarkerSet
+) -> list[Finding]:
+    """Say that a recording names another subject than the one who was calibrated.
+
+    A warning: between sessions a subject may be renamed. `report` is that of the
+    calibration.
+    """
+    static = report.get("static")
+    names = static.get("subjects") if isinstance(static, Mapping) else None
+    # Folders of before these were kept do not have them.
+    of = {str(name) for name in names} if isinstance(names, list) else set()
+    found = subject_names(recording, worn)
+    if not of or not found or of & found:
+        return []
+    return [
+        Finding(
+            "another person",
+            "warn",
+            recording.source,
+            f"the markers are those of {' and '.join(sorted(found))}, but the subject "
+            f"was calibrated as {' and '.join(sorted(of))}",
+            "use the subject folder of this person",
+        )
+    ]
+
+
+def usual_residual(report: Mapping[str, Any]) -> float | None:
+    """Return how far the markers were from the body at calibration, m.
+
+    The largest of its recordings' medians; after :func:`ikns.rewear` the new wearing's.
+    None where the report does not say.
+    """
+    worn_again = report.get("rewear")
+    rows = worn_again.get("natural") if isinstance(worn_again, Mapping) else None
+    rows = rows or report.get("explorations")
+    if not isinstance(rows, list):
+        return None
+    known = [row.get("residual_median_m") for row in rows if isinstance(row, Mapping)]
+    return max((float(one) for one in known if isinstance(one, float)), default=None)
+
+
+def subject_names(recording: Recording, worn: MarkerSet) -> set[str]:
+    """Return the subjects before the labels of a set's markers, in lower case."""
     columns = worn.columns(recording.labels)
     used = [recording.labels[i] for i in columns[columns >= 0]]
     return {label.rsplit(":", 1)[0].casefold() for label in used if ":" in label}

@@ -30,6 +30,11 @@ _MOST_MARKER, _SUSPECT_MARKER = 0.08, 0.05
 _BEYOND, _SHARE = np.radians(30.0), 0.2
 #: Share of frames in which inverse kinematics may fail.
 _MOST_FAILED = 0.1
+#: Another person: so many times the distance of the markers from the body that there
+#: was at calibration, and more than this, m. In all 168 trials of seven people of
+#: UE_ADL, calibrated with four each, it is at most 1.1 times that. With 24 of the 42
+#: other people it is twice that in some trial; a name before the labels tells all.
+_MORE, _ANYONE = 2.0, 0.01
 #: What skin and modeling leave between a marker and the body, m.
 _SKIN_SD = 0.02
 #: Skin turns where the residual is at most this share of what it is with a cluster
@@ -42,11 +47,16 @@ _TRIED, _LEFT = 3, 0.3
 
 
 def judge_tracking(
-    where: str, skeleton: Skeleton, time: Array, markers: Array
+    where: str,
+    skeleton: Skeleton,
+    time: Array,
+    markers: Array,
+    *,
+    usual: float | None = None,
 ) -> list[Finding]:
     """Judge how a skeleton follows its markers (T, M, 3), m; NaN where not seen.
 
-    At times (T,), s.
+    At times (T,), s. `usual` is the residual at calibration, m.
     """
     worn = skeleton.marker_set
     rows = _glances(markers)
@@ -77,6 +87,8 @@ def judge_tracking(
             )
         ]
     findings = _residual(where, worn.labels, residual, off)
+    if not findings and usual is not None:
+        findings = _unlike(where, float(np.nanmedian(motion.residual)), usual)
     findings += _turning_skin(where, skeleton, some, residual)
     findings += judge_slips(where, skeleton, time[rows], motion.q, placed, some)
     if share.max() > _SHARE:
@@ -219,6 +231,23 @@ def _residual(
             f"{'' if all_of_them else 'for one marker '}with the static trial of "
             "this person and session: a marker moved, or has another marker's name",
             (labels[worst],),
+        )
+    ]
+
+
+def _unlike(where: str, residual: float, usual: float) -> list[Finding]:
+    """Say that the markers are much farther from the body than at calibration, m."""
+    if not residual > max(_MORE * usual, _ANYONE):
+        return []
+    return [
+        Finding(
+            "another person",
+            "warn",
+            where,
+            f"the markers are {1000 * residual:.0f} mm from the body in the median "
+            f"frame, {1000 * usual:.0f} mm at calibration: another person, or markers "
+            "that were put on again",
+            "use this person's subject folder, or `ikns calibrate --rewear`",
         )
     ]
 
