@@ -477,7 +477,8 @@ def test_labels_of_another_set_name_it(data):
         ikns.scale(generic(), lift)
     # A body keeps its markers.
     (told,) = check_recordings([lift], skeleton=person()).findings
-    assert "calibrate with --marker-set ue_adl, or use recordings" in told.sentence
+    assert "calibrate with --marker-set ue_adl (in Python" in told.sentence
+    assert "or use recordings with markers of oxford24" in told.sentence
     # A set of one's own may leave markers out.
     own = MarkerSet.load("ue_adl")
     right = [m.label for m in own.markers if not m.label.startswith("L")]

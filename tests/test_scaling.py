@@ -257,6 +257,22 @@ def test_forearm_agrees_with_the_tape_as_far_as_landmarks_do(data, generic):
     assert abs(report.lengths["left_forearm"] - 0.235) < 0.025
 
 
+def test_the_set_is_the_bodys_own_unless_another_is_given(data):
+    static = read(data / "ue_adl" / "ADL005" / "ADL005_static.csv")
+    with pytest.raises(MarkerMismatch, match=r'in Python marker_set="ue_adl"'):
+        scale(Skeleton.load(), static)
+    worn = Skeleton.load(marker_set="ue_adl")
+    found, _ = scale(worn, static)
+    given, _ = scale(Skeleton.load(), static, marker_set="ue_adl")
+    assert found.marker_set == given.marker_set
+    # A person lacks static-only markers, a body for a new trial of theirs does not.
+    again, _ = scale(found, static)
+    assert again.marker_set.labels == given.marker_set.labels
+    mine = replace(worn.marker_set, name="mine")
+    own, _ = scale(worn.with_markers(mine), static)
+    assert own.marker_set.markers == given.marker_set.markers
+
+
 def test_a_custom_set_is_accepted_as_an_object(generic):
     worn = MarkerSet.load("oxford24")
     trusted = tuple(replace(m, placement_sd=(1e-3, 1e-3, 1e-3)) for m in worn.markers)

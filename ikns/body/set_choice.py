@@ -4,9 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 from ikns.body.marker_set import MarkerSet, label_keys
+
+
+def set_worn(choice: str | Path | MarkerSet | None, own: MarkerSet) -> MarkerSet:
+    """Return the marker set that is meant; None means the body's own.
+
+    Where that is a shipped one, all of it: a person's body lacks static-only markers.
+
+    >>> clusters = MarkerSet.load("ue_adl")
+    >>> set_worn(None, clusters.without_static()) == clusters
+    True
+    """
+    if choice is None:
+        return MarkerSet.load(own.name) if own.name in MarkerSet.names() else own
+    return choice if isinstance(choice, MarkerSet) else MarkerSet.load(choice)
 
 
 class SetMatch(NamedTuple):
@@ -72,11 +87,17 @@ def _shipped() -> tuple[MarkerSet, ...]:
     return tuple(MarkerSet.load(name) for name in MarkerSet.names())
 
 
+def option(name: str) -> str:
+    """Say how a set is given on the command line and in Python."""
+    return f'--marker-set {name} (in Python marker_set="{name}")'
+
+
 def set_advice(worn: MarkerSet, labels: Sequence[str]) -> str:
     """Say which set to choose instead of one that does not fit."""
     best = better_set(worn, labels)
     if best is not None:
-        return f"use --marker-set {best.name}, of which {best.found} of {best.of} fit"
+        fit = f"{best.found} of {best.of} fit"
+        return f"use {option(best.name)}, of which {fit}"
     return (
         "choose the set that was worn with --marker-set, or describe it with "
         "`ikns markers new`"

@@ -44,7 +44,7 @@ def fit_explorations(
     explorations: Sequence[Recording],
     motions: Sequence[Motion],
     *,
-    marker_set: str | Path | MarkerSet = "oxford24",
+    marker_set: str | Path | MarkerSet | None = None,
     min_duration: float = 1.0,
     known: bool = False,
 ) -> tuple[Skeleton, BodyReport | None]:

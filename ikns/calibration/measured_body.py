@@ -11,6 +11,7 @@ import numpy as np
 
 from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.marker_set import MarkerSet
+from ikns.body.set_choice import set_worn
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.exploration_fit import BodyReport, fit_explorations
 from ikns.calibration.judged_motion import require_usable
@@ -40,7 +41,7 @@ def measured_body(
     natural: Sequence[Recording],
     *,
     generic: Skeleton | None,
-    marker_set: str | Path,
+    marker_set: str | Path | MarkerSet | None,
     chain: ChainLike,
     min_static: float,
     progress: Callable[[str, int, int], None] | None,
@@ -54,23 +55,24 @@ def measured_body(
     say = progress or silent
     say(SCALING, 0, 1)
     body = Skeleton.load() if generic is None else generic
+    worn = set_worn(marker_set, body.marker_set)
     if static is None:
         if generic is None:
             raise InvalidInput(
                 "expected a static trial, or a body from stature, mass and sex."
             )
-        skeleton, scaling = scaled_body(body, explorations, marker_set=marker_set)
+        skeleton, scaling = scaled_body(body, explorations, marker_set=worn)
         missing = [_assumed(scaling)]
     else:
         with naming(static.source):
             skeleton, scaling = scale(
                 body,
                 static,
-                marker_set=marker_set,
+                marker_set=worn,
                 min_duration=min_static,
                 known=known,
             )
-        missing = _left_out(static, scaling, marker_set, explorations, chain)
+        missing = _left_out(static, scaling, worn, explorations, chain)
     recordings = (*explorations, *natural)
     warned: list[str] = []
     for k, recording in enumerate(recordings):
@@ -92,7 +94,7 @@ def measured_body(
             static,
             explorations,
             tracked[: len(explorations)],
-            marker_set=marker_set,
+            marker_set=worn,
             min_duration=min_static,
             known=known,
         )
@@ -139,7 +141,7 @@ def _tracked(
 def _left_out(
     static: Recording,
     scaling: ScalingReport,
-    marker_set: str | Path,
+    worn: MarkerSet,
     recordings: Sequence[Recording],
     chain: ChainLike,
 ) -> list[str]:
@@ -147,7 +149,6 @@ def _left_out(
 
     The other arm's may be missing from all of them: nobody asked for it.
     """
-    worn = MarkerSet.load(marker_set)
     own = ("thorax", *chain_sides(chain))
     counts = np.array([marker.link.startswith(own) for marker in worn.markers])
     for recording in recordings:

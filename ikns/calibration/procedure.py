@@ -11,6 +11,7 @@ import numpy as np
 
 from ikns.arrays import Array, Mask
 from ikns.body.chains import ChainLike, chain_joints
+from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton, check_chain
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.freedoms import check_freedoms, freedom_motions
@@ -49,7 +50,7 @@ def calibrate(
     *,
     natural: Sequence[Recording] = (),
     generic: Skeleton | None = None,
-    marker_set: str | Path = "oxford24",
+    marker_set: str | Path | MarkerSet | None = None,
     chain: ChainLike = "right_arm",
     n_points: int = 10,
     n_dof: int = 1,
@@ -81,8 +82,8 @@ def calibrate(
     generic : Skeleton, optional
         Body to start from; :meth:`Skeleton.from_anthropometry` when stature, mass and
         sex are known. Default: the generic adult.
-    marker_set : str or Path
-        The markers on the person.
+    marker_set : str, path or MarkerSet, optional
+        The markers on the person; by default those of `generic`.
     chain : str or Chain
         Joints of the task, by the name of a chain that comes with the package
         (``urdf/chains.toml``) or as a :class:`ikns.Chain`. All others are extrinsic:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ikns.body.marker_set import Marker, MarkerSet
+from ikns.body.set_choice import set_worn
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.scaling import ScalingReport
 from ikns.calibration.size_fit import SEGMENT_SD, SIDE_SD
@@ -31,7 +32,7 @@ def scaled_body(
     generic: Skeleton,
     recordings: Sequence[Recording],
     *,
-    marker_set: str | Path | MarkerSet = "oxford24",
+    marker_set: str | Path | MarkerSet | None = None,
 ) -> tuple[Skeleton, ScalingReport]:
     """Put a marker set on a body from stature, mass and sex, without a static trial.
 
@@ -41,8 +42,8 @@ def scaled_body(
         From :meth:`Skeleton.from_anthropometry`.
     recordings : sequence of Recording
         What will be tracked: the joints of an arm without markers in them are held.
-    marker_set : str, path or MarkerSet
-        The markers on the person.
+    marker_set : str, path or MarkerSet, optional
+        The markers on the person; by default those of the generic skeleton.
 
     Returns
     -------
@@ -66,9 +67,7 @@ def scaled_body(
     >>> round(1000 * report.length_sd["right_forearm"])
     12
     """
-    worn = (
-        marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
-    )
+    worn = set_worn(marker_set, generic.marker_set)
     seen = np.zeros(len(worn.markers), dtype=bool)
     for recording in recordings:
         markers = worn.pick(recording.labels, recording.markers)

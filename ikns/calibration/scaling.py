@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ikns.arrays import Array
 from ikns.body.marker_set import MarkerSet
+from ikns.body.set_choice import set_worn
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding, refused, worst_first
 from ikns.calibration.judge.labels import judge_labels
@@ -86,7 +87,7 @@ def scale(
     generic: Skeleton,
     static: Recording,
     *,
-    marker_set: str | Path | MarkerSet = "oxford24",
+    marker_set: str | Path | MarkerSet | None = None,
     min_duration: float = 1.0,
     known: bool = False,
 ) -> tuple[Skeleton, ScalingReport]:
@@ -98,8 +99,8 @@ def scale(
         The generic body, or one from stature, mass and sex.
     static : Recording
         Static trial.
-    marker_set : str, path or MarkerSet
-        The markers on the person.
+    marker_set : str, path or MarkerSet, optional
+        The markers on the person; by default those of the generic skeleton.
     min_duration : float
         Shortest static trial to accept, s.
     known : bool
@@ -152,7 +153,7 @@ def judge_static(
     generic: Skeleton,
     static: Recording,
     *,
-    marker_set: str | Path | MarkerSet = "oxford24",
+    marker_set: str | Path | MarkerSet | None = None,
     min_duration: float = 1.0,
     known: bool = False,
     repair: bool = True,
@@ -164,9 +165,7 @@ def judge_static(
     Without `repair` names are not exchanged to see what fits: far faster.
     """
     where = static.source
-    worn = (
-        marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
-    )
+    worn = set_worn(marker_set, generic.marker_set)
     others = judge_labels(where, static.labels, worn, calibrated=known)
     if refused(others):
         return StaticJudgment(others, None, None)

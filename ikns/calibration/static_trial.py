@@ -11,7 +11,7 @@ import numpy as np
 from ikns.arrays import Array, Mask
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.marker_set import MarkerSet
-from ikns.body.set_choice import better_set, set_advice
+from ikns.body.set_choice import better_set, set_advice, set_worn
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding
 from ikns.errors import MarkerMismatch, NotEnoughData
@@ -27,7 +27,7 @@ def static_posture(
     generic: Skeleton,
     static: Recording,
     *,
-    marker_set: str | Path | MarkerSet = "oxford24",
+    marker_set: str | Path | MarkerSet | None = None,
     min_duration: float = 1.0,
 ) -> tuple[Skeleton, Array, float]:
     """Average a static trial, and put the marker set on the generic body.
@@ -36,9 +36,7 @@ def static_posture(
     its nominal places, where joints of an arm without any marker are held; mean marker
     positions (M, 3) m, NaN where never seen; and the duration of the trial, s.
     """
-    worn = (
-        marker_set if isinstance(marker_set, MarkerSet) else MarkerSet.load(marker_set)
-    )
+    worn = set_worn(marker_set, generic.marker_set)
     if short := too_short(static, min_duration):
         raise NotEnoughData(short[0].sentence)
     target = _mean_posture(static, worn)

@@ -91,7 +91,7 @@ def fit_lengths(
     static: Recording,
     recordings: Sequence[Recording],
     *,
-    marker_set: str | Path | MarkerSet = "oxford24",
+    marker_set: str | Path | MarkerSet | None = None,
     n_frames: int = 60,
     independent_frames: float = 1.0,
     marker_sd: float | None = None,

@@ -142,8 +142,10 @@ class Skeleton:
         """Return the same body with markers at the nominal places for its size.
 
         A shipped set has the places on the generic body; on a longer limb they lie
-        farther apart.
+        farther apart. The body's own set stays as it is.
         """
+        if marker_set is self.marker_set:
+            return self
         generic = Skeleton.load().urdf
         sizes = relative_sizes(self.urdf, generic)
         sized = Skeleton(generic, marker_set).resized(sizes).marker_set

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from ikns.body.marker_set import MarkerSet, label_keys
-from ikns.body.set_choice import better_set, match_set
+from ikns.body.set_choice import better_set, match_set, option
 from ikns.calibration.judge.finding import Finding, say_markers
 from ikns.motion.unseen import unseen_labels, unseen_words
 from ikns.recording.recording import Recording
@@ -34,10 +34,10 @@ def judge_labels(
             "refuse" if own.share < _ANOTHER else "warn",
             where,
             f"it has {best}, but {own}",
-            f"calibrate with --marker-set {best.name}, or use recordings with "
+            f"calibrate with {option(best.name)}, or use recordings with "
             f"markers of {worn.name}"
             if calibrated
-            else f"use --marker-set {best.name}",
+            else f"use {option(best.name)}",
         )
     ]
 

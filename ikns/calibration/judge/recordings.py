@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ikns.body.marker_set import MarkerSet
-from ikns.body.set_choice import better_set, set_advice
+from ikns.body.set_choice import better_set, set_advice, set_worn
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
@@ -66,7 +66,7 @@ def check_recordings(
     static: Recording | None = None,
     skeleton: Skeleton | None = None,
     generic: Skeleton | None = None,
-    marker_set: str | Path | MarkerSet = "oxford24",
+    marker_set: str | Path | MarkerSet | None = None,
     min_static: float = 1.0,
     report: Mapping[str, Any] | None = None,
 ) -> Check:
@@ -84,8 +84,9 @@ def check_recordings(
         The person's, from a calibration; instead of a static trial.
     generic : Skeleton, optional
         Body to scale; the generic adult by default.
-    marker_set : str, path or MarkerSet
-        The markers on the person; the skeleton's own where there is one.
+    marker_set : str, path or MarkerSet, optional
+        The markers on the person; by default those of `generic`, and with a skeleton
+        its own.
     min_static : float
         Shortest static trial to accept, s.
     report : mapping, optional
@@ -123,11 +124,7 @@ def check_recordings(
     if skeleton is not None:
         worn = skeleton.marker_set
     else:
-        worn = (
-            marker_set
-            if isinstance(marker_set, MarkerSet)
-            else MarkerSet.load(marker_set)
-        )
+        worn = set_worn(marker_set, body.marker_set)
     findings: list[Finding] = []
     judged: list[tuple[str, str]] = []
     if static is not None:
