@@ -11,6 +11,7 @@ from command_line import check_refused
 import ikns
 from ikns.analysis.compare import crosstalk
 from ikns.cli import main
+from ikns.live.control.recorded import control_table
 from ikns.view.scene import recording_scene
 
 
@@ -76,9 +77,16 @@ def test_compare_reads_crosstalk_by_the_method_and_directions_by_the_paper(
     assert paper["crosstalk"]["mean_change"] != intent["crosstalk"]["mean_change"]
 
 
-def test_view_plays_the_c_of_the_method(files, tmp_path, capsys):
+def test_view_plays_the_c_of_the_method(files, tmp_path, capsys, monkeypatch):
     page = tmp_path / "new.html"
     person, recording = files / "person", files / "free.c3d"
+    played = []
+
+    def noted(*args, c, **own):
+        played.append(c)
+        return recording_scene(*args, c=c, **own)
+
+    monkeypatch.setattr("ikns.view.scene.recording_scene", noted)
     argv = ["view", str(person), str(recording), "--out", str(page), "--json"]
     assert main([*argv, "--method", "intent"]) == 0
     assert json.loads(capsys.readouterr().out)["method"] == "intent"
@@ -86,6 +94,10 @@ def test_view_plays_the_c_of_the_method(files, tmp_path, capsys):
     subject, frames = ikns.Subject.load(person), ikns.read(recording)
     motion = ikns.MarkerIK(subject.skeleton).track(frames, chain="right_arm")
     c = subject.readout("intent").control_signal(subject.skeleton, motion)
+    # As `ikns control` has it, before it is clipped: empty where it is too uncertain.
+    table = control_table(subject, motion, recording=frames, method="intent")
+    np.testing.assert_array_equal(np.clip(played[0][:, 0], 0, 1), table.rows[:, 1])
+    assert np.nanmax(played[0]) > 1
     scene = recording_scene(
         subject.skeleton,
         subject.null_space_map,

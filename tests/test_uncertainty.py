@@ -20,7 +20,7 @@ from ikns.live.control import FrameSolver
 from ikns.live.control.controller import Controller
 from ikns.live.control.frame import MAX_UNCERTAINTY
 from ikns.live.control.intent import intent_numbers
-from ikns.live.control.recorded import control_table
+from ikns.live.control.recorded import control_table, uncertain_sentence
 from ikns.live.control.settings import ControlSettings
 from ikns.motion.marker_ik import PRIOR, MarkerIK
 from ikns.nullspace.map import NullSpaceMap
@@ -215,6 +215,17 @@ def test_a_recording_is_judged_as_it_is_live(method):
     assert np.mean(close) > 0.97
     assert np.mean(np.isnan(c) == np.isnan(live)) > 0.99
     assert found.summary["frames_uncertain"] == np.sum(~(deviation <= MAX_UNCERTAINTY))
+    assert not uncertain_sentence(found.summary, MAX_UNCERTAINTY)
+    # Where the hand is does not depend on how well c is known, and why c is missing in
+    # many frames is told.
+    none = control_table(
+        subject, motion, recording=recording, method=method, max_uncertainty=1e-9
+    )
+    assert np.isnan(none.rows[:, none.columns.index("c")]).all()
+    at = none.columns.index("inside")
+    np.testing.assert_array_equal(none.rows[:, at], found.rows[:, at])
+    assert set(none.rows[:, at]) == {0.0, 1.0}
+    assert f"in {len(c)} of {len(c)} frames" in uncertain_sentence(none.summary, 1e-9)
 
 
 def test_limits_are_the_same_everywhere_and_positive(person):

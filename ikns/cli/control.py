@@ -39,7 +39,8 @@ def control(
         float,
         typer.Option(
             help="Leave c empty while its standard deviation is larger, as it is "
-            "when markers that c needs are hidden.",
+            "when markers that c needs are hidden, or where the learned range is "
+            "small.",
             min=0.0,
             max=10.0,
         ),
@@ -66,7 +67,11 @@ def control(
 
     from ikns.calibration.judged_motion import judged_motion
     from ikns.calibration.simulated import is_simulated
-    from ikns.live.control.recorded import control_table, jump_sentence
+    from ikns.live.control.recorded import (
+        control_table,
+        jump_sentence,
+        uncertain_sentence,
+    )
 
     calibrated = ikns.Subject.load(subject)
     with naming(str(subject)):
@@ -91,7 +96,8 @@ def control(
     write_csv(out, found.columns, found.rows, force=force)
     result = found.summary
     jumps = jump_sentence(method, result["jumps_outside"])
-    warned += [jumps] * bool(jumps)
+    why = uncertain_sentence(result, max_uncertainty)
+    warned += [said for said in (jumps, why) if said]
     simulated = is_simulated(calibrated, subject, [recording])
     _draw(figure, found, simulated=simulated, force=force)
     show(
@@ -120,8 +126,14 @@ def _rows(result: dict[str, Any]) -> list[list[Any]]:
         ["of these without a signal", result["frames_without_signal"]],
         ["of these, markers rejected", result["frames_rejected"]],
         ["of these, c too uncertain", result["frames_uncertain"]],
-        [f"% with the hand {result['inside_means']}", _percent(result["inside_share"])],
-        ["% with c clipped to 0 or 1", _percent(result["clipped_share"])],
+        [
+            f"of those with a signal, % with the hand {result['inside_means']}",
+            _percent(result["inside_share"]),
+        ],
+        [
+            "of those with a signal, % with c clipped to 0 or 1",
+            _percent(result["clipped_share"]),
+        ],
         ["median of c", round(result["c_median"], 3)],
         ["median standard deviation of c", round(result["uncertainty_median"], 4)],
         ["median marker residual, mm", round(1000 * result["residual_median_m"], 1)],
@@ -134,6 +146,8 @@ def _draw(
     """Draw c as the CSV file has it, with the hand's speed, if asked to."""
     if path is None:
         return
+    import numpy as np
+
     from ikns.view.signals import control_figure
 
     at, rows = found.columns.index, found.rows
@@ -142,8 +156,8 @@ def _draw(
         rows[:, 0],
         c,
         rows[:, at("hand_speed_m_s")],
-        # Where c is unknown the line is broken, which says it.
-        (rows[:, at("inside")] > 0) | (c != c).any(axis=1),
+        # Where the hand is unknown the lines are broken, which says it.
+        (rows[:, at("inside")] > 0) | np.isnan(rows[:, at("hand_speed_m_s")]),
         taught=found.summary["inside_means"],
         simulated=simulated,
     )

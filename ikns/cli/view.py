@@ -81,8 +81,9 @@ def view(
     """Show PCA points, volume and null space around the body, in one HTML file.
 
     With a recording the page plays it, together with the map and the c that --method
-    reads; also one that must not be used, and says what is wrong with it. --rerun and
-    --rrd show it on a timeline instead, with every marker, c and the residuals.
+    reads, with gaps where `ikns control` leaves it empty; also one that must not be
+    used, and says what is wrong with it. --rerun and --rrd show it on a timeline
+    instead, with every marker, c and the residuals.
     """
     inputs = [subject, recording]
     if rerun or rrd is not None:
@@ -229,6 +230,7 @@ def _scene(
     method: Method,
 ) -> Scene:
     """Track the recording, if there is one, and make the scene."""
+    from ikns.live.control.recorded import recorded_signal
     from ikns.motion.unseen import warn_unseen
     from ikns.view.scene import map_scene, recording_scene
 
@@ -241,7 +243,7 @@ def _scene(
         motion = ikns.MarkerIK(body).track(
             frames, chain=chain, progress=partial(report, Path(frames.source).name)
         )
-    c = person.readout(method).control_signal(body, motion)
+    c = recorded_signal(person, motion, recording=frames, method=method).raw
     if method != "paper":
         own["read_by"] = method
     return recording_scene(body, learned, chain, motion, frames, c=c, **own)

@@ -43,12 +43,13 @@ def view_in_rerun(
     check_inputs([recording], subject)
 
     from ikns.calibration.simulated import is_simulated
+    from ikns.live.control.recorded import recorded_signal
     from ikns.motion.unseen import warn_unseen
     from ikns.view.timeline import RerunLog, log_recording
 
     person = ikns.Subject.load(subject)
     with naming(str(subject)):
-        readout = person.readout(method)  # before anything is tracked
+        person.readout(method)  # before anything is tracked
     simulated = is_simulated(person, subject, [recording])
     frames, body = read(recording), person.skeleton
     warn_unseen(body, frames, person.chain)
@@ -56,7 +57,7 @@ def view_in_rerun(
         motion = ikns.MarkerIK(body).track(
             frames, chain=person.chain, progress=partial(report, recording.name)
         )
-    c = readout.control_signal(body, motion)
+    c = recorded_signal(person, motion, recording=frames, method=method).raw
     title = f"{recording.name}, {subject.resolve().name}"
     title += " (simulated)" * simulated
     log = RerunLog(rrd, title=title, force=force)

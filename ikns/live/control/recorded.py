@@ -21,6 +21,8 @@ from ikns.nullspace.signal_names import signal_names
 from ikns.numerics.median import finite_median
 from ikns.recording.recording import Recording
 
+#: Share of the frames without c that calls for a reason.
+_MANY = 0.25
 #: No person moves c by more from one frame of cameras to the next.
 _JUMP = 0.1
 
@@ -77,27 +79,14 @@ def control_table(
     InvalidInput
         When the subject was calibrated without the method.
     """
-    learned, chain = subject.null_space_map, subject.chain
-    if not max_uncertainty > 0:
-        raise InvalidInput(
-            f"expected a positive max_uncertainty, found {max_uncertainty:g}."
-        )
-    readout, n = subject.readout(method), len(motion.time)
-    inside = readout.inside(subject.skeleton, motion)
-    uncertainty, uncertain = np.full((n, learned.directions_.shape[1]), np.nan), 0
-    if recording is None or not _knows(readout):
-        raw = readout.control_signal(subject.skeleton, motion)
-    else:
-        uncertainty = _uncertainty(subject, readout, motion, recording)
-        raw, within = readout.of_postures(subject.skeleton, motion.q)
-        if raw.ndim == 1:
-            uncertainty = uncertainty[:, :1]
-        certain = uncertainty.reshape(raw.shape) <= max_uncertainty
-        believed = motion.believed(chain).reshape(n, *[1] * (raw.ndim - 1))
-        uncertain = int((~certain & believed).reshape(n, -1).any(axis=1).sum())
-        raw = np.where(certain & believed, raw, np.nan)
-        inside = within & np.isfinite(raw.reshape(n, -1)[:, 0])
-    raw = raw.reshape(n, -1)
+    chain, readout = subject.chain, subject.readout(method)
+    raw, inside, uncertainty, uncertain = recorded_signal(
+        subject,
+        motion,
+        recording=recording,
+        method=method,
+        max_uncertainty=max_uncertainty,
+    )
     c = np.clip(raw, 0.0, 1.0)
     names = signal_names(c.shape[1])
     known_worth = uncertainty[:, : c.shape[1]]
@@ -125,6 +114,62 @@ def control_table(
     columns = ["time_s", *names, "hand_speed_m_s", "inside", "residual_m"]
     columns += [f"{name}_uncertainty" for name in names]
     return ControlTable(columns, rows, summary)
+
+
+class RecordedSignal(NamedTuple):
+    """c of a recording before it is clipped, and where it can be relied upon."""
+
+    raw: NDArray[np.float64]  # (T, d), NaN where it is too uncertain or unknown
+    inside: NDArray[np.bool_]  # (T,), whether the arm is known to be where taught
+    uncertainty: NDArray[np.float64]  # (T, d), standard deviations; NaN where unknown
+    uncertain: int  # frames whose markers are believed, but c is too uncertain
+
+
+def recorded_signal(
+    subject: Subject,
+    motion: Motion,
+    *,
+    recording: Recording | None = None,
+    method: Method = "paper",
+    max_uncertainty: float = MAX_UNCERTAINTY,
+) -> RecordedSignal:
+    """Read c off a recording, unclipped; arguments as for :func:`control_table`."""
+    learned, chain = subject.null_space_map, subject.chain
+    if not max_uncertainty > 0:
+        raise InvalidInput(
+            f"expected a positive max_uncertainty, found {max_uncertainty:g}."
+        )
+    readout, n = subject.readout(method), len(motion.time)
+    inside = readout.inside(subject.skeleton, motion)
+    uncertainty, uncertain = np.full((n, learned.directions_.shape[1]), np.nan), 0
+    if recording is None or not _knows(readout):
+        raw = readout.control_signal(subject.skeleton, motion)
+    else:
+        uncertainty = _uncertainty(subject, readout, motion, recording)
+        raw, within = readout.of_postures(subject.skeleton, motion.q)
+        if raw.ndim == 1:
+            uncertainty = uncertainty[:, :1]
+        certain = uncertainty.reshape(raw.shape) <= max_uncertainty
+        known = motion.believed(chain)
+        believed = known.reshape(n, *[1] * (raw.ndim - 1))
+        uncertain = int((~certain & believed).reshape(n, -1).any(axis=1).sum())
+        raw = np.where(certain & believed, raw, np.nan)
+        inside = within & known
+    return RecordedSignal(raw.reshape(n, -1), inside, uncertainty, uncertain)
+
+
+def uncertain_sentence(summary: dict[str, Any], max_uncertainty: float) -> str:
+    """Say why c is unknown in many frames of a :class:`ControlTable`; else empty."""
+    unknown, frames = summary["frames_uncertain"], summary["frames"]
+    if unknown <= _MANY * frames:
+        return ""
+    return (
+        f"c is unknown in {unknown} of {frames} frames, as its standard deviation "
+        f"({summary['uncertainty_median']:.2g} in the median frame) is above "
+        f"{max_uncertainty:g}: the range learned there is small, or markers are "
+        "hidden; calibrate with wider swings of the elbow, or show c all the same with "
+        "a larger --max-uncertainty."
+    )
 
 
 def inside_means(readout: Readout) -> str:
