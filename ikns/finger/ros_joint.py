@@ -205,6 +205,6 @@ class RosJoint:
         others = sorted({e.type for e in self._node.subscribers(topic)} - {wanted})
         return (
             f"{self._name}: expected a controller that listens to {wanted}, found "
-            + (f"one for {others[0]}" if others else "nobody")
+            + (f"one for {others[0]}" if others else "none")
             + "; start it, or give another topic or type."
         )
