@@ -29,8 +29,14 @@ def old(files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_control_says_what_a_subject_has(files, old, tmp_path, capsys):
+    advised = shutil.copytree(files / "person", tmp_path / "advised")
+    report = json.loads((advised / "calibration.json").read_text())
+    assert report["methods"]["summary"]["recommended"] is None  # too few reaches
+    report["methods"]["summary"]["recommended"] = "intent"
+    (advised / "calibration.json").write_text(json.dumps(report))
     advice = "; its calibration recommends intent"
-    for folder, known, more in ((files / "person", 3, advice), (old, 1, "")):
+    subjects = (advised, 3, advice), (files / "person", 3, ""), (old, 1, "")
+    for folder, known, more in subjects:
         argv = ["control", "--subject", str(folder), str(files / "free.c3d")]
         out = tmp_path / f"{folder.name}.csv"
         assert main([*argv, "--out", str(out), "--json"]) == 0
@@ -116,4 +122,4 @@ def test_view_of_a_map_alone_is_the_paper_s(files, tmp_path, capfd):
     sentence = check_refused(
         [*argv, "--out", str(tmp_path / "x.html")], tmp_path, capfd
     )
-    assert "expected a recording to compute c from with --method intent" in sentence
+    assert "--method intent needs a recording to compute c from" in sentence
