@@ -92,13 +92,50 @@ def option(name: str) -> str:
     return f'--marker-set {name} (in Python marker_set="{name}")'
 
 
-def set_advice(worn: MarkerSet, labels: Sequence[str]) -> str:
-    """Say which set to choose instead of one that does not fit."""
+def other_set(
+    worn: MarkerSet, labels: Sequence[str], *, calibrated: bool
+) -> tuple[str, str] | None:
+    """Say that another shipped set fits labels better, and what to do; None if not.
+
+    `calibrated` says that the set is that of a person's body, not one to be chosen.
+    """
     best = better_set(worn, labels)
-    if best is not None:
-        fit = f"{best.found} of {best.of} fit"
-        return f"use {option(best.name)}, of which {fit}"
-    return (
-        "choose the set that was worn with --marker-set, or describe it with "
+    if best is None:
+        return None
+    right = f"use {option(best.name)}"
+    if calibrated:
+        right = (
+            f"calibrate with {option(best.name)}, or use recordings with markers of "
+            f"{worn.name}"
+        )
+    return f"it has {best}, but only {match_set(worn, labels)}", right
+
+
+def too_few_of_set(
+    source: str, worn: MarkerSet, labels: Sequence[str], *, calibrated: bool = False
+) -> str:
+    """Say that a recording has too few markers of a set, and which others."""
+    if other := other_set(worn, labels, calibrated=calibrated):
+        return f"{source}: {other[0]}; {other[1]}."
+    there = worn.columns(labels)
+    have = [m.label for m, c in zip(worn.markers, there, strict=True) if c >= 0]
+    lack = [m.label for m in worn.markers if m.label not in have]
+    own = set(there.tolist())
+    others = [x.rsplit(":", 1)[-1] for i, x in enumerate(labels) if i not in own]
+    right = (
+        f"use recordings with markers of {worn.name}"
+        if calibrated
+        else "give the set that was worn as --marker-set, or make one with "
         "`ikns markers new`"
     )
+    return (
+        f"{source}: only {len(have)} of {len(worn.markers)} markers of {worn.name} are "
+        f"in it{_listed(' (', have, ')')}; missing: {_listed('', lack)}; its other "
+        f"labels: {_listed('', others) or 'none'}; {right}."
+    )
+
+
+def _listed(before: str, labels: Sequence[str], after: str = "", most: int = 4) -> str:
+    """Return the first few labels; nothing for none."""
+    shown = ", ".join([*labels[:most], *(["..."] if len(labels) > most else [])])
+    return before + shown + after if labels else ""

@@ -11,7 +11,7 @@ import numpy as np
 from ikns.arrays import Array, Mask
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.marker_set import MarkerSet
-from ikns.body.set_choice import better_set, set_advice, set_worn
+from ikns.body.set_choice import other_set, set_worn, too_few_of_set
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding
 from ikns.errors import MarkerMismatch, NotEnoughData
@@ -75,12 +75,12 @@ def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
     markers = worn.pick(static.labels, static.markers)
     seen = seen_markers(markers)
     if not seen.any():
-        raise MarkerMismatch(
-            f"{static.source}: expected markers of {worn.name} "
-            f"({', '.join(worn.labels[:4])}, ...), found "
-            f"{', '.join(static.labels[:4]) or 'none'}; "
-            f"{set_advice(worn, static.labels)}."
-        )
+        if (worn.columns(static.labels) >= 0).any():
+            raise MarkerMismatch(
+                f"{static.source}: no marker of {worn.name} is in any frame; export "
+                "the labeled trajectories."
+            )
+        raise MarkerMismatch(too_few_of_set(static.source, worn, static.labels))
     # No one stands quite still, so markers averaged over different frames do not match:
     # where enough frames show everything, only those count.
     complete = seen[:, seen.any(axis=0)].all(axis=1)
@@ -121,7 +121,8 @@ def absent_joints(
     bare = sorted(links - shown)
     if bare:
         wanted = [m.label for m in worn.markers if m.link == bare[0]]
-        advice = f"; {set_advice(worn, labels)}" if better_set(worn, labels) else ""
+        other = other_set(worn, labels, calibrated=False)
+        advice = "" if other is None else f"; {other[0]}: {other[1]}"
         raise MarkerMismatch(
             f"{source}: the segment {bare[0]} has no marker; expected at least "
             f"one of {', '.join(wanted)} of {worn.name}{advice}."

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from ikns.body.marker_set import MarkerSet, label_keys
-from ikns.body.set_choice import better_set, match_set, option
-from ikns.calibration.judge.finding import Finding, say_markers
+from ikns.body.set_choice import better_set, match_set, other_set
+from ikns.calibration.judge.finding import Finding, Severity, say_markers
 from ikns.motion.unseen import unseen_labels, unseen_words
 from ikns.recording.recording import Recording
 
@@ -24,22 +24,13 @@ def judge_labels(
 
     `calibrated` says that the set is that of a person's body, not one to be chosen.
     """
-    best = better_set(worn, labels)
-    if best is None:
+    other = other_set(worn, labels, calibrated=calibrated)
+    if other is None:
         return []
-    own = match_set(worn, labels)
-    return [
-        Finding(
-            "marker set",
-            "refuse" if own.share < _ANOTHER else "warn",
-            where,
-            f"it has {best}, but {own}",
-            f"calibrate with {option(best.name)}, or use recordings with "
-            f"markers of {worn.name}"
-            if calibrated
-            else f"use {option(best.name)}",
-        )
-    ]
+    severity: Severity = (
+        "refuse" if match_set(worn, labels).share < _ANOTHER else "warn"
+    )
+    return [Finding("marker set", severity, where, *other)]
 
 
 def judge_unseen(recording: Recording, worn: MarkerSet) -> list[Finding]:

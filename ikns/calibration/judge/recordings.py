@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ikns.body.marker_set import MarkerSet
-from ikns.body.set_choice import better_set, set_advice, set_worn
+from ikns.body.set_choice import better_set, set_worn, too_few_of_set
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
@@ -169,12 +169,7 @@ def _require_markers(recording: Recording, worn: MarkerSet) -> None:
         known = int((worn.columns(recording.labels) >= 0).sum())
     # Where another set fits, the judge says so.
     if known < 3 and better_set(worn, recording.labels) is None:
-        raise MarkerMismatch(
-            f"{recording.source}: expected markers of {worn.name} "
-            f"({', '.join(worn.labels[:4])}, ...), found "
-            f"{', '.join(recording.labels[:4])}, ...; "
-            f"{set_advice(worn, recording.labels)}."
-        )
+        raise MarkerMismatch(too_few_of_set(recording.source, worn, recording.labels))
 
 
 def _still(recording: Recording, worn: MarkerSet) -> bool:

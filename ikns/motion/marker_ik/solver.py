@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from ikns.arrays import Array, Indices
 from ikns.body.chains import SIDES, ChainLike
-from ikns.body.set_choice import set_advice
+from ikns.body.set_choice import too_few_of_set
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, MarkerMismatch, NotEnoughData, naming
 from ikns.motion.ends import with_ends
@@ -179,10 +179,9 @@ class MarkerIK:
         known = found & self._tracked
         if known.sum() < 3:
             raise MarkerMismatch(
-                f"{recording.source}: expected markers of {marker_set.name} "
-                f"({', '.join(marker_set.labels[:4])}, ...), found "
-                f"{', '.join(recording.labels[:4])}, ...; "
-                f"{set_advice(marker_set, recording.labels)}."
+                too_few_of_set(
+                    recording.source, marker_set, recording.labels, calibrated=True
+                )
             )
         markers = np.ascontiguousarray(
             marker_set.pick(recording.labels, recording.markers), dtype=np.float64
@@ -195,7 +194,7 @@ class MarkerIK:
                     raise NotEnoughData(
                         f"expected at least 2 frames, as one shows no speed, found {n}."
                     )
-                require_sight(self.skeleton, visibility, chain)
+                require_sight(self.skeleton, visibility, chain, recording.labels)
         # Start where most markers are seen, then go both ways.
         visible = seen_markers(markers)[:, self._tracked].sum(axis=1)
         start = int(np.argmax(visible))

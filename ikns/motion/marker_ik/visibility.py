@@ -7,7 +7,7 @@ segment of its arms are, live and offline alike; then all their joints are known
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import SIDES, ChainLike, chain_sides
+from ikns.body.set_choice import other_set
 from ikns.body.skeleton import Skeleton
 from ikns.errors import MarkerMismatch
 from ikns.motion.motion import all_seen
@@ -121,8 +122,16 @@ def visible_segments(skeleton: Skeleton, markers: Array) -> Visibility:
     return Visibility(names, shown, known)
 
 
-def require_sight(skeleton: Skeleton, visibility: Visibility, chain: ChainLike) -> None:
-    """Refuse a recording that never shows a segment of a chain, or the thorax."""
+def require_sight(
+    skeleton: Skeleton,
+    visibility: Visibility,
+    chain: ChainLike,
+    labels: Sequence[str],
+) -> None:
+    """Refuse a recording that never shows a segment of a chain, or the thorax.
+
+    `labels` are those of the recording; where another set fits them, that is the cause.
+    """
     worn = skeleton.marker_set
     for link, (own, need) in sight_needs(skeleton, chain).items():
         if not own:
@@ -130,6 +139,8 @@ def require_sight(skeleton: Skeleton, visibility: Visibility, chain: ChainLike) 
                 f"expected a marker on the segment {link}, found none in {worn.name}."
             )
         if not visibility.seen[:, visibility.segments.index(link)].any():
+            if other := other_set(worn, labels, calibrated=True):
+                raise MarkerMismatch(f"{other[0]}; {other[1]}.")
             raise MarkerMismatch(
                 f"the segment {link} is never visible; expected at least {need} of "
                 f"{', '.join(worn.labels[i] for i in own)} of {worn.name} in a frame."
