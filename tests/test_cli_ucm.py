@@ -178,7 +178,7 @@ def test_input_that_cannot_be_split_is_refused_in_one_sentence(
     for path in same:
         path.write_bytes(reaches[0].read_bytes())
     assert "constant" in refused(command(same, files))
-    assert "near a PCA point" in refused(command([still], files))
+    assert "at no PCA point was the hand held" in refused(command([still], files))
     assert "ends in .png, .svg or .pdf" in refused(
         command(reaches, files, "--figure", tmp_path / "split.jpg")
     )

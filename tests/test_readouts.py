@@ -304,7 +304,7 @@ def test_jumps_outside_the_volume_are_counted_and_told():
 def test_natural_movement_that_covers_nothing_is_refused():
     run = small_person.protocol()
     still = small_person.cut(run.points.recording, 0, 60)  # one place
-    with pytest.raises(NotEnoughData, match="natural movement over the work space"):
+    with pytest.raises(NotEnoughData, match="so this is no natural movement"):
         calibrate(run.static.recording, [run.points.recording], natural=[still])
 
 

@@ -126,7 +126,7 @@ def test_what_shows_nothing_is_refused():
         rewear(own, static, [free])
     place = np.flatnonzero(other.points.point == 0)
     held = small_person.cut(other.points.recording, place[0], place[-1])
-    with pytest.raises(NotEnoughData, match="over the work space, found a hand"):
+    with pytest.raises(NotEnoughData, match="so this is no natural movement"):
         rewear(subject, static, [held])
     left = dataclasses.replace(subject, chain="left_arm")
     with pytest.raises(NotEnoughData, match=r"expected natural movement of the left"):

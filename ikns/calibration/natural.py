@@ -37,10 +37,19 @@ def check_covered(wrist_in_thorax: Array) -> None:
     span = np.ptp(np.quantile(w, [0.01, 0.99], axis=0), axis=0) if len(w) else 0
     if np.max(span) < LEAST_COVERED:
         raise NotEnoughData(
-            "expected natural movement over the work space, found a hand that "
-            f"moves within {1e3 * np.max(span):.0f} mm: reach and carry things, "
-            "20 s over all of it."
+            f"the hand moves by {_millimeters(float(np.max(span)))}, so this is no "
+            "natural movement; record 20 s of reaching and carrying across the whole "
+            "workspace."
         )
+
+
+def _millimeters(meters: float) -> str:
+    """Say a width.
+
+    >>> _millimeters(0.0002), _millimeters(0.042)
+    ('less than 1 mm', '42 mm')
+    """
+    return f"{1e3 * meters:.0f} mm" if meters >= 1e-3 else "less than 1 mm"
 
 
 def check_own_arm(natural: Sequence[Motion], chain: ChainLike) -> None:

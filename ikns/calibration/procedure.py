@@ -33,7 +33,7 @@ from ikns.motion.excursion import other_hand_moves
 from ikns.motion.marker_ik.rejection import rejection_sentence
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
-from ikns.nullspace.map.samples import no_still_sample
+from ikns.nullspace.map.samples import no_still_sample, samples_in
 from ikns.nullspace.readout import Readout
 from ikns.recording.recording import Recording
 
@@ -155,7 +155,7 @@ def calibrate(
         (m, still_mask(m, chain, max_hand_speed=max_hand_speed, min_duration=min_rest))
         for m in motions
     ]
-    enough = int(np.ceil(min_still * explorations[0].rate))
+    enough = samples_in(min_still, explorations[0].rate)
     learned = NullSpaceMap(
         n_points,
         n_dof=n_dof,

@@ -86,7 +86,10 @@ def compare_visited(
     # The analytic map needs samples at each of its points.
     points = np.flatnonzero(counts > 0)
     if not points.size:
-        raise NotEnoughData("expected still samples near a PCA point, found none.")
+        raise NotEnoughData(
+            "the hand was never held near a PCA point; use the recording that the map "
+            "was learned from, or one with the hand held at its points."
+        )
     some = NullSpaceMap.from_arrays(
         learned.centers_[points],
         learned.directions_[points],

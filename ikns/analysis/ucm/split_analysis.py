@@ -19,6 +19,7 @@ from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap, still_mask
+from ikns.nullspace.map.samples import samples_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,11 +170,11 @@ def analyze_points(
         near[gate] = nearest_center(places, learned.centers_, radius=learned.radius_)[0]
     counts = np.bincount(near[near >= 0], minlength=len(learned.centers_))
     step = float(np.median(np.diff(motion.time)))
-    least = max(len(chain_joints(chain)) + 1, int(np.ceil(min_still / step)))
+    least = max(len(chain_joints(chain)) + 1, samples_in(min_still, 1 / step))
     if counts.max() < least:
         raise NotEnoughData(
-            f"expected at least {least} samples with the hand slower than "
-            f"{max_hand_speed:g} m/s near a PCA point, found {counts.max()} at most."
+            f"at no PCA point was the hand held (slower than {max_hand_speed:g} m/s) "
+            f"for {least} samples; the most was {counts.max()}."
         )
     points = {}
     for k in np.flatnonzero(counts >= least).tolist():

@@ -30,6 +30,7 @@ from ikns.live.calibration.natural_verdict import (
 from ikns.live.calibration.verdict import ONE_PLACE, Verdict
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
+from ikns.nullspace.map.samples import samples_in
 from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.recording.recording import Recording
 
@@ -98,7 +99,7 @@ def judge_point(
         "residual_mm": millimeters(median(motion.residual)),
     }
     # As in the calibration, which leaves points with fewer samples out.
-    enough = max(int(np.ceil(min_still * recording.rate)), len(chain_joints(chain)) + 1)
+    enough = max(samples_in(min_still, recording.rate), len(chain_joints(chain)) + 1)
     reason = tracking_fault(skeleton, recording, motion, chain=chain)
     if gate.sum() < enough:
         speed = median(motion.hand_speed(chain))

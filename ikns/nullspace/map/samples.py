@@ -16,6 +16,15 @@ from ikns.motion.motion import Motion
 from ikns.numerics.turns import nearest_turn, without_turns
 
 
+def samples_in(seconds: float, rate: float) -> int:
+    """How many samples last so long, at a rate in 1/s that files round.
+
+    >>> samples_in(0.5, 100.0), samples_in(0.5, 100.00001), samples_in(0.5, 101.0)
+    (50, 50, 51)
+    """
+    return int(np.ceil(seconds * rate * (1 - 1e-6)))
+
+
 def still_mask(
     motion: Motion,
     chain: ChainLike = "right_arm",
