@@ -195,7 +195,7 @@ def test_a_check_without_a_static_trial_says_so_and_no_zero_has_a_sign(
 ) -> None:
     assert main(["check", str(files / "free.c3d")]) == 0
     said = " ".join(capfd.readouterr().out.split())
-    assert "Checked as" in said
+    assert "Roles" in said
     assert "movement, without a static trial" in said
     assert main(["markers", "check", "oxford24", str(files / "static.c3d")]) == 0
     assert "-0" not in capfd.readouterr().out.split()

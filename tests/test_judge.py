@@ -294,7 +294,9 @@ def test_the_command_exits_with_2_only_for_what_must_not_be_used(tmp_path, capsy
         write_c3d(paths[name], recording)
     clean = ["check", str(paths["reaching"]), "--static", str(paths["static"])]
     assert main(clean) == 0
-    assert "Nothing is wrong." in capsys.readouterr().out
+    assert "No problems found." in capsys.readouterr().out
+    assert main([*clean, "--rename", "Ann:RELB=Ann:X1"]) == 0
+    assert "No errors; 2 notes." in capsys.readouterr().out
     wrong = ["check", str(paths["reaching"]), "--static", str(paths["wrong"])]
     assert main(wrong) == 2
     out, err = capsys.readouterr()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +20,25 @@ from ikns.cli.options import (
 from ikns.cli.output import show, table
 from ikns.cli.reading import Read, check_inputs, reads_markers, refuse_repeated
 from ikns.errors import InvalidInput, MarkerMismatch
+
+if TYPE_CHECKING:
+    from ikns.calibration.judge.finding import Finding
+
+
+def _counted(findings: Sequence[Finding]) -> list[str]:
+    """Say that findings are no errors; nothing where some are, or none was found."""
+    from ikns.calibration.judge.finding import refused
+    from ikns.statistics.wording import counted
+
+    if not findings or refused(findings):
+        return []
+    kinds = [finding.severity for finding in findings]
+    told = [
+        counted(kinds.count(severity), name)
+        for severity, name in (("warn", "warning"), ("note", "note"))
+        if severity in kinds
+    ]
+    return [f"No errors; {' and '.join(told)}."]
 
 
 @reads_markers
@@ -85,17 +105,18 @@ def check(
     show(
         found.as_dict(),
         table(
-            "Checked as",
-            {"recording": "s", "as": "s"},
+            "Roles",
+            {"recording": "s", "checked as": "s"},
             [[Path(name).name, kind] for name, kind in found.judged],
         ),
         table(
             "Found",
-            {"verdict": "s", "recording": "s", "what": "s", "what would be right": "s"},
+            {"verdict": "s", "recording": "s", "problem": "s", "remedy": "s"},
             rows,
         )
         if rows
-        else "Nothing is wrong.",
+        else "No problems found.",
+        *_counted(found.findings),
         as_json=as_json,
     )
     if faults := refused(found.findings):

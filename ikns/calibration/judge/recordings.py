@@ -158,7 +158,11 @@ def check_recordings(
         own = worn if skeleton is None else skeleton.marker_set
         findings += judge_unseen(recording, own.without_static())
         known = (
-            "without a static trial" if skeleton is None else "with the person's body"
+            "without a static trial"
+            if skeleton is None
+            else "compared with the static trial"
+            if static is not None
+            else "compared with the calibrated person"
         )
         judged.append((recording.source, f"movement, {known}"))
     return Check(tuple(worst_first(findings)), tuple(judged))

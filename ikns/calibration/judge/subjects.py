@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from ikns.body.marker_set import MarkerSet
@@ -36,7 +37,7 @@ def other_rate(static: Recording, recording: Recording) -> list[Finding]:
             "warn",
             recording.source,
             f"{recording.rate:.4g} frames per second, but the static trial "
-            f"{static.source} has {static.rate:.4g}",
+            f"{Path(static.source).name} has {static.rate:.4g}",
             "if the cameras had one rate, correct it in the file: all speeds depend "
             "on it",
         )
@@ -50,14 +51,13 @@ def other_subject(
     names = [subject_names(one, worn) for one in (static, recording)]
     if not all(names) or names[0] & names[1]:
         return []
-    of, found = (" and ".join(sorted(name)) for name in names)
     return [
         Finding(
             "another person",
             "refuse",
             recording.source,
-            f"the markers are those of {found}, but the static trial {static.source} "
-            f"is of {of}",
+            f"the markers are those of {_spelled(recording, worn)}, but the static "
+            f"trial {Path(static.source).name} is of {_spelled(static, worn)}",
             "use the static trial of this person",
         )
     ]
@@ -83,7 +83,7 @@ def other_than_calibrated(
             "another person",
             "warn",
             recording.source,
-            f"the markers are those of {' and '.join(sorted(found))}, but the subject "
+            f"the markers are those of {_spelled(recording, worn)}, but the subject "
             f"was calibrated as {' and '.join(sorted(of))}",
             "use the subject folder of this person",
         )
@@ -107,6 +107,16 @@ def usual_residual(report: Mapping[str, Any]) -> float | None:
 
 def subject_names(recording: Recording, worn: MarkerSet) -> set[str]:
     """Return the subjects before the labels of a set's markers, in lower case."""
+    return {*_subjects(recording, worn)}
+
+
+def _subjects(recording: Recording, worn: MarkerSet) -> dict[str, str]:
+    """Subjects of a set's markers as they are spelled, by their lower case."""
     columns = worn.columns(recording.labels)
     used = [recording.labels[i] for i in columns[columns >= 0]]
-    return {label.rsplit(":", 1)[0].casefold() for label in used if ":" in label}
+    names = [label.rsplit(":", 1)[0] for label in used if ":" in label]
+    return {name.casefold(): name for name in sorted(names)}
+
+
+def _spelled(recording: Recording, worn: MarkerSet) -> str:
+    return " and ".join(sorted(_subjects(recording, worn).values()))
