@@ -186,7 +186,7 @@ def test_a_cutoff_smooths_the_angles(
     assert rough.read_text() != smooth.read_text()
     capfd.readouterr()
     fast = [*words, "--out", str(tmp_path / "new.csv"), "--cutoff", "30"]
-    assert "cut-off above 0 and below" in check_refused(fast, tmp_path, capfd)
+    assert "--cutoff must be above 0 and below" in check_refused(fast, tmp_path, capfd)
 
 
 def test_live_calibration_has_no_files_to_rename(

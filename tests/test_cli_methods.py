@@ -58,7 +58,7 @@ def test_a_method_that_an_old_folder_lacks_is_named(
         "view": ["view", str(old), recording, "--out", f"{out}html"],
     }[command]
     sentence = check_refused([*argv, "--method", "intent"], tmp_path, capfd, names=old)
-    assert "has the method paper, not proximal and intent; calibrate" in sentence
+    assert "has the method paper only; calibrate" in sentence
 
 
 def test_compare_reads_crosstalk_by_the_method_and_directions_by_the_paper(

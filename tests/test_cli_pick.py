@@ -81,7 +81,7 @@ def test_an_object_by_ring_and_by_arm(
         (["--conditions", "gamepad"], "found 'gamepad'"),
         (["--conditions", "ring", "--objects", "Z"], "found 'Z'"),
         (["--conditions", "ring", "--objects", ""], "a value for --objects"),
-        (["--conditions", "ring", "--limit", "0"], "limit above 0 s"),
+        (["--conditions", "ring", "--limit", "0"], "--limit must be above 0, found 0."),
         (["--conditions", "ring", "--finger", "gpio:1"], "unknown finger"),
         (["--conditions", "ring", "--number", "-1"], "for --number, found -1"),
     ],

@@ -203,7 +203,7 @@ def test_ten_points_of_a_robot_whose_z_points_up(
         (["--frame", "panda_link0"], "from the base to 'panda_link0', found none"),
         (["--from", "torso"], "has no link 'torso' to start from, but panda_link0"),
         (["--from", "panda_hand", "--frame", "panda_link1"], "'panda_link1' on 'panda"),
-        (["--speed", "0"], "slower than 0 m/s, found none"),
+        (["--speed", "0"], "--speed must be above 0, found 0."),
         (["--figure", "robot.gif"], "expected a name that ends in .png"),
     ],
 )

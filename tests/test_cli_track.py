@@ -167,7 +167,10 @@ def test_nothing_is_written_where_the_source_does_not_answer(
         (["--conditions", ""], "a value for --conditions"),
         (["--conditions", "virtual,mouse"], "people or the virtual operator"),
         (["--conditions", "mouse", "--repeats", "0"], "1 to 1000 for --repeats"),
-        (["--conditions", "mouse", "--seconds", "3"], "at least 12 s"),
+        (
+            ["--conditions", "mouse", "--seconds", "3"],
+            "3600 for --seconds, found 3",
+        ),
         (["--conditions", "mouse", "--align", "-1"], "for --align, found -1"),
         (["--conditions", "mouse", "--rest", "nan"], "for --rest, found nan"),
         (["--conditions", "mouse", "--rate", "0"], "--rate"),

@@ -189,9 +189,9 @@ def test_the_paper_s_visit_is_the_default():
         ({"repeats": 0}, "repeats from 1"),
         ({"training": -1}, "training from 0"),
         ({"seed": -1}, "a seed"),
-        ({"limit": 0.0}, "a limit above 0 s"),
-        ({"limit": math.nan}, "a limit above 0 s"),
-        ({"rest": -1.0}, "a rest from 0 s"),
+        ({"limit": 0.0}, "limit must be above 0 s"),
+        ({"limit": math.nan}, "limit must be above 0 s"),
+        ({"rest": -1.0}, "rest 0 s or more"),
     ],
 )
 def test_impossible_designs_are_refused(options, says):

@@ -247,7 +247,7 @@ def test_a_folder_of_before_opens_and_says_what_it_lacks(folder, tmp_path):
         (old / f"{method}.json").unlink()
     loaded = Subject.load(old)
     assert loaded.readout("paper").map is loaded.null_space_map
-    with pytest.raises(InvalidInput, match="has the method paper, not proximal and"):
+    with pytest.raises(InvalidInput, match="has the method paper only; calibrate"):
         loaded.readout("intent")
     with pytest.raises(InvalidInput, match="expected a method of"):
         loaded.readout("guess")

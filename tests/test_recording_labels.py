@@ -103,7 +103,7 @@ def test_gaps_stay_and_are_not_filtered_across():
 
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, np.nan, 50.0, 45.0])
 def test_a_cutoff_that_the_rate_does_not_allow_is_refused(cutoff):
-    with pytest.raises(InvalidInput, match="cut-off above 0 and below"):
+    with pytest.raises(InvalidInput, match="--cutoff must be above 0 and below"):
         low_pass(recording(["A"], frames=20), cutoff)
 
 

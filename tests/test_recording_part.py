@@ -140,3 +140,18 @@ def test_part_and_subject_together(tmp_path):
     part = read(path, subject_prefix="Ann", start=0.02, end=0.04)
     assert part.labels == ("A", "B")
     assert part.markers.shape == (2, 2, 3)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "says"),
+    [
+        (30.0, None, "--from 30 s is past its end; it runs from 1 to 2 s."),
+        (None, 0.5, "--to 0.5 s is before its start; it runs from 1 to 2 s."),
+        (1.2, 1.3, "it has no frame from 1.2 to 1.3 s; it runs from 1 to 2 s."),
+    ],
+)
+def test_a_part_without_frames_says_how_long_the_recording_is(start, end, says):
+    whole = Recording([1.0, 1.5, 2.0], np.ones((3, 1, 3)), ["RSHO"], "walk.c3d")
+    with pytest.raises(InvalidInput) as refused:
+        between(whole, start, end)
+    assert str(refused.value) == f"walk.c3d: {says}"

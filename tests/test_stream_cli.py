@@ -101,10 +101,10 @@ def test_a_stream_that_dies_without_a_word_is_noticed_and_found_again(
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--speed", "0"], "speed above 0, found 0"),
+        (["--speed", "0"], "--speed must be above 0, found 0."),
         (["--speed", "nan"], "finite number for --speed, found nan"),
         (["--fault", "lose=0.1"], "unknown fault 'lose=0.1', expected drop, late"),
-        (["--seed", "-1"], "seed of 0 or more, found -1"),
+        (["--seed", "-1"], "--seed must be 0 or more, found -1."),
         (["--wait", "0.2"], "no one listened within 0.2 s"),
     ],
 )

@@ -105,7 +105,7 @@ def test_an_example_replaces_files_only_if_forced_and_never_results(
         ({"tracking": {"repeats": 0}}, "found 0: no trial would be left"),
         ({"tracking": {"repeats": 1.5}}, "a whole number for repeats"),
         ({"tracking": {"training": -1}}, "training from 0 trials .* -1"),
-        ({"tracking": {"seconds": 5}}, "a profile of at least 12 s, found 5 s"),
+        ({"tracking": {"seconds": 5}}, "seconds must be at least 12, found 5"),
         ({"tracking": {"seconds": 12}, "study": {"seed": 5}}, "no profile T1 of 12 s"),
         ({"tracking": {"align": -1.0}}, "align from 0 s"),
         ({"tracking": {"rest": -1.0}}, "rest from 0 s"),

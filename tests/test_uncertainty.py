@@ -233,11 +233,11 @@ def test_limits_are_the_same_everywhere_and_positive(person):
     for command in (run, control):
         shown = inspect.signature(command).parameters["max_uncertainty"].default
         assert shown == MAX_UNCERTAINTY
-    with pytest.raises(InvalidInput, match="positive max_uncertainty, found 0"):
+    with pytest.raises(InvalidInput, match="max_uncertainty must be above 0, found 0"):
         ControlSettings(max_uncertainty=0.0)
     subject, recording = small_person.subject(), small_person.protocol().free.recording
     motion = MarkerIK(subject.skeleton).track(recording)
-    with pytest.raises(InvalidInput, match="positive max_uncertainty, found 0"):
+    with pytest.raises(InvalidInput, match="max_uncertainty must be above 0, found 0"):
         control_table(subject, motion, max_uncertainty=0.0)
 
 

@@ -120,11 +120,10 @@ class Subject:
             if not whole_arms(self.chain):
                 raise InvalidInput(no_swivel(self.chain))
             known = self.methods
-            lost = [other for other in OTHERS if other not in self.readouts]
             raise InvalidInput(
-                f"the subject has the method{'s' * (len(known) > 1)} "
-                f"{' and '.join(known)}, not {' and '.join(lost)}; calibrate one arm "
-                f"with one degree of freedom again to use '{method}'."
+                f"this subject has the method{'s' * (len(known) > 1)} "
+                f"{' and '.join(known)} only; calibrate one arm with one degree of "
+                f"freedom (--n-dof 1) to use {method}."
             )
         return self.readouts[method]
 

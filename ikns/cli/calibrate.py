@@ -26,7 +26,6 @@ from ikns.cli.options import (
 )
 from ikns.cli.output import show
 from ikns.cli.reading import Read, check_inputs, reads_markers, refuse_repeated
-from ikns.errors import InvalidInput
 from ikns.output.folder import check_output_folder
 
 
@@ -236,8 +235,6 @@ def calibrate(
     }
     takes: list[dict[str, Any]] = []
     if live:
-        if radius is not None and not radius > 0:
-            raise InvalidInput(f"expected a radius above 0 m, found {radius:g}.")
         static, exploration, movement, takes = record_live(
             LiveOptions(
                 source=source or "",

@@ -13,13 +13,19 @@ from typer.models import ArgumentInfo
 
 from ikns.errors import InvalidInput
 
+#: Options whose value is above zero.
+_POSITIVE = (
+    *("--cutoff", "--duration", "--hold-speed", "--limit", "--max-uncertainty"),
+    *("--radius", "--speed"),
+)
+
 
 def checked(command: Callable[..., None]) -> Callable[..., None]:
     """Return a command that refuses values which no option can mean.
 
-    These are numbers that are not finite, and names that are not text in UTF-8, which
-    no file of results could hold. A value that the option has by default
-    is right.
+    These are numbers that are not finite, or not above zero where they must be, and
+    names that are not text in UTF-8, which no file of results could hold. A value that
+    the option has by default is right.
 
     Examples
     --------
@@ -57,6 +63,8 @@ def _is_argument(parameter: Parameter) -> bool:
 def _check(option: str, value: Any) -> None:
     if isinstance(value, float) and not math.isfinite(value):
         raise InvalidInput(f"expected a finite number for {option}, found {value:g}.")
+    if isinstance(value, float) and option in _POSITIVE and value <= 0:
+        raise InvalidInput(f"{option} must be above 0, found {value:g}.")
     if isinstance(value, (str, Path)):
         text = str(value)
         try:

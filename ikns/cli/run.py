@@ -129,7 +129,7 @@ def run(
 
     Research software, not a medical device.
     """
-    _check_options(subject, duration, session, participant, resume=resume)
+    _check_options(subject, session, participant, resume=resume)
     _check_machine(publish or [], realtime=realtime)
 
     from ikns.calibration.simulated import is_simulated, played_files
@@ -213,14 +213,11 @@ def run(
 
 def _check_options(
     subject: Path,
-    duration: float | None,
     session: Path | None,
     participant: str | None,
     *,
     resume: bool,
 ) -> None:
-    if duration is not None and not 0 < duration < math.inf:
-        raise InvalidInput(f"expected a duration above 0 s, found {duration:g}.")
     if resume and session is None:
         raise InvalidInput("--resume needs the --session to continue.")
     if participant is not None and session is None:

@@ -89,8 +89,6 @@ def servo(
 
     from ikns.finger.emulator import FAULTS, Servo, Wire, parse_fault
 
-    if duration is not None and not 0 <= duration < math.inf:
-        raise InvalidInput(f"the duration must be a number of seconds, not {duration}.")
     faults = [parse_fault(text) for text in fault or ()]
     numbers = id or [1]
     if len(set(numbers)) < len(numbers):

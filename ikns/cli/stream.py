@@ -54,10 +54,8 @@ def stream(
     from ikns.live.stream import Faults, LslOutlet, broadcast
 
     faults = Faults.parse(fault)
-    if not 0 < speed < float("inf"):
-        raise InvalidInput(f"expected a speed above 0, found {speed:g}.")
     if seed < 0:
-        raise InvalidInput(f"expected a seed of 0 or more, found {seed}.")
+        raise InvalidInput(f"--seed must be 0 or more, found {seed}.")
     frames = read(recording)
     if len(frames.time) < 2:
         raise InvalidInput(

@@ -94,7 +94,10 @@ def track(
     seconds: Annotated[
         float | None,
         typer.Option(
-            help="Length of each trajectory, s.", show_default="25", min=0.0, max=3600.0
+            help="Length of each trajectory, s.",
+            show_default="25",
+            min=12.0,
+            max=3600.0,
         ),
     ] = None,
     align: Annotated[

@@ -49,7 +49,7 @@ def low_pass(recording: Recording, cutoff: float) -> Recording:
     rate = recording.rate if len(time) > 1 else math.nan
     if not 0 < cutoff < rate / 2 * _TWO_PASSES:
         raise InvalidInput(
-            f"{recording.source}: expected a cut-off above 0 and below "
+            f"{recording.source}: --cutoff must be above 0 and below "
             f"{rate / 2 * _TWO_PASSES:.3g} Hz at {rate:g} frames per second, found "
             f"{cutoff:g} Hz."
         )

@@ -87,10 +87,14 @@ def between(
     rounding = 1e-6
     kept = (time >= low - rounding) & (time <= high + rounding)
     if not kept.any():
+        if low > time[-1]:
+            wrong = f"--from {low:g} s is past its end"
+        elif high < time[0]:
+            wrong = f"--to {high:g} s is before its start"
+        else:
+            wrong = f"it has no frame from {low:g} to {high:g} s"
         raise InvalidInput(
-            f"{recording.source}: expected frames from {_said(start, 'its start')} to "
-            f"{_said(end, 'its end')}, found it to last from {time[0]:g} to "
-            f"{time[-1]:g} s."
+            f"{recording.source}: {wrong}; it runs from {time[0]:g} to {time[-1]:g} s."
         )
     return Recording(
         time[kept],
@@ -117,7 +121,3 @@ def require_rate(recording: Recording, *, part: bool) -> None:
         raise NotEnoughData(
             f"{recording.source}: the {what} has {frames} frame; at least 2 are needed."
         )
-
-
-def _said(moment: float | None, default: str) -> str:
-    return default if moment is None else f"{moment:g} s"

@@ -99,7 +99,7 @@ def equivalence(pairs: Pairs, *, margin: float, alpha: float = 0.05) -> Equivale
     """
     margin = checked_margin(margin)
     if not 0 < alpha < 0.5:
-        raise InvalidInput(f"expected alpha between 0 and 0.5, found {alpha:g}.")
+        raise InvalidInput(f"alpha must be between 0 and 0.5, found {alpha:g}.")
     means = pairs.subject_means()
     d = means.need_spread()
     p, _, _ = statsmodels("stats.weightstats").ttost_paired(

@@ -87,7 +87,7 @@ def sample_size(
         difference not inside the margin.
     """
     if not 0 < alpha < 0.5:
-        raise InvalidInput(f"expected alpha between 0 and 0.5, found {alpha:g}.")
+        raise InvalidInput(f"alpha must be between 0 and 0.5, found {alpha:g}.")
     if not alpha < target < 1:
         raise InvalidInput(
             f"expected a power between alpha {alpha:g} and 1, found {target:g}."

@@ -160,7 +160,7 @@ def simulated_power(
     if margin is not None:
         margin = checked_margin(margin)
     if not 0 < alpha < 0.5:
-        raise InvalidInput(f"expected alpha between 0 and 0.5, found {alpha:g}.")
+        raise InvalidInput(f"alpha must be between 0 and 0.5, found {alpha:g}.")
     if simulations < 1:
         raise InvalidInput(f"expected at least 1 simulation, found {simulations}.")
     if not math.isfinite(difference):

@@ -116,8 +116,8 @@ def pick_schedule(
         )
     if not (0 < limit < np.inf and 0 <= rest < np.inf):
         raise InvalidInput(
-            f"expected a limit above 0 s and a rest from 0 s, found {limit:g} and "
-            f"{rest:g} s."
+            "limit must be above 0 s and rest 0 s or more, found "
+            f"{limit:g} and {rest:g}."
         )
     condition_orders = williams(len(conditions))
     steps: list[PickStep] = []

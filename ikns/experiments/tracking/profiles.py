@@ -129,7 +129,7 @@ def draw_profile(name: str, seed: int, *, seconds: float = 25.0) -> Profile:
             f"expected a profile of {', '.join(CHARACTERS)}, found '{name}'."
         )
     if not 12.0 <= seconds < np.inf:
-        raise InvalidInput(f"expected a profile of at least 12 s, found {seconds:g} s.")
+        raise InvalidInput(f"seconds must be at least 12, found {seconds:g}.")
     character = CHARACTERS[name]
     # Profiles of one seed but different names are independent.
     rng = np.random.default_rng([seed, *name.encode()])

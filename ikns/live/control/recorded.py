@@ -137,7 +137,7 @@ def recorded_signal(
     learned, chain = subject.null_space_map, subject.chain
     if not max_uncertainty > 0:
         raise InvalidInput(
-            f"expected a positive max_uncertainty, found {max_uncertainty:g}."
+            f"max_uncertainty must be above 0, found {max_uncertainty:g}."
         )
     readout, n = subject.readout(method), len(motion.time)
     inside = readout.inside(subject.skeleton, motion)

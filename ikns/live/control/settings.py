@@ -83,7 +83,7 @@ class ControlSettings:
         ):
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:
-                raise InvalidInput(f"expected a positive {name}, found {value:g}.")
+                raise InvalidInput(f"{name} must be above 0, found {value:g}.")
 
     def table(self) -> dict[str, Any]:
         """Return what a session keeps; `dofs` where it is not the first alone."""
