@@ -66,7 +66,7 @@ def test_a_part_is_written_and_nothing_else_replaced(
     source.write_bytes(c3d_bytes(labels=[f"Ann:{name}" for name in NAMES]))
     argv = ["convert", str(source), str(target), "--subject-prefix", "ann"]
     assert main([*argv, "--from", "0.02", "--to", "0.06"]) == 0
-    assert "3 of them in 3 frames, 0.04 s" in capfd.readouterr().out
+    assert f"b.csv: {len(NAMES)} markers, 3 frames, 0.04 s" in capfd.readouterr().out
     assert ikns.read(target).labels == tuple(NAMES)
     check_refused(argv, tmp_path, capfd, names=target)
     check_refused([*argv[:2], str(source), "--force"], tmp_path, capfd)

@@ -146,7 +146,8 @@ def calibrate(
     n_dof: Annotated[
         int,
         typer.Option(
-            help="Degrees of freedom to control: each elbow, then turning the hand.",
+            help="Degrees of freedom to control: first the elbow swivel of each arm, "
+            "then hand rotation.",
             min=1,
             max=7,
         ),

@@ -62,7 +62,7 @@ def check(
     to: To = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say what is wrong with recordings: labels, units, ghosts, another person.
+    """Check recordings for wrong labels, units, ghost markers or another person.
 
     A recording in which the person stands still is judged as a static trial. Exits
     with 2 when one must not be used. --from and --to take a part of every recording,

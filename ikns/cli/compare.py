@@ -59,14 +59,14 @@ def compare(
         str,
         typer.Option(
             metavar="own|both|NAME|FILE",
-            help="Joints to compare: those of the map (own), also the arm with "
-            "(without) the clavicle, learned again (both), or another chain of the "
-            "same hand, by its name or from a .toml file.",
+            help="Joints to compare: own, those of the map; both, also those with the "
+            "clavicle if the map has none, else without it, learned again; or another "
+            "chain of the same hand, by its name or from a .toml file.",
         ),
     ] = "both",
     coordinates: Annotated[
         Literal["internal", "isb", "rotation_vector", "all"],
-        typer.Option(help="Shoulder coordinates. Any but internal are learned again."),
+        typer.Option(help="Shoulder coordinates. All but internal are learned again."),
     ] = "internal",
     reaches: Annotated[
         Path | None, typer.Option(help="Recording of natural reaches, for crosstalk.")
@@ -94,10 +94,10 @@ def compare(
     """Compare learned and analytic directions at every PCA point.
 
     Angles between them, with what chance would give; the share of joint variance inside
-    the null space; the hand's leak and turn as c goes from 0 to 1; where a straight
-    line along Z leads the hand; how far the null space bends; and crosstalk. Directions
-    are the paper's; crosstalk is that of --method. --from and --to take a part of the
-    recording, not of --reaches.
+    the null space; the hand's leak and turn as c goes from 0 to 1; where the hand goes
+    along a straight line along Z; how far the null space bends; and crosstalk.
+    Directions are the paper's; crosstalk is that of --method. --from and --to take a
+    part of the recording, not of --reaches.
     """
     from ikns.body.chain_files import chain_file, load_chain
 

@@ -10,7 +10,7 @@ import typer
 from ikns.cli.options import (
     MARKER_FILES,
     AsJson,
-    Force,
+    ForceFile,
     From,
     LabelFile,
     Rename,
@@ -45,13 +45,13 @@ def convert(
         str | None,
         typer.Option(help="Name of the marker stream, if an .xdf file has several."),
     ] = None,
-    force: Force = False,
+    force: ForceFile = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a recording, or joint angles, in another format; or a part of it.
+    """Convert a recording or joint angles to another format, whole or in part.
 
-    Times stay as they are, and labels but for --rename and --labels;
-    --subject-prefix takes the prefix off.
+    Times and labels are kept, except that --rename and --labels rename markers and
+    --subject-prefix strips the prefix.
     """
     from ikns.recording.files.convert import convert_file
 
@@ -82,7 +82,11 @@ def convert(
             "duration_s": found.duration,
             "frames_left_out": found.left_out,
         },
-        f"Wrote {target}: {found.kind}, {len(found.names)} of them in {found.frames} "
-        f"frames, {found.duration:.2f} s{lost}",
+        f"Wrote {target}: {_count(len(found.names), found.kind)}, "
+        f"{_count(found.frames, 'frames')}, {found.duration:.2f} s{lost}",
         as_json=as_json,
     )
+
+
+def _count(number: int, things: str) -> str:
+    return f"{number} {things.removesuffix('s') if number == 1 else things}"

@@ -53,11 +53,10 @@ def ik(
 ) -> None:
     """Write joint angles (deg), the pose of the thorax and residuals per frame.
 
-    The body is that of a subject, or scaled from --static with --marker-set. Cells of a
-    joint are empty in frames in which a segment next to it is out of sight, cells of
-    the thorax in frames that do not show it, and those of an arm in frames whose
-    markers cannot be right; .mot and .sto, which have no empty cells, are without such
-    frames. A recording that must not be used is refused, as by `ikns check`.
+    The body is that of a subject, or scaled from --static with --marker-set. Cells are
+    empty in frames that do not show the thorax or a segment next to the joint, or whose
+    markers of the arm cannot be right; .mot and .sto cannot have empty cells, so they
+    omit such frames. A recording that must not be used is refused, as by `ikns check`.
 
     No model that comes with OpenSim has the joints of this body: write --out body.osim
     too, open it in OpenSim, and load the .mot there as a motion.

@@ -15,7 +15,7 @@ from ikns.cli.marker_options import (
     millimeters,
 )
 from ikns.cli.marker_questions import ask_sites
-from ikns.cli.options import AsJson, Force, MinStatic
+from ikns.cli.options import AsJson, ForceFile, MinStatic
 from ikns.cli.output import held_sentences, notes, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput, naming
@@ -36,7 +36,8 @@ def new(
         Path | None,
         typer.Option(
             help="Text file with a line LABEL=PLACE for each marker, instead of "
-            "questions; `static` behind a place that is worn in static trials only."
+            "questions; add `static` after the place of a marker that is worn in "
+            "static trials only."
         ),
     ] = None,
     guess: Annotated[
@@ -48,15 +49,15 @@ def new(
         str | None, typer.Option(help="Name of the set. Default: that of the file.")
     ] = None,
     min_static: MinStatic = 1.0,
-    force: Force = False,
+    force: ForceFile = False,
     as_json: AsJson = False,
 ) -> None:
     """Make a marker set from a static trial and where each marker sits.
 
     Asks for every label where it sits, with what the label usually means as the
     default. Places of landmarks are known; where the other markers sit is measured.
-    Markers that --movement lacks are taken to be worn in static trials only, and how
-    well the body follows that movement is said.
+    Markers that --movement lacks are taken to be worn in static trials only, and it is
+    reported how well the body follows that movement.
     """
     inputs = [static, sites, movement]
     refuse_overwriting(out, force=force, inputs=inputs, endings=[".toml"])

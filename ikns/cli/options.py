@@ -13,6 +13,10 @@ AsJson = Annotated[
 Force = Annotated[
     bool, typer.Option("--force", help="Overwrite what an earlier run wrote.")
 ]
+#: The same where one file is written.
+ForceFile = Annotated[
+    bool, typer.Option("--force", help="Overwrite the file if it exists.")
+]
 SubjectFolder = Annotated[
     Path, typer.Option("--subject", help="Folder that `ikns calibrate` wrote.")
 ]
@@ -89,7 +93,7 @@ Rerun = Annotated[
 ]
 Rrd = Annotated[
     Path | None,
-    typer.Option(help="Write the same to a file of Rerun, FILE.rrd."),
+    typer.Option(help="Write the same to a Rerun file, FILE.rrd."),
 ]
 OptionalMarkerSet = Annotated[
     str | None,
@@ -108,8 +112,8 @@ ChainName = Annotated[
     typer.Option(
         "--chain",
         metavar="NAME|FILE",
-        help="Joints of the task, in place of --side: a chain such as right_arm, or a "
-        ".toml file with one of your own (FILE:NAME of several).",
+        help="Joints of the task, in place of --side: a chain such as right_arm, or "
+        "one of your own: a .toml file, or FILE:NAME where it has several.",
     ),
 ]
 #: What reads c off recordings.

@@ -25,7 +25,7 @@ def replay(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compute c and the commands of a session again and compare them bit for bit."""
+    """Recompute c and the commands of a session and compare them bit for bit."""
     from ikns.live.runtime import replay_run
     from ikns.live.session import (
         check_export,

@@ -78,7 +78,7 @@ def robot(
     """Learn directions from a robot's joint angles and compare them with its Jacobian.
 
     The robot holds its frame at several places and moves in its null space, as a person
-    does in the calibration. Angles of joints that turn for ever may jump by full turns;
+    does in the calibration. Angles of continuous joints may jump by full turns;
     joints that mimic others follow them and need no column.
     """
     from ikns.analysis.compare import compare_robot, free_tasks

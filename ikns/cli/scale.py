@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import ikns
-from ikns.cli.options import AsJson, Force
+from ikns.cli.options import AsJson, ForceFile
 from ikns.cli.output import show, table
 from ikns.output.file import refuse_overwriting, write_text
 
@@ -18,7 +18,7 @@ def scale(
     mass: Annotated[float, typer.Option(help="Body mass, kg.")],
     sex: Annotated[str, typer.Option(help="'female' or 'male'.")],
     out: Annotated[Path, typer.Option(help="URDF file to write.")],
-    force: Force = False,
+    force: ForceFile = False,
     as_json: AsJson = False,
 ) -> None:
     """Write a URDF scaled from anthropometric tables.

@@ -29,9 +29,8 @@ def stream(
     fault: Annotated[
         str,
         typer.Option(
-            help="Faults with their probability per frame, such as drop=0.01,lat "
-            "e=0.001:0.3,repeat=0.01,swap=0.01,freeze=0.001:0.5 (late and "
-            "freeze with seconds)."
+            help="Faults with their probability per frame, such as drop=0.01,swap=0.1; "
+            "also repeat, and with seconds late and freeze: late=0.001:0.3."
         ),
     ] = "",
     seed: Annotated[int, typer.Option(help="Seed of the faults.")] = 0,

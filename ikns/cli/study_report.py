@@ -32,7 +32,7 @@ def report(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write tables, figures and statistics of a study's visits, and a page with all.
+    """Write tables, figures and statistics of a study's visits, and one page with all.
 
     Everything is computed again from the recorded attempts. People and simulated
     participants are never pooled; the page says which is which.

@@ -65,7 +65,7 @@ def ucm(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Split joint variance by the null space of the task (uncontrolled manifold).
+    """Split joint variance into that within and outside the task's null space (UCM).
 
     Several recordings: variance over repetitions at each normalized time. One: variance
     over the still samples at each PCA point. --from and --to take a part of every

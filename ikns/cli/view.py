@@ -80,9 +80,9 @@ def view(
 ) -> None:
     """Show PCA points, volume and null space around the body, in one HTML file.
 
-    With a recording the page plays it, together with the map and the c that --method
-    reads, with gaps where `ikns control` leaves it empty; also one that must not be
-    used, and says what is wrong with it. --rerun and --rrd show it on a timeline
+    With a recording, the page plays it with the map and the c that --method reads, with
+    gaps where `ikns control` leaves it empty. A recording that `ikns check` rejects is
+    played too, with what is wrong. --rerun and --rrd show it on a timeline
     instead, with every marker, c and the residuals.
     """
     inputs = [subject, recording]

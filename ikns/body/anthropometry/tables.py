@@ -35,7 +35,7 @@ def normalize_sex(sex: str) -> str:
     if word is None:
         raise InvalidInput(
             f"sex is {sex!r}, expected 'female' or 'male' (or 'F', 'M'); "
-            "the tables hold no other."
+            "the tables cover no other."
         )
     return word
 

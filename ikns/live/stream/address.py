@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from urllib.parse import parse_qsl
 
 from ikns.body.marker_set import MarkerSet
@@ -107,7 +108,8 @@ def open_source(
     place, _, query = rest.rpartition("?") if "?" in rest else (rest, "", "")
     kind = _KINDS.get(scheme) if colon else None
     if kind is None:
-        raise InvalidInput(f"unknown source '{address}', expected {_KNOWN}.")
+        meant = f"; to play this file, give replay:{address}" * _is_file(address)
+        raise InvalidInput(f"unknown source '{address}', expected {_KNOWN}{meant}.")
     open_feed, options_known = kind
     options = dict(parse_qsl(query, keep_blank_values=True))
     for option in options:
@@ -252,6 +254,13 @@ def _host(text: str, port: int) -> tuple[str, int]:
     if not (number.isascii() and number.isdigit() and 0 < int(number) < 65536):
         raise InvalidInput(f"expected a port from 1 to 65535, found '{number}'.")
     return host.strip("[]"), int(number)
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except OSError:  # too long for a name
+        return False
 
 
 def _timeout(options: Options) -> float:

@@ -65,7 +65,10 @@ def read_angle_table(path: Path) -> tuple[Array, tuple[str, ...], Array]:
         if name.endswith(ending) and name != "residual_m"
     ]
     if not kept:
-        raise FileError(f"{path}: expected columns JOINT_deg, JOINT_rad, found none.")
+        raise FileError(
+            f"{path}: expected columns of joints, such as right_elbow_flexion_deg or "
+            f"_rad; it has {', '.join(header)}."
+        )
     time = table[:, header.index("time_s")]
     if not np.isfinite(time).all() or not (np.diff(time) > 0).all():
         raise FileError(f"{path}: expected a time_s that increases from row to row.")
