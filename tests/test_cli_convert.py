@@ -83,6 +83,8 @@ def test_angles_need_no_map_and_go_to_other_programs(
     result = json.loads(capfd.readouterr().out)
     assert result["files"] == [str(name) for name in names]
     assert result["csv"] == str(names[0])
+    # The simulated laboratory has Z up, OpenSim Y.
+    assert any("Z is up in the laboratory" in note for note in result["notes"])
     table, angles = read_csv(names[0]), read_storage(names[1])
     assert angles.in_degrees
     # Frames that do not show all joints have empty cells in one file, and are left out

@@ -13,6 +13,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput, RecordingWarning
 from ikns.motion.export import fitted_markers, motion_coordinates, write_motion
 from ikns.motion.gimbal import gimbal_sentence, xyz_angles
+from ikns.motion.lab_vertical import lab_vertical, up_sentence
 from ikns.motion.motion import Motion
 from ikns.motion.unseen import warn_unseen
 from ikns.recording.files import read
@@ -178,6 +179,47 @@ def test_a_model_of_opensim_moves_its_markers_as_the_body_does(tmp_path):
         for label, place in zip(SKELETON.marker_set.labels, expected, strict=True):
             # Twelve digits are printed of places and angles.
             np.testing.assert_allclose(found[label][:3], place, atol=1e-9)
+
+
+@given(
+    up=st.sampled_from([*np.eye(3), *-np.eye(3)]),
+    heading=st.floats(-180, 180),
+    lean=st.floats(0, 30),
+    way=st.floats(-180, 180),
+)
+def test_up_in_the_laboratory_is_where_an_upright_trunk_points(up, heading, lean, way):
+    # The thorax has y up: to the laboratory's up, then turned about it, then leaning.
+    aside = np.roll(up, 1)
+    across = Rotation.from_rotvec(np.radians(way) * up).apply(aside)
+    stands = (
+        Rotation.from_rotvec(np.radians(lean) * across)
+        * Rotation.from_rotvec(np.radians(heading) * up)
+        * Rotation.align_vectors([up], [[0.0, 1, 0]])[0]
+    )
+    moved = motion()
+    q = moved.q.copy()
+    q[:, 3:7] = stands.as_quat()
+    found = lab_vertical(Motion(**{**vars(moved), "q": q}))
+    np.testing.assert_array_equal(found, up)
+
+
+def test_a_trunk_that_is_not_upright_shows_no_vertical():
+    moved, q = motion(), motion().q.copy()
+    q[:, 3:7] = Rotation.from_euler("x", 45, degrees=True).as_quat()
+    assert lab_vertical(Motion(**{**vars(moved), "q": q})) is None
+    q[:, :7] = np.nan
+    assert lab_vertical(Motion(**{**vars(moved), "q": q})) is None
+    assert "gravity of the model" in up_sentence(None, model=True)
+    assert up_sentence(np.array([0.0, 1, 0]), model=True) == ""
+    assert "gravity is along X" in up_sentence(np.array([-1.0, 0, 0]), model=True)
+
+
+def test_gravity_of_an_opensim_model_is_down_in_the_laboratory(tmp_path):
+    for name, up, told in (("own", None, None), ("z", [0, 0, 1], "0 0 -9.80665")):
+        path = tmp_path / f"{name}.osim"
+        write_motion(path, motion(), SKELETON, up=up)
+        model = ElementTree.parse(path).getroot().find("Model")
+        assert model.findtext("gravity") == told
 
 
 @pytest.mark.parametrize("ending", [".mot", ".sto"])

@@ -67,6 +67,7 @@ def ik(
 
     from ikns.calibration.judged_motion import judged_motion
     from ikns.motion.export import write_motion
+    from ikns.motion.lab_vertical import lab_vertical
     from ikns.motion.table import limits_passed, motion_table
 
     left_out: list[str] = []
@@ -89,8 +90,12 @@ def ik(
             report=calibration,
             progress=partial(report, "joint angles"),
         )
-    told = [write_motion(path, motion, skeleton, force=force) for path in outputs]
-    told += _cautions(motion, outputs)
+    upright = motion if still is None else ikns.MarkerIK(skeleton).track(still)
+    up = lab_vertical(upright)
+    told = [
+        write_motion(path, motion, skeleton, up=up, force=force) for path in outputs
+    ]
+    told += _cautions(motion, outputs, up)
     said = [*left_out, *(sentence for sentence in told if sentence), *warned]
     csv = next((path for path in outputs if path.suffix.lower() == ".csv"), None)
     found = motion_table(motion)
@@ -137,14 +142,17 @@ def _check(
         )
 
 
-def _cautions(motion: ikns.Motion, outputs: list[Path]) -> list[str]:
+def _cautions(motion: ikns.Motion, outputs: list[Path], up: Any) -> list[str]:
     """Say what whoever opens the files has to know."""
     from ikns.motion.file_names import MODEL, STORAGE
     from ikns.motion.gimbal import gimbal_sentence
+    from ikns.motion.lab_vertical import up_sentence
 
     endings = {path.suffix.lower() for path in outputs}
     angles = bool(endings & {*STORAGE})
     told = [gimbal_sentence(motion, thorax=angles)]
+    if angles or MODEL in endings:
+        told.append(up_sentence(up, model=MODEL in endings))
     if angles and MODEL not in endings:
         told.append(
             "the coordinates are those of this body, which no model that comes with "

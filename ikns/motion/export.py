@@ -25,7 +25,12 @@ from ikns.recording.recording import Recording
 
 
 def write_motion(
-    path: Path, motion: Motion, skeleton: Skeleton, *, force: bool = False
+    path: Path,
+    motion: Motion,
+    skeleton: Skeleton,
+    *,
+    up: Array | None = None,
+    force: bool = False,
 ) -> str:
     """Write a motion; the ending of the name decides what.
 
@@ -39,6 +44,9 @@ def write_motion(
     motion : Motion
     skeleton : Skeleton
         The body that moves.
+    up : (3,) array, optional
+        Unit vector up in the laboratory, for the gravity of an ``.osim``; see
+        :func:`ikns.motion.lab_vertical.lab_vertical`.
     force : bool
         Whether to replace a file that exists.
 
@@ -57,7 +65,7 @@ def write_motion(
         write(path, fitted_markers(skeleton, motion), force=force)
         return ""
     if ending == MODEL:
-        write_text(path, opensim_model(skeleton), force=force)
+        write_text(path, opensim_model(skeleton, up), force=force)
         return ""
     coordinates = motion_coordinates(motion)
     if not len(coordinates.time):

@@ -13,11 +13,13 @@ from ikns.numerics.rigid import turn_to
 
 #: Version of the format: OpenSim 4.0, which later ones read.
 _VERSION = "40000"
+#: Standard gravity, m/s^2, as OpenSim has it.
+_GRAVITY = 9.80665
 #: OpenSim's cylinders lie along y, those of a URDF along z.
 _Y_TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
-def opensim_model(skeleton: Skeleton) -> str:
+def opensim_model(skeleton: Skeleton, up: Array | None = None) -> str:
     """Return the text of an .osim file.
 
     Parameters
@@ -26,6 +28,9 @@ def opensim_model(skeleton: Skeleton) -> str:
         Links become bodies with their mass, inertia and shape, revolute joints
         PinJoints with one coordinate of the same name, the thorax's free flyer a
         FreeJoint with ``thorax_rx`` to ``thorax_tz``, and markers are carried along.
+    up : (3,) array, optional
+        Unit vector up in the laboratory, which is the model's ground; without it,
+        gravity is OpenSim's own, along -Y.
 
     Returns
     -------
@@ -37,6 +42,9 @@ def opensim_model(skeleton: Skeleton) -> str:
     links = {str(link.get("name")): link for link in robot.iter("link")}
     document = ET.Element("OpenSimDocument", Version=_VERSION)
     model = _part(document, "Model", robot.get("name", "body"))
+    if up is not None:
+        # Adding 0 leaves no -0.
+        _text(model, "gravity", _numbers(-_GRAVITY * np.asarray(up) + 0.0))
     bodies = ET.SubElement(_part(model, "BodySet", "bodyset"), "objects")
     for name, link in links.items():
         _body(bodies, name, link)
