@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import small_person
 
@@ -125,3 +126,27 @@ def _near(a: object, b: object) -> bool:
     if isinstance(a, float) and isinstance(b, float):
         return a == pytest.approx(b, rel=1e-2, abs=1e-4)
     return a == b
+
+
+def test_a_still_part_of_a_recording_makes_a_marker_set(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    still = read(files / "static.c3d")
+    # The right hand goes 10 cm forward and back before the person stands still.
+    end = len(still.time) / still.rate
+    markers = np.concatenate([still.markers, still.markers])
+    times = np.arange(len(markers)) / still.rate
+    hand = [still.labels.index(label) for label in ("RWRA", "RWRB", "RFIN")]
+    ahead = 0.05 * (1 - np.cos(2 * np.pi * times / end)) * (times < end)
+    markers[:, hand, 0] += ahead[:, None]
+    path = small_person.write(tmp_path, "both", Recording(times, markers, still.labels))
+    made = str(tmp_path / "mine.toml")
+    argv = ["markers", "new", str(path), "--guess", "--out", made]
+    assert main(argv) == 2
+    assert "moves" in capsys.readouterr().err
+    part = ["--from", f"{end:.2f}"]
+    assert main([*argv, *part]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert f"ikns markers check {made} {path} {' '.join(part)}" in words
+    assert main(["markers", "check", made, str(path), *part]) == 0
+    assert main(["markers", "check", made, str(path)]) == 2

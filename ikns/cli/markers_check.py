@@ -12,7 +12,7 @@ from ikns.cli.marker_options import (
     StaticFile,
     followed_sentence,
 )
-from ikns.cli.options import AsJson, MinStatic
+from ikns.cli.options import AsJson, From, MinStatic, To
 from ikns.cli.output import notes, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import MarkerMismatch, naming
@@ -31,6 +31,8 @@ def check(
     static: StaticFile,
     movement: Movement = None,
     min_static: MinStatic = 1.0,
+    from_: From = None,
+    to: To = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare a marker set with a static trial, and with a movement.
@@ -38,12 +40,13 @@ def check(
     How far each marker is from where the set expects it, in millimeters and in
     placement deviations, and the joint angles in which the person stands; with
     --movement, how far the markers are from the body that follows them. Exits with 2
-    when the static trial must not be used, as of a mirror image.
+    when the static trial must not be used, as of a mirror image. --from and --to take
+    a part of the static trial.
     """
     from ikns.calibration.judge.finding import refusal, refused
     from ikns.calibration.set_check import check_marker_set, follow_movement
 
-    frames = read(static)
+    frames = read(static, start=from_, end=to)
     worn = ikns.MarkerSet.load(marker_set)
     with naming(str(static)):
         found = check_marker_set(

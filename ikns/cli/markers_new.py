@@ -15,7 +15,7 @@ from ikns.cli.marker_options import (
     millimeters,
 )
 from ikns.cli.marker_questions import ask_sites
-from ikns.cli.options import AsJson, ForceFile, MinStatic
+from ikns.cli.options import AsJson, ForceFile, From, MinStatic, To
 from ikns.cli.output import held_sentences, notes, show, table
 from ikns.cli.reading import Read, reads_markers
 from ikns.errors import InvalidInput, naming
@@ -49,6 +49,8 @@ def new(
         str | None, typer.Option(help="Name of the set. Default: that of the file.")
     ] = None,
     min_static: MinStatic = 1.0,
+    from_: From = None,
+    to: To = None,
     force: ForceFile = False,
     as_json: AsJson = False,
 ) -> None:
@@ -57,7 +59,8 @@ def new(
     Asks for every label where it sits, with what the label usually means as the
     default. Places of landmarks are known; where the other markers sit is measured.
     Markers that --movement lacks are taken to be worn in static trials only, and it is
-    reported how well the body follows that movement.
+    reported how well the body follows that movement. --from and --to take a part of the
+    static trial, if a longer recording holds one.
     """
     inputs = [static, sites, movement]
     refuse_overwriting(out, force=force, inputs=inputs, endings=[".toml"])
@@ -67,7 +70,7 @@ def new(
     from ikns.calibration.set_check import follow_movement
     from ikns.recording.labels import read_name_pairs
 
-    frames = read(static)
+    frames = read(static, start=from_, end=to)
     moved = None if movement is None else read(movement)
     seen = () if moved is None else moved.labels
     answers = (
@@ -117,6 +120,11 @@ def new(
         *notes(remarks),
         f"Wrote {out}; see how it fits: ikns markers check {out} {static}"
         + f" --min-static {min_static:g}" * (min_static != 1.0)
+        + "".join(
+            f" --{option} {value}"
+            for option, value in (("from", from_), ("to", to))
+            if value is not None
+        )
         + f" --movement {movement or 'RECORDING'}",
         as_json=as_json,
     )
