@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 import small_person
 
-from ikns.calibration.method_summary import method_summary, no_range_learned
+from ikns.calibration.method_summary import (
+    _recommended,
+    method_summary,
+    no_range_learned,
+)
 from ikns.calibration.subject import Subject
 from ikns.cli.calibration_tables import calibration_parts, methods_parts
 from ikns.live.control.recorded import control_table
@@ -94,6 +98,20 @@ def test_without_enough_reaches_no_method_is_recommended(moved):
     )
     assert "No method is recommended yet: 0 reaches between points and" in text
     assert "at least 5 of one kind are needed" in text
+
+
+def test_a_method_whose_c_follows_reaches_is_not_recommended():
+    counts = {"between_places": 7, "natural": 0}
+    rows = {
+        "paper": {"between_places": 0.3, "natural": None, "turned_hand": 2.8},
+        "intent": {"between_places": 1.1, "natural": None, "turned_hand": 0.2},
+    }
+    # By the mean of both causes it would be intent.
+    assert _recommended(rows, counts)["recommended"] == "paper"
+    rows["paper"]["between_places"] = 0.8
+    found = _recommended(rows, counts)
+    assert found["recommended"] is None
+    assert "intent by 1.10 and that of paper by 0.80" in found["why"]
 
 
 def test_a_range_smaller_than_a_reach_s_change_is_no_range(moved):

@@ -25,6 +25,9 @@ TURN = np.radians(29.0)
 #: A reach goes at least so far, m; fewer of them say nothing; c moves a lot by more
 #: than this.
 _FAR, _FEWEST, _LOT = 0.10, 5, 0.2
+#: A method whose c a reach changes by more than this is not recommended: real people's
+#: reaches change the paper's by 0.2, where the elbow was swung at held places.
+_USELESS = 0.5
 #: Methods that can be recommended. Proximal follows the elbow: in real people's reaches
 #: its c changes more than that of intent, by 0.139 against 0.051, or 0.127 with the
 #: natural posture of other people (benchmarks/README.md, null_space_bench).
@@ -241,6 +244,17 @@ def _recommended(
         return {"recommended": None, "why": "c is unknown at the ends of the reaches"}
     cost = {m: float(np.mean([of[m] for of in causes.values()])) for m in known}
     best, other = sorted(cost, key=lambda method: cost[method])
+    reach = causes.get(kind, {})
+    if reach and min(reach.values()) > _USELESS:
+        each = [f"that of {m} by {value:.2f}" for m, value in sorted(reach.items())]
+        return {
+            "recommended": None,
+            "why": f"a {_REACHES[kind]} changes c by more than half of its range, "
+            f"{' and '.join(each)}; hold the hand at each place, and turn the elbow to "
+            "both ends",
+        }
+    if reach.get(best, 0.0) > _USELESS:
+        best, other = other, best
     each = [
         f"{words[c]}: {of[best]:.2f} and {of[other]:.2f}" for c, of in causes.items()
     ]

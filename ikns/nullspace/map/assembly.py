@@ -9,7 +9,7 @@ import numpy as np
 
 from ikns.arrays import Array, Indices
 from ikns.nullspace.map.alignment import align
-from ikns.nullspace.map.checks import MapSettings, MapWarning, format_point
+from ikns.nullspace.map.checks import MapSettings, MapWarning, format_point, listed
 
 # Directions more than 60 degrees apart say little about each other's sign.
 _WEAK = 0.5
@@ -80,11 +80,12 @@ def _warn_of_disagreement(
         least = _WEAK if (i, j) in tree or (j, i) in tree else 0.0
         if cosine < least:
             both_ends = f"{format_point(centers, i)} and {format_point(centers, j)}"
-            weak.append(f"{both_ends} (cosine {cosine:.2f})")
+            weak.append((cosine, f"{both_ends} (cosine {cosine:.2f})"))
     if weak:
+        named = listed([name for _, name in sorted(weak)])
         warnings.warn(
             "the directions of neighboring points differ so much that their signs, and "
-            f"c between them, are uncertain: {'; '.join(weak)}.",
+            f"c between them, are uncertain: {named}.",
             MapWarning,
             stacklevel=4,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -199,7 +200,7 @@ def _too_few(found: BoundingBoxKMeans, few: list[int]) -> str:
     elif empty:
         told.append(f"{len(empty)} have 0, as the hand was not held there")
     advice = f"; use {len(centers) - len(few)} points, or record more places"
-    return "; ".join(told) + advice * bool(empty)
+    return listed(told) + advice * bool(empty)
 
 
 def _warn_of_merged(found: BoundingBoxKMeans) -> None:
@@ -210,7 +211,7 @@ def _warn_of_merged(found: BoundingBoxKMeans) -> None:
     ]
     if shared:
         warnings.warn(
-            f"two places share one PCA point: {'; '.join(shared)}; use as many points "
+            f"two places share one PCA point: {listed(shared)}; use as many points "
             "as there are places, or one recording per place.",
             MapWarning,
             stacklevel=4,
@@ -239,7 +240,7 @@ def warn_of_components(centers: Array, n_components: Indices, n_dof: int) -> Non
     ]
     if none:
         warnings.warn(
-            f"no joint moves at {'; '.join(none)}, so these points do not contribute "
+            f"no joint moves at {listed(none)}, so these points do not contribute "
             "to c.",
             MapWarning,
             stacklevel=3,
@@ -251,11 +252,17 @@ def warn_of_components(centers: Array, n_components: Indices, n_dof: int) -> Non
     if more:
         warnings.warn(
             f"the recording holds more degrees of freedom than the {n_dof} requested "
-            "(the "
-            f"hand turned, the shoulder girdle moved, or noise): at {'; '.join(more)}.",
+            "(the hand turned, the shoulder girdle moved, or noise): at "
+            f"{listed(more)}.",
             MapWarning,
             stacklevel=3,
         )
+
+
+def listed(what: Sequence[str], most: int = 3) -> str:
+    """Return the first of them, and how many more there are."""
+    more = len(what) - most
+    return "; ".join(what[:most]) + (f"; and {more} more" if more > 0 else "")
 
 
 def format_point(centers: Array, k: int) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
-from ikns.nullspace.map.checks import MapWarning, format_point
+from ikns.nullspace.map.checks import MapWarning, format_point, listed
 
 #: From a joint vector (n,), rad, to d motions (d, n) of the joints there.
 Motions = Callable[[Array], Array]
@@ -150,18 +150,17 @@ def _check_shown(centers: Array, faults: Sequence[str], n_dof: int) -> None:
     if not wrong:
         return
     count, good = len(faults), len(faults) - len(wrong)
-    listed = "; ".join(wrong[:3]) + f"; and {len(wrong) - 3} more" * (len(wrong) > 3)
     least = max(math.ceil(_MOST * count), min(4, count))
     if good < least:
         raise NotEnoughData(
             f"expected {n_dof} degrees of freedom at {least} of the {count} places or "
             "more, "
-            f"found them at {good}: {listed}: explore each by itself there (lift the "
-            "elbow, turn the hand), or ask for fewer with --n-dof."
+            f"found them at {good}: {listed(wrong)}: explore each by itself there "
+            "(lift the elbow, turn the hand), or ask for fewer with --n-dof."
         )
     warnings.warn(
         f"{len(wrong)} of {count} places do not show {n_dof} degrees of freedom: "
-        f"{listed}.",
+        f"{listed(wrong)}.",
         MapWarning,
         stacklevel=4,
     )
