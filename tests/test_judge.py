@@ -1,6 +1,7 @@
 """What the judge says of static trials and recordings, clean and wrong."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +17,7 @@ from ikns.calibration.scaling import judge_static, scale
 from ikns.cli import main
 from ikns.errors import FileError, InvalidInput, MarkerMismatch, NotEnoughData
 from ikns.recording.files import read, write_c3d
+from ikns.recording.labels import renamed
 from ikns.recording.recording import Recording
 
 RATE = 50.0
@@ -122,6 +124,15 @@ def test_both_wrists_exchanged_are_mended_together():
     (found,) = judge_static(generic(), static).findings
     assert found.kind == "exchanged"
     assert set(found.markers) == {"RWRA", "RWRB", "LWRA", "LWRB"}
+
+
+def test_the_command_that_is_named_mends_names_also_of_a_ring_of_three():
+    ring = {"RUPA": "RUPB", "RUPB": "RUPC", "RUPC": "RUPA"}
+    wrong = renamed(reaching(), ring)
+    right = check(wrong).findings[0].right
+    names = dict(re.findall(r"--rename (\w+)=(\w+)", right))
+    assert names == {new: old for old, new in ring.items()}
+    assert check(renamed(wrong, names)).findings == ()
 
 
 def test_a_mirror_image_is_told():
@@ -361,7 +372,7 @@ def test_real_people_pass_and_their_wrong_recordings_do_not(data):
 @pytest.mark.parametrize(
     ("label", "found", "right"),
     [
-        ("RELBOW", ", but Ann:RELBOW, which", "add --rename Ann:RELBOW=RELB"),
+        ("RELBOW", ", but Ann:RELBOW, which", "add --rename RELBOW=RELB"),
         ("X1", "; oxford24 does not have Ann:X1", "if one of these is meant"),
         (None, "", "look whether it was worn"),
     ],

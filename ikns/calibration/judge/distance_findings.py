@@ -6,6 +6,7 @@ import numpy as np
 
 from ikns.arrays import Array, Indices
 from ikns.calibration.judge.finding import Finding, say_markers
+from ikns.calibration.judge.sides import renaming
 
 
 def exchanged_names(
@@ -30,7 +31,7 @@ def exchanged_names(
                 where,
                 f"{say_markers(names)} have swapped names: their distances to other "
                 "markers of their segments are off",
-                f"swap {steps}: then all distances fit",
+                f"swap {steps}: then all distances fit ({renaming(labels, group)})",
                 names,
             )
         )

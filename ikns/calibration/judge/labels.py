@@ -51,7 +51,11 @@ def judge_unseen(recording: Recording, worn: MarkerSet) -> list[Finding]:
     others = _unknown(recording.labels, worn)
     found, right = unseen_words(named), "look whether it was worn and labeled"
     alike = {name: _alike(name, others) for name in named}
-    meant = [f"--rename {other}={name}" for name, other in alike.items() if other]
+    meant = [
+        f"--rename {other.rsplit(':', 1)[-1]}={name}"
+        for name, other in alike.items()
+        if other
+    ]
     if meant:
         known = ", ".join(filter(None, alike.values()))
         found += f", but {known}, which {worn.name} does not have"

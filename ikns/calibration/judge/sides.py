@@ -23,6 +23,23 @@ def other_side(labels: Sequence[str]) -> Indices:
     )
 
 
+#: How labels of all markers of a file are changed.
+_SIDES = "in a file: `ikns convert --labels FILE` with a line OLD=NEW for each marker"
+
+
+def renaming(labels: Sequence[str], exchanges: Sequence[tuple[int, int]]) -> str:
+    """Say how exchanges of markers, one after the other, are made in a file.
+
+    >>> renaming(["A", "B", "C"], [(0, 1)])
+    'in a file: `ikns convert --rename B=A --rename A=B`'
+    """
+    own = list(range(len(labels)))
+    for a, b in exchanges:
+        own[a], own[b] = own[b], own[a]
+    options = [f"--rename {labels[k]}={labels[i]}" for i, k in enumerate(own) if i != k]
+    return f"in a file: `ikns convert {' '.join(options)}`"
+
+
 def sides_exchanged(where: str, then: str) -> Finding:
     """Say that left and right carry each other's names; `then` is what fits then."""
     return Finding(
@@ -30,7 +47,7 @@ def sides_exchanged(where: str, then: str) -> Finding:
         "refuse",
         where,
         "left and right are swapped",
-        f"swap the labels of left and right: {then}",
+        f"swap the labels of left and right: {then} ({_SIDES})",
     )
 
 
@@ -45,5 +62,5 @@ def mirror_image(where: str, then: str, *, or_sides: bool = False) -> Finding:
         "refuse",
         where,
         "the body is a mirror image",
-        f"{labels}export without mirroring an axis: {then}",
+        f"{labels}export without mirroring an axis: {then}" + f" ({_SIDES})" * or_sides,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ikns.calibration.judge.plausible import (
     assumed,
 )
 from ikns.calibration.judge.repair import Repair, find_repair
+from ikns.calibration.judge.sides import mirror_image, renaming
 from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.judge.unit import size_ratio, wrong_unit
 from ikns.calibration.size_fit import SizeFit
@@ -163,14 +165,8 @@ def _exchanged(
 ) -> Finding:
     severity: Severity = "refuse" if repair.sure else "warn"
     if repair.mirrored:
-        return Finding(
-            "mirrored",
-            severity,
-            where,
-            "the body is a mirror image",
-            "swap the labels of left and right, or export without mirroring an "
-            "axis: then everything fits",
-        )
+        image = mirror_image(where, "then everything fits", or_sides=True)
+        return replace(image, severity=severity)
     names = tuple(labels[i] for pair in repair.exchanges for i in pair)
     pairs = [f"{a} and {b}" for a, b in zip(names[::2], names[1::2], strict=True)]
     worst = int(np.nanargmax(found.offsets_sd))
@@ -179,7 +175,8 @@ def _exchanged(
         severity,
         where,
         f"{', '.join(pairs)} have swapped names ({_misfit(labels, worst, found)})",
-        f"swap {', and '.join(pairs)}: then everything fits",
+        f"swap {', and '.join(pairs)}: then everything fits "
+        f"({renaming(labels, repair.exchanges)})",
         names,
     )
 

@@ -9,7 +9,12 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.distances import quantile
 from ikns.calibration.judge.finding import Finding, say_markers
 from ikns.calibration.judge.pose_cost import PoseCost
-from ikns.calibration.judge.sides import mirror_image, other_side, sides_exchanged
+from ikns.calibration.judge.sides import (
+    mirror_image,
+    other_side,
+    renaming,
+    sides_exchanged,
+)
 from ikns.calibration.judge.slips import judge_slips
 from ikns.calibration.turning_skin import turning_labels, with_free_turn
 from ikns.motion.marker_ik import MarkerIK, turned_markers
@@ -82,7 +87,8 @@ def judge_tracking(
                 where,
                 f"{first} and {second} have swapped names: no posture fits "
                 f"({1000 * residual:.0f} mm off)",
-                f"swap {first} and {second}: then a posture fits",
+                f"swap {first} and {second}: then a posture fits "
+                f"({renaming((first, second), [(0, 1)])})",
                 (first, second),
             )
         ]
