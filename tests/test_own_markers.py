@@ -11,7 +11,12 @@ from ikns.body.marker_set import MarkerSet
 from ikns.body.sites import guess_sites, site, sites, usual_site
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.observed import unshown_joints
-from ikns.calibration.own_markers import OwnMarkerSet, own_marker_set, read_answers
+from ikns.calibration.own_markers import (
+    OwnMarkerSet,
+    own_marker_set,
+    read_answers,
+    side_sentence,
+)
 from ikns.calibration.set_check import check_marker_set, follow_movement
 from ikns.errors import InvalidInput, MarkerMismatch
 from ikns.recording.files import read
@@ -266,6 +271,20 @@ def test_what_a_movement_lacks_is_guessed_to_be_static_only() -> None:
     beside = guess_sites(labels, moving=["Ann:rlar1", "RLAR2", "RLAR3", "RSPR", "RELB"])
     assert [k for k, v in beside.items() if v.endswith(" static")] == ["RMEP"]
     assert "XYZ" not in beside
+
+
+def test_labels_that_name_no_side_are_of_the_side_that_is_given(data: Path) -> None:
+    # One arm of a real person wears markers.
+    trial = read(data / "shoulder_kinova" / "example.c3d", start=4, end=5.2)
+    with pytest.raises(MarkerMismatch, match=r"EPI_lat.* give --side right or"):
+        own_marker_set(Skeleton.load(), trial, guess_sites(trial.labels), name="a")
+    found = guess_sites(trial.labels, side="right")
+    assert found["Martin:EPI_lat"] == "right_lateral_epicondyle"
+    made = own_marker_set(Skeleton.load(), trial, found, name="right")
+    assert {"EPI_lat", "MET5"} <= set(made.marker_set.labels)
+    assert side_sentence(made.skipped) == ""
+    # A label's own side comes first.
+    assert usual_site("LELB", side="right") == usual_site("LELB")
 
 
 @pytest.mark.parametrize("name", ["ADL001", "ADL005"])

@@ -304,6 +304,7 @@ TOGETHER = [
     "ucm {points} --subject {person} --from 5 --to 1",
     "markers new {static} --guess --out new.toml --from 5 --to 1",
     "markers check oxford24 {static} --from 1e6",
+    "markers new {static} --sites {angles} --side left --out new.toml",
     "compare {points} --subject {person} --from 1e6",
     "check {free} --subject {person} --to -1",
     "calibrate --static {static} --exploration {points} --out new --from 1e6",

@@ -118,12 +118,15 @@ def usual_site(
     label: str,
     answered: Mapping[str, str] | None = None,
     others: Iterable[str] = (),
+    *,
+    side: str | None = None,
 ) -> Site | None:
     """Return where a marker of this label usually sits; None where that is open.
 
     `answered` are places by label: what was said of the same label on the other side
     comes first. `others` are labels worn with it: the sternum's is at the lower end of
-    the bone where another one is at the upper end, else anywhere on it.
+    the bone where another one is at the upper end, else anywhere on it. `side` is that
+    of labels that name none, as where one arm alone wears markers.
 
     >>> usual_site("Anna:RELB").name, usual_site("LUAR3").name, usual_site("XYZ")
     ('right_lateral_epicondyle', 'left_upper_arm', None)
@@ -131,6 +134,8 @@ def usual_site(
     'left_knuckle_3'
     >>> usual_site("STRN").name, usual_site("STRN", others=["CLAV"]).name
     ('sternum', 'xiphoid')
+    >>> usual_site("EPICl"), usual_site("EPICl", side="left").name
+    (None, 'left_lateral_epicondyle')
     """
     bare = label.rpartition(":")[2].strip()
     if twin := _mirrored(bare, answered or {}):
@@ -144,14 +149,31 @@ def usual_site(
     ]
     if found := _named(bare, middle):
         return found
-    for side, rest in _readings(bare):
-        own = [s for s in sites().values() if s.side == side]
+    readings = _readings(bare) + ([(side, bare)] if side else [])
+    for own_side, rest in readings:
+        own = [s for s in sites().values() if s.side == own_side]
         if found := _named(rest, own):
             return found
     return None
 
 
-def guess_sites(labels: Sequence[str], moving: Sequence[str] = ()) -> dict[str, str]:
+def without_side(labels: Sequence[str]) -> list[str]:
+    """Return labels that name a place on an arm, but not on which.
+
+    >>> without_side(["RELB", "EPICl", "XYZ", "T10"])
+    ['EPICl']
+    """
+    return [
+        label
+        for label in labels
+        if usual_site(label, others=labels) is None
+        and usual_site(label, others=labels, side="right") is not None
+    ]
+
+
+def guess_sites(
+    labels: Sequence[str], moving: Sequence[str] = (), *, side: str | None = None
+) -> dict[str, str]:
     """Take each label for what it usually means; labels of no known place are left out.
 
     Parameters
@@ -162,6 +184,8 @@ def guess_sites(labels: Sequence[str], moving: Sequence[str] = ()) -> dict[str, 
         Of a movement, if there is one: markers that it lacks are static only. Without
         one, landmarks of a forearm that carries three markers elsewhere are: they are
         put on to calibrate such a cluster.
+    side : {"right", "left"}, optional
+        That of labels that name none.
 
     Returns
     -------
@@ -175,7 +199,7 @@ def guess_sites(labels: Sequence[str], moving: Sequence[str] = ()) -> dict[str, 
     """
     answers: dict[str, str] = {}
     for label in labels:
-        if found := usual_site(label, answers, labels):
+        if found := usual_site(label, answers, labels, side=side):
             answers[label] = found.name
     worn = label_keys(moving)
     places = {label: site(name) for label, name in answers.items()}

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ikns.arrays import Array
 from ikns.body.marker_set import Marker, MarkerSet
-from ikns.body.sites import Site, site
+from ikns.body.sites import Site, site, without_side
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.finding import say_markers
 from ikns.calibration.judge.static import refuse_moving
 from ikns.calibration.observed import with_unshown_held
 from ikns.calibration.size_fit import SizeFit, fit_sizes, size_factors
@@ -180,9 +181,30 @@ def _check(placed: tuple[PlacedLabel, ...], static: Recording) -> None:
     if len({p.site.link for p in known}) < 2:
         raise MarkerMismatch(
             f"{static.source}: expected landmarks on two segments or more, to find the "
-            f"body from, found {', '.join(p.label for p in known) or 'none'}; say "
-            "where more of its markers sit, as in --sites FILE."
+            f"body from, found {', '.join(p.label for p in known) or 'none'}; "
+            f"{_where_more(placed, static)}."
         )
+
+
+def _where_more(placed: tuple[PlacedLabel, ...], static: Recording) -> str:
+    """Say what would place more markers."""
+    said = {one.label.casefold() for one in placed}
+    left = [label for label in static.labels if _bare(label).casefold() not in said]
+    if told := side_sentence(left):
+        return told
+    return "say where more of its markers sit, as in --sites FILE"
+
+
+def side_sentence(labels: Sequence[str]) -> str:
+    """Say which labels name places of an arm, but not of which; empty for none."""
+    open_ = without_side(labels)
+    if not open_:
+        return ""
+    one = len(open_) == 1
+    return (
+        f"{say_markers(open_)} name{'s' * one} {'a place' if one else 'places'} of an "
+        "arm, but not which: give --side right or --side left"
+    )
 
 
 def _measured(

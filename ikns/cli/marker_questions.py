@@ -9,18 +9,23 @@ from ikns.errors import InvalidInput
 
 
 def ask_sites(
-    labels: Sequence[str], *, guess: bool, moving: Sequence[str] = ()
+    labels: Sequence[str],
+    *,
+    guess: bool,
+    moving: Sequence[str] = (),
+    side: str | None = None,
 ) -> dict[str, str]:
     """Ask on the terminal where each label sits; answers as a file would have them.
 
     With `guess` nothing is asked, and labels that usually mean no place are left out.
     `moving` are the labels of a movement, if there is one: the others are static only.
+    `side` is that of labels that name none.
     """
     from ikns.body.marker_set import label_keys
     from ikns.body.sites import guess_sites, site, sites, usual_site
 
     if guess:
-        return guess_sites(labels, moving)
+        return guess_sites(labels, moving, side=side)
     answers: dict[str, str] = {}
     worn = label_keys(moving)
     _say(
@@ -30,7 +35,7 @@ def ask_sites(
         "trials only."
     )
     for label in labels:
-        usual = usual_site(label, answers, labels)
+        usual = usual_site(label, answers, labels, side=side)
         default = usual.name if usual else "skip"
         if usual and worn and not label_keys([label]) & worn:
             default += " static"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -44,6 +44,12 @@ def new(
         bool,
         typer.Option("--guess", help="Do not ask: take what the labels usually mean."),
     ] = False,
+    side: Annotated[
+        Literal["right", "left"] | None,
+        typer.Option(
+            help="Side of the labels that name none, where one arm wears markers."
+        ),
+    ] = None,
     movement: Movement = None,
     name: Annotated[
         str | None, typer.Option(help="Name of the set. Default: that of the file.")
@@ -66,6 +72,8 @@ def new(
     refuse_overwriting(out, force=force, inputs=inputs, endings=[".toml"])
     if guess and sites is not None:
         raise InvalidInput("expected --sites or --guess, found both.")
+    if side is not None and sites is not None:
+        raise InvalidInput("--side and --sites exclude each other; give one.")
     from ikns.calibration.own_markers import own_marker_set
     from ikns.calibration.set_check import follow_movement
     from ikns.recording.labels import read_name_pairs
@@ -74,7 +82,7 @@ def new(
     moved = None if movement is None else read(movement)
     seen = () if moved is None else moved.labels
     answers = (
-        ask_sites(frames.labels, guess=guess, moving=seen)
+        ask_sites(frames.labels, guess=guess, moving=seen, side=side)
         if sites is None
         else read_name_pairs(sites, form="LABEL=PLACE")
     )
@@ -86,7 +94,7 @@ def new(
             name=name or out.stem,
             min_duration=min_static,
         )
-    remarks = _remarks(made)
+    remarks = _remarks(made, guess=guess)
     followed = None
     if moved is not None:
         followed = follow_movement(
@@ -130,14 +138,17 @@ def new(
     )
 
 
-def _remarks(made: OwnMarkerSet) -> list[str]:
+def _remarks(made: OwnMarkerSet, *, guess: bool) -> list[str]:
     """Say what was assumed or left out."""
+    from ikns.calibration.own_markers import side_sentence
+
     return [
         *(
             f"no landmark on {link}: its angles count from the static trial's posture."
             for link in made.assumed
         ),
         *([f"left out: {', '.join(made.skipped)}."] if made.skipped else []),
+        *([f"{told}."] if guess and (told := side_sentence(made.skipped)) else []),
         *(
             [
                 f"{', '.join(made.turning)} turn about the forearm with its skin: the "
