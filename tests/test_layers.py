@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-# Lowest floor first. A room imports from lower floors and from itself; rooms on one
-# floor do not know each other.
-FLOORS = (
+# Lowest level first. A package imports from lower levels and from itself; packages on
+# one level do not know each other.
+LEVELS = (
     "arrays errors endings",
     "_kernels output",
     "numerics",
@@ -24,7 +24,11 @@ FLOORS = (
     "view",
     "cli",
 )
-FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms.split()}
+LEVEL = {
+    package: level
+    for level, packages in enumerate(LEVELS)
+    for package in packages.split()
+}
 ONLY_IN = {
     "pinocchio": {"body", "view"},
     "sklearn": {"nullspace"},
@@ -96,16 +100,16 @@ def test_imports_point_down(path: Path) -> None:
     for line, name in imports(path):
         library, _, inside = name.partition(".")
         assert own in ONLY_IN.get(library, {own}), f"line {line}: {own} takes {name}"
-        room = inside.split(".")[0]
-        if library == "ikns" and not room:  # all public names: from above only
+        package = inside.split(".")[0]
+        if library == "ikns" and not package:  # all public names: from above only
             assert own == "cli", f"line {line}: {own} imports the whole package"
-        elif library == "ikns" and room != own:
-            assert FLOOR[room] < FLOOR[own], f"line {line}: {own} imports {name}"
+        elif library == "ikns" and package != own:
+            assert LEVEL[package] < LEVEL[own], f"line {line}: {own} imports {name}"
 
 
-def test_every_room_has_a_floor() -> None:
-    rooms = {module_of(path).split(".")[0] for path in FILES}
-    assert rooms == set(FLOOR)
+def test_every_package_has_a_level() -> None:
+    packages = {module_of(path).split(".")[0] for path in FILES}
+    assert packages == set(LEVEL)
 
 
 def circle(arrows: dict[str, set[str]]) -> list[str]:
