@@ -1,7 +1,7 @@
 """Intrinsic kinematic null space: learned from a person, driving a wearable robot.
 
-Public names, in the order in which data pass. They load on first use, so importing the
-package costs next to nothing.
+Public names, in the order of the data flow. They load on first use, so importing the
+package takes next to no time.
 
 Recording: markers over time
     read                         read a file of markers: C3D, TRC, CSV, TSV or XDF
@@ -16,7 +16,7 @@ Skeleton: the body of a person, or a robot
     fit_lengths                  the same with an exploration, by optimization
     Chain                        joints of a task, and the links that perform it
     load_chain                   a chain by its name or from a file
-    extrinsic_chain              joints that a task leaves alone, to be read as well
+    extrinsic_chain              joints that a task does not use, to be read as well
     Robot                        any robot arm from its URDF
 
 Motion: joints over time
@@ -24,17 +24,17 @@ Motion: joints over time
     Motion                       joint angles, velocities and hand poses
 
 Map: the null space and its range where the hand is
-    check_recordings             what is wrong with recordings, before they are used
+    check_recordings             find problems of recordings before they are used
     calibrate                    static trial and explorations in, a subject out
-    rewear                       a subject whose markers were put on again
-    method_summary               what c of each method does where nothing is meant
+    rewear                       a subject whose markers were reapplied
+    method_summary               change of c of each method without intent
     Subject                      skeleton, map and report of a person
     NullSpaceMap                 the map, learned from still samples
     null_space_samples           the still samples of a motion
     analytic_map                 the same map from the Jacobian
     NaturalNeighborInterpolator  the interpolation between its points
-    IntentMap                    c as what the person means: swivel less posture
-    NaturalPosture               where a person's elbow is with the wrist here
+    IntentMap                    c of intent: elbow swivel minus natural posture
+    NaturalPosture               elbow posture expected without intent
     hinge_swivel                 how far an arm is turned from shoulder to wrist
 
 Control: from live markers to the control signal c
@@ -42,12 +42,12 @@ Control: from live markers to the control signal c
     FrameSolver                  joint angles and c of one frame
     run                          the control loop, from a source to a finger
     read_run                     read a recorded run
-    replay_run                   compute a recorded run again, bit for bit
+    replay_run                   recompute a recorded run, bit for bit
     warm_up                      compile before the first frame
 
 Finger: the wearable robotic finger
     open_finger                  connect to a finger by its address
-    open_fingers                 several, each with its freedom of the map
+    open_fingers                 several, each with its degree of freedom of the map
     SimulatedFinger              a finger without hardware
     DynamixelFinger              a finger with a Dynamixel servo
     check_finger                 conformance test of a finger class

@@ -23,7 +23,7 @@ from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
 _SHORT = 16
 #: Shown over the curve of c; the gray box goes from 0 to 1.
 _CURVE = (
-    "c before clipping: the finger is told 0 below and 1 above the gray box; beyond "
+    "c before clipping: the finger gets 0 below and 1 above the gray box; beyond "
     "-0.15 and 1.15 the line leaves the picture"
 )
 _KINDS = {"f": ("<f4", "f4"), "u": ("<u4", "u4"), "i": ("<u4", "u4")}
