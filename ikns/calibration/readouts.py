@@ -69,8 +69,8 @@ def learn_readouts(
     """
     found: dict[str, Readout] = {}
     report: dict[str, Any] = {"without": {}, "warnings": []}
-    if learned.directions_.shape[1] > 1:
-        reason = "reads one degree of freedom, and the map has more"
+    if (n_dof := learned.directions_.shape[1]) > 1:
+        reason = f"it reads one degree of freedom, and this map has {n_dof}"
         report["without"] = dict.fromkeys(("proximal", "intent"), reason)
         return found, report
     if not whole_arms(chain):
