@@ -48,7 +48,7 @@ Frame#\tTime\tA\t\t
         ),
         ("optitrack:host", "unknown source 'optitrack:host', expected replay:FILE"),
         ("", "unknown source ''"),
-        ("{}/good.c3d", "HOST or ros2:TOPIC; to play this file, give replay:"),
+        ("{}/good.c3d", "HOST or ros2:TOPIC; to play this file, write replay:"),
         ("replay:", "expected replay:FILE"),
         ("vicon:", "vicon:HOST"),
         ("replay:{}/none.c3d", "none.c3d"),

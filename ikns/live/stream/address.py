@@ -108,7 +108,7 @@ def open_source(
     place, _, query = rest.rpartition("?") if "?" in rest else (rest, "", "")
     kind = _KINDS.get(scheme) if colon else None
     if kind is None:
-        meant = f"; to play this file, give replay:{address}" * _is_file(address)
+        meant = "; to play this file, write replay: before it" * _is_file(address)
         raise InvalidInput(f"unknown source '{address}', expected {_KNOWN}{meant}.")
     open_feed, options_known = kind
     options = dict(parse_qsl(query, keep_blank_values=True))
