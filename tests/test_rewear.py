@@ -19,6 +19,7 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.map import still_mask
 from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.nullspace.readout import IntentMap
+from ikns.recording.recording import Recording
 from ikns.simulation import Protocol, VirtualSubject
 
 
@@ -140,6 +141,21 @@ def test_a_folder_of_before_keeps_what_it_has():
     found = rewear(old, other.static.recording, [other.free.recording])
     assert found.methods == ["paper"]
     assert found.report["rewear"]["why"] == "the subject has no intent"
+
+
+def test_the_markers_of_another_person_are_told():
+    subject, _, other = people()
+
+    def named(one, name):
+        labels = [f"{name}:{label}" for label in one.labels]
+        return Recording(one.time, one.markers, labels, one.source)
+
+    report = {"static": {"subjects": ["ann"]}}
+    ann = dataclasses.replace(subject, readouts={}, report=report)
+    trials = [named(one.recording, "Ben") for one in (other.static, other.free)]
+    found = rewear(ann, trials[0], trials[1:]).report
+    assert any("was calibrated as ann" in told for told in found["warnings"])
+    assert found["static"]["subjects"] == ["ben"]
 
 
 def test_the_command_writes_another_folder(tmp_path, capfd):

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ikns.body.marker_set import MarkerSet
+from ikns.calibration.judge.subjects import other_than_calibrated
 from ikns.calibration.measured_body import measured_body
 from ikns.calibration.method_summary import method_summary
 from ikns.calibration.natural import LEAST_NATURAL, check_covered, check_own_arm
@@ -115,6 +116,7 @@ def rewear(
         progress=progress,
         known=True,
     )
+    others = other_than_calibrated(subject.report, static, measured.skeleton.marker_set)
     motions = measured.explorations
     with naming(names):
         check_own_arm(motions, chain)
@@ -133,7 +135,7 @@ def rewear(
                 for recording, motion in zip(natural, motions, strict=True)
             ],
         },
-        "warnings": measured.warnings,
+        "warnings": [*(other.sentence for other in others), *measured.warnings],
     }
     new = replace(new, report=report, readouts={**subject.readouts, **found})
     methods = dict(subject.report.get("methods", {"without": {}, "warnings": []}))
