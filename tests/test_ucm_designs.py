@@ -135,7 +135,7 @@ def test_an_analysis_of_points_splits_the_still_samples_near_each() -> None:
     # Points are held for 1.5 s at 50 Hz; one that asks for more than the longest rest
     # near it is left out.
     longest = found.counts.max() / 50
-    with pytest.raises(NotEnoughData, match=f"found {found.counts.max()} at most"):
+    with pytest.raises(NotEnoughData, match=f"the most was {found.counts.max()}"):
         analyze_points(skeleton, motion, learned, min_still=longest + 0.1)
 
 
