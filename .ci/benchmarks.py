@@ -23,8 +23,10 @@ AT_ONCE = 3  # some mostly wait
 WITH_TEST_PACKAGES = {
     "endings",
     "finger_faults",
+    "live_loop",
     "marker_ik",
     "natural_neighbor",
+    "paper_statistics",
     "publishing",
     "soak",
     "stream_latency",
