@@ -1,4 +1,4 @@
-"""Run every benchmark with ``--quick``, three at a time; exit 1 if one fails.
+"""Run every benchmark with ``--quick``, two at a time; exit 1 if one fails.
 
 ``benchmarks.py FILE``: as soon as FILE exists, what tests need is installed. The few
 benchmarks that need it, too, wait for that.
@@ -18,7 +18,7 @@ from typing import BinaryIO
 
 from ikns.live.warm_up import warm_up
 
-AT_ONCE = 3  # some mostly wait
+AT_ONCE = 2
 #: They import what only the group `test` has, or start programs that do.
 WITH_TEST_PACKAGES = {
     "endings",
