@@ -216,7 +216,7 @@ def test_force_never_replaces_a_file_that_is_read(
         target = desk / f"out{SUFFIX.get(output, '.csv')}"
         disguise(target, source)
         sentence = check_refused(argv(name, output, target), desk, capfd, names=target)
-        assert "this file is read" in sentence
+        assert "this file is also an input" in sentence
         target.unlink()
         (desk / "between").unlink(missing_ok=True)
 
@@ -248,7 +248,7 @@ def test_a_marker_set_in_the_subject_folder_stays(
         if not given.exists():
             os.link(desk / "person" / "markers.toml", given)
         sentence = check_refused([*words, str(given)], desk, capfd)
-        assert "is read" in sentence
+        assert "which is an input" in sentence
 
 
 def test_what_comes_from_standard_input_is_not_replaced(
@@ -264,4 +264,4 @@ def test_what_comes_from_standard_input_is_not_replaced(
         finally:
             os.dup2(kept, 0)
             os.close(kept)
-    assert "this file is read as in.c3d" in sentence
+    assert "this file is also an input, in.c3d" in sentence

@@ -15,7 +15,7 @@ Refused = pytest.CaptureFixture[str]
     [
         (
             "convert {free} {free}",
-            "{free}: this file is read; give the output another name.",
+            "{free}: this file is also an input; give the output another name.",
         ),
         ("check {free} {free}", "{free}: given twice; give each recording once."),
         ("ucm --subject {person} {free} {free}", "{free}: given twice"),

@@ -24,7 +24,7 @@ def test_one_file_under_two_names_is_one_file(tmp_path: Path, make) -> None:
     source.write_text("kept")
     make(source, tmp_path / "written")
     for given in (source, tmp_path / "folder", str(source)):
-        with pytest.raises(InvalidInput, match="this file is read as"):
+        with pytest.raises(InvalidInput, match="this file is also an input, "):
             refuse_input(tmp_path / "written", [given])
 
 
@@ -39,7 +39,7 @@ def test_a_folder_around_an_input_or_with_a_link_to_it_is_refused(
     refuse_input_folder(out, [apart / "b", apart, None])
     os.link(apart / "b", out / "b")
     for source in (out, out / "deep", out / "deep" / "a", apart / "b"):
-        with pytest.raises(InvalidInput, match="is read; give the output"):
+        with pytest.raises(InvalidInput, match="is an input; give the output"):
             refuse_input_folder(out, [source])
     # A folder within one that is read may be written: a report in its study.
     refuse_input_folder(out / "deep", [out])

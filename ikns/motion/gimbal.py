@@ -7,6 +7,7 @@ import numpy as np
 from ikns.arrays import Array, Mask
 from ikns.body.chains import SIDES
 from ikns.motion.motion import Motion
+from ikns.numerics.rigid import quaternion_matrix
 
 #: Where the cosine of the middle angle is less, an error of the rotation is more than
 #: ten times as large in the other two angles: within 5.7 deg of +-90.
@@ -78,9 +79,9 @@ def near_gimbal_lock(motion: Motion, *, thorax: bool) -> dict[tuple[str, str], i
     """
     found: dict[tuple[str, str], Mask] = {}
     if thorax:
-        x, y, z, w = motion.thorax_in_world[:, 3:].T
+        turned = quaternion_matrix(motion.thorax_in_world[:, 3:])
         with np.errstate(invalid="ignore"):
-            sine = np.abs(2 * (x * z + y * w))  # of thorax_ry
+            sine = np.abs(turned[:, 0, 2])  # of thorax_ry
             found["thorax_rx", "thorax_rz"] = sine > np.sqrt(1 - _LOCKED**2)
     angles = dict(zip(motion.joint_names, motion.angles.T, strict=True))
     for side in SIDES:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ikns.arrays import Array
 from ikns.motion.motion import Motion
+from ikns.numerics.rigid import quaternion_matrix
 
 #: A trunk is upright when its long axis is within 37 deg of an axis of the laboratory,
 #: and the laboratory's vertical is known when the trunk is so in most of the frames.
@@ -26,11 +27,7 @@ def lab_vertical(motion: Motion) -> Array | None:
         A unit vector along an axis, such as ``[0, 0, 1]``; None where the trunk is not
         upright in most frames, or not always the same way up.
     """
-    x, y, z, w = motion.thorax_in_world[:, 3:].T
-    # The second column of the rotation: the thorax has its y up.
-    up = np.column_stack(
-        [2 * (x * y - w * z), 1 - 2 * (x**2 + z**2), 2 * (y * z + w * x)]
-    )
+    up = quaternion_matrix(motion.thorax_in_world[:, 3:])[:, :, 1]  # its y points up
     up = up[np.isfinite(up).all(axis=1)]
     if not len(up):
         return None

@@ -20,19 +20,21 @@ def rigid_transform(source: Array, target: Array) -> tuple[Array, Array]:
 
 
 def quaternion_matrix(quaternion: Array) -> Array:
-    """Rotation (3, 3) of a quaternion (4,), x, y, z, w, of any length but 0.
+    """Rotations (..., 3, 3) of quaternions (..., 4), x, y, z, w, of any length but 0.
 
     >>> quaternion_matrix(np.array([0.0, 0.0, 2.0, 2.0])).round(9).tolist()
     [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     """
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    return np.array(
+    length = np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    x, y, z, w = np.moveaxis(quaternion / length, -1, 0)
+    rows = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
+    return np.moveaxis(rows, (0, 1), (-2, -1))
 
 
 def turn_matrix(axis: Array, angle: float) -> Array:

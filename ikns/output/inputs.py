@@ -35,9 +35,10 @@ def refuse_input(path: Path, inputs: Iterable[Path | str | None]) -> None:
     for source in _given(inputs):
         held = source.rglob("*") if source.is_dir() else [source]
         if any(_identity(each) == own for each in held if not each.is_dir()):
-            name = "" if str(path) == str(source) else f" as {source}"
+            name = "" if str(path) == str(source) else f", {source}"
             raise InvalidInput(
-                f"{path}: this file is read{name}; give the output another name."
+                f"{path}: this file is also an input{name}; give the output another "
+                "name."
             )
 
 
@@ -57,9 +58,9 @@ def refuse_input_folder(folder: Path, inputs: Iterable[Path | str | None]) -> No
         place = source.resolve()
         around = {_identity(each) for each in (place, *place.parents)}
         if own in around or (not source.is_dir() and _identity(source) in held):
-            found = f"this folder holds {source}, which is read"
+            found = f"this folder holds {source}, which is an input"
             if str(folder) == str(source):
-                found = "this folder is read"
+                found = "this folder is also an input"
             raise InvalidInput(f"{folder}: {found}; give the output another name.")
 
 

@@ -17,6 +17,7 @@ from mpl_toolkits.mplot3d.art3d import (  # type: ignore[import-untyped]
 )
 
 from ikns.arrays import Array
+from ikns.numerics.rigid import quaternion_matrix
 from ikns.view.scene.commands import ROOT, Command
 from ikns.view.scene.scene import FIELD_OF_VIEW, Scene
 from ikns.view.style import GREY, INK, figure_style
@@ -144,16 +145,10 @@ def _at(animation: Command, time: float) -> dict[str, Array]:
             if track["name"] == ".position":
                 poses[entry["path"]][:3, 3] = values
             elif track["name"] == ".quaternion":
-                poses[entry["path"]][:3, :3] = _rotation(values.astype(float))
+                poses[entry["path"]][:3, :3] = quaternion_matrix(values.astype(float))
             elif not values[0]:
                 poses[entry["path"]][:3, :3] = 0.0  # not seen: of no size
     return dict(poses)
-
-
-def _rotation(quaternion: Array) -> Array:
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + 2 * w * cross + 2 * cross @ cross)
 
 
 def _triangles(geometry: Command) -> Array:
