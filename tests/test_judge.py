@@ -12,6 +12,7 @@ import ikns
 from ikns.body.marker_set import MarkerSet
 from ikns.body.set_choice import better_set
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.labels import judge_unseen
 from ikns.calibration.judge.recordings import check_recordings
 from ikns.calibration.scaling import judge_static, scale
 from ikns.cli import main
@@ -132,6 +133,15 @@ def test_the_command_that_is_named_mends_names_also_of_a_ring_of_three():
     right = check(wrong).findings[0].right
     names = dict(re.findall(r"--rename (\w+)=(\w+)", right))
     assert names == {new: old for old, new in ring.items()}
+    assert check(renamed(wrong, names)).findings == ()
+
+
+def test_the_command_that_is_named_has_the_labels_of_the_file():
+    theirs = renamed(reaching(), {"RSHO": "RACR", "RELB": "RLEP"})
+    wrong = renamed(theirs, {"RACR": "RLEP", "RLEP": "RACR"})
+    right = check(wrong).findings[0].right
+    names = dict(re.findall(r"--rename (\w+)=(\w+)", right))
+    assert names == {"RACR": "RLEP", "RLEP": "RACR"}
     assert check(renamed(wrong, names)).findings == ()
 
 
@@ -393,6 +403,29 @@ def test_a_marker_that_is_in_no_frame_is_a_note(label, found, right):
     assert (told.kind, told.severity, told.markers) == ("unseen", "note", ("RELB",))
     assert told.found.startswith("RELB is in no frame" + found)
     assert right in told.right
+
+
+def test_a_label_may_be_that_of_one_missing_marker_only():
+    labels = [x.replace("RWRA", "RWR") for x in reaching().labels]
+    kept = [i for i, x in enumerate(labels) if not x.endswith("RWRB")]
+    cut = Recording(
+        reaching().time, reaching().markers[:, kept], [labels[i] for i in kept]
+    )
+    (told,) = check(cut).findings
+    assert told.markers == ("RWRA", "RWRB")
+    assert told.right.count("--rename") == 1
+
+
+def test_a_label_of_the_other_side_is_no_other_spelling():
+    oxford = MarkerSet.load("oxford24")
+    right = tuple(m for m in oxford.markers if not m.label.startswith("L"))
+    own = replace(oxford, name="own", markers=right)
+    kept = [i for i, x in enumerate(reaching().labels) if not x.endswith("RFIN")]
+    labels = [reaching().labels[i] for i in kept]
+    cut = Recording(reaching().time, reaching().markers[:, kept], labels)
+    (told,) = judge_unseen(cut, own.without_static())
+    assert "RFIN is in no frame" in told.found
+    assert "--rename L" not in told.right
 
 
 def test_an_arm_without_any_marker_was_left_out_on_purpose():

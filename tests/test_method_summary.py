@@ -96,7 +96,7 @@ def test_without_enough_reaches_no_method_is_recommended(moved):
     text = str(
         methods_parts({"methods": {**subject.report["methods"], "summary": found}})
     )
-    assert "No method is recommended yet: 0 reaches between points and" in text
+    assert "No method is recommended: 0 reaches between points and" in text
     assert "at least 5 of one kind are needed" in text
 
 
@@ -107,11 +107,17 @@ def test_a_method_whose_c_follows_reaches_is_not_recommended():
         "intent": {"between_places": 1.1, "natural": None, "turned_hand": 0.2},
     }
     # By the mean of both causes it would be intent.
-    assert _recommended(rows, counts)["recommended"] == "paper"
+    found = _recommended(rows, counts)
+    assert found["recommended"] == "paper"
+    assert "changes c of intent by 1.10, more than half of its range" in found["why"]
+    assert found["why"].endswith("that of paper by 0.30")
     rows["paper"]["between_places"] = 0.8
     found = _recommended(rows, counts)
     assert found["recommended"] is None
-    assert "intent by 1.10 and that of paper by 0.80" in found["why"]
+    assert "half of its range: paper by 0.80 and intent by 1.10" in found["why"]
+    # Nor is it recommended because there is no other.
+    del rows["intent"]
+    assert _recommended(rows, counts)["recommended"] is None
 
 
 def test_a_range_smaller_than_a_reach_s_change_is_no_range(moved):

@@ -201,7 +201,7 @@ def test_wrong_parameters_and_arrays_are_refused():
     with pytest.raises(InvalidInput, match="penalty above 0"):
         NaturalPosture(local_penalty=-1.0).fit(wrist, s)
     own = NaturalPosture().fit(wrist, s)
-    with pytest.raises(InvalidInput, match="wrist centers of shape"):
+    with pytest.raises(InvalidInput, match="places of shape"):
         own.swivel(wrist[:, :2])
     arrays = own.coefficients_, own.people_, own.leverage_
     for bad in ((arrays[0][:5], *arrays[1:]), (arrays[0] * np.nan, *arrays[1:])):

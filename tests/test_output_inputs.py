@@ -39,7 +39,7 @@ def test_a_folder_around_an_input_or_with_a_link_to_it_is_refused(
     refuse_input_folder(out, [apart / "b", apart, None])
     os.link(apart / "b", out / "b")
     for source in (out, out / "deep", out / "deep" / "a", apart / "b"):
-        with pytest.raises(InvalidInput, match="is an input; give the output"):
+        with pytest.raises(InvalidInput, match="an input; give the output"):
             refuse_input_folder(out, [source])
     # A folder within one that is read may be written: a report in its study.
     refuse_input_folder(out / "deep", [out])

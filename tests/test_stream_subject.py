@@ -203,6 +203,8 @@ def test_swapped_sides_are_not_replayed(tmp_path: Path, files: Path) -> None:
     subject, address = small_person.subject(), f"replay:{tmp_path / 'swapped.c3d'}"
     with pytest.raises(MarkerMismatch, match="left and right are swapped"):
         open_source(address, subject=subject)
-    # Two that may be exchanged leave the choice to each frame.
     back = dict(zip(swapped, free.labels, strict=True))
+    open_source(address, subject=subject, names=back).close()
+    # Two that are exchanged leave the choice to each frame.
+    back |= {"LWRA": "RWRB", "LWRB": "RWRA"}
     open_source(address, subject=subject, names=back).close()

@@ -5,6 +5,7 @@ On reaches, between the held places and in natural movement, and while the hand 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -65,8 +66,8 @@ def method_summary(
         ``turned_deg``; ``methods``, for each the mean change of c over a reach of
         either kind, the share of reaches ``above_0.2``, the mean change with the
         ``turned_hand`` at the held places, all None where unknown; ``recommended`` for
-        live use, paper or intent, or None where too few reaches were recorded, and
-        ``why``.
+        live use, paper or intent, or None where no reach or too many speak for
+        one, and ``why``.
 
     Examples
     --------
@@ -216,16 +217,27 @@ def _recommended(
     """Choose the method whose c changes least, and say which took part.
 
     By the mean of what a reach and a turned hand do to c: natural reaches where enough
-    are known, else those between points. No method without enough reaches.
+    are known, else those between points. No method without enough reaches, and none
+    whose c a reach changes by more than half of its range.
     """
     known = [m for m in _CHOICES if m in rows]
     aside = [m for m in rows if m not in _CHOICES]
+    kind = next((k for k in _REACHES if counts[k] >= _FEWEST), None)
+    reach = {m: rows[m][kind] for m in known} if kind else {}
+    changes = {m: value for m, value in reach.items() if value is not None}
+    usable = [m for m in known if changes.get(m, 0.0) <= _USELESS]
+    spoiled = " and ".join(f"{m} by {changes[m]:.2f}" for m in known if m not in usable)
+    if not usable:
+        return {
+            "recommended": None,
+            "why": f"a {_REACHES[str(kind)]} changes c by more than half of its range: "
+            f"{spoiled}; hold the hand at each place, and turn the elbow to both ends",
+        }
     if len(known) == 1:
         why = (
             "intent was not learned" if aside else "paper is the only method available"
         )
         return {"recommended": known[0], "why": why}
-    kind = next((k for k in _REACHES if counts[k] >= _FEWEST), None)
     if kind is None:
         return {
             "recommended": None,
@@ -233,6 +245,12 @@ def _recommended(
             f"{counts['natural']} in natural movement were recorded; at least "
             f"{_FEWEST} of one kind are needed",
         }
+    if spoiled:
+        why = (
+            f"a {_REACHES[kind]} changes c of {spoiled}, more than half of its range; "
+            f"that of {usable[0]} by {changes.get(usable[0], math.nan):.2f}"
+        )
+        return {"recommended": usable[0], "why": why}
     words = {kind: _REACHES[kind], "turned_hand": "hand turned"}
     causes = {
         cause: {m: value for m in known if (value := rows[m][cause]) is not None}
@@ -244,17 +262,6 @@ def _recommended(
         return {"recommended": None, "why": "c is unknown at the ends of the reaches"}
     cost = {m: float(np.mean([of[m] for of in causes.values()])) for m in known}
     best, other = sorted(cost, key=lambda method: cost[method])
-    reach = causes.get(kind, {})
-    if reach and min(reach.values()) > _USELESS:
-        each = [f"that of {m} by {value:.2f}" for m, value in sorted(reach.items())]
-        return {
-            "recommended": None,
-            "why": f"a {_REACHES[kind]} changes c by more than half of its range, "
-            f"{' and '.join(each)}; hold the hand at each place, and turn the elbow to "
-            "both ends",
-        }
-    if reach.get(best, 0.0) > _USELESS:
-        best, other = other, best
     each = [
         f"{words[c]}: {of[best]:.2f} and {of[other]:.2f}" for c, of in causes.items()
     ]
@@ -268,3 +275,10 @@ def _recommended(
             "reaches its c changes more than that of intent"
         )
     return {"recommended": best, "why": why}
+
+
+def recommendation(summary: dict[str, Any]) -> str:
+    """Say which method is recommended and why, or why none is."""
+    if summary["recommended"] is None:
+        return f"No method is recommended: {summary['why']}."
+    return f"Recommended: --method {summary['recommended']}; {summary['why']}."

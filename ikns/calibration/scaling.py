@@ -16,6 +16,7 @@ from ikns.body.set_choice import set_worn
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding, refused, worst_first
 from ikns.calibration.judge.labels import judge_labels
+from ikns.calibration.judge.sides import labels_in_file
 from ikns.calibration.judge.static import body_size, judge_posture, movement
 from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.size_fit import (
@@ -189,7 +190,14 @@ def judge_static(
     # The judge knows people, not this one: a known body must not look exchanged only
     # because its markers are put elsewhere than usual.
     fit = fit_sizes(reference, target)
-    findings += judge_posture(where, reference, target, fit, repair=repair)
+    findings += judge_posture(
+        where,
+        reference,
+        target,
+        fit,
+        in_file=labels_in_file(reference.marker_set, static.labels),
+        repair=repair,
+    )
     if known:
         fit = fit_sizes(reference, target, known=True)
     skeleton, report = _fitted(reference, target, fit, duration)

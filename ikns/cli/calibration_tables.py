@@ -115,18 +115,11 @@ def methods_parts(report: dict[str, Any]) -> list[Any]:
             "ordinary movement; add some with --natural."
         )
     found = methods.get("summary")
-    return parts if found is None else [_changes(found), *parts, _advice(found)]
+    if found is None:
+        return parts
+    from ikns.calibration.method_summary import recommendation
 
-
-def _advice(found: dict[str, Any]) -> str:
-    """Say which method is recommended, and why."""
-    from ikns.calibration.method_summary import no_range_learned
-
-    if no_range_learned(found):
-        return "No method is recommended: c has no range that means anything."
-    if found["recommended"] is None:
-        return f"No method is recommended yet: {found['why']}."
-    return f"Recommended: --method {found['recommended']}; {found['why']}."
+    return [_changes(found), *parts, recommendation(found)]
 
 
 def _changes(found: dict[str, Any]) -> Any:

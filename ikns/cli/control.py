@@ -169,7 +169,7 @@ def _methods(method: str, calibrated: ikns.Subject) -> str:
     from ikns.calibration.method_summary import no_range_learned
 
     summary = calibrated.report.get("methods", {}).get("summary") or {}
-    # None where too few reaches were recorded to tell.
+    # None where reaches speak for no method.
     best = summary.get("recommended") or method
     if summary and no_range_learned(summary):
         best = method

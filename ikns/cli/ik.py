@@ -67,6 +67,7 @@ def ik(
 
     from ikns.calibration.judged_motion import judged_motion
     from ikns.motion.export import write_motion
+    from ikns.motion.file_names import MODEL, STORAGE
     from ikns.motion.lab_vertical import lab_vertical
     from ikns.motion.table import limits_passed, motion_table
 
@@ -90,8 +91,10 @@ def ik(
             report=calibration,
             progress=partial(report, "joint angles"),
         )
-    upright = motion if still is None else ikns.MarkerIK(skeleton).track(still)
-    up = lab_vertical(upright)
+    up = None
+    if any(path.suffix.lower() in (MODEL, *STORAGE) for path in outputs):
+        upright = motion if still is None else ikns.MarkerIK(skeleton).track(still)
+        up = lab_vertical(upright)
     told = [
         write_motion(path, motion, skeleton, up=up, force=force) for path in outputs
     ]

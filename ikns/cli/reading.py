@@ -82,10 +82,6 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
     @wraps(command)
     def run(**values: Any) -> None:
         given = {name: values.pop(name, None) for name in _OPTIONS}
-        if given["cutoff"] is not None and not given["cutoff"] > 0:
-            raise InvalidInput(
-                f"--cutoff must be above 0 Hz, found {given['cutoff']:g}."
-            )
         _keep(given["labels"], values)
         names = label_names(given["rename"], given["labels"])
         prefix = given["subject_prefix"]

@@ -274,7 +274,7 @@ class NaturalPosture(EstimatorBase):
         rows = np.array(X, dtype=np.float64)
         if self.n_features_in_ == WRIST and rows.ndim:
             rows = wrist_of(rows)
-        return checked_rows(rows, self.n_features_in_, "wrist centers")
+        return checked_rows(rows, self.n_features_in_, "places")
 
     def _leverage(self, phi: Array) -> Array:
         return np.einsum("...i,ij,...j->...", phi, self.leverage_, phi)

@@ -57,21 +57,21 @@ def ridge(
     By the norm of :class:`ikns.NaturalPosture`, in which turns of the hand have a
     price; `turned` (3, 3) is its D, by default the population's.
     """
-    k = phi.shape[1]
-    price = np.diag(np.r_[0.0, np.full(k - 1, float(penalty))])
-    if k == TERMS[HAND]:
+    price = _penalties(phi.shape[1], penalty)
+    if len(price) == TERMS[HAND]:
         price[-3:, -3:] += natural_posture_people().turned if turned is None else turned
     n = len(phi)
     return np.asarray(np.linalg.solve(phi.T @ phi / n + price, phi.T @ swivel / n))
 
 
 def leverage_of(phi: Array, penalty: float) -> tuple[Array, float]:
-    """Matrix of the leverage of terms (N, K), (K, K), and its 99th percentile.
-
-    The first term is the constant, which has no penalty.
-    """
-    k = phi.shape[1]
-    free = np.diag(np.r_[0.0, np.full(k - 1, float(penalty))])
-    matrix = np.linalg.inv(phi.T @ phi / len(phi) + free)
+    """Matrix of the leverage of terms (N, K), (K, K), and its 99th percentile."""
+    penalties = _penalties(phi.shape[1], penalty)
+    matrix = np.asarray(np.linalg.inv(phi.T @ phi / len(phi) + penalties), np.float64)
     levels = np.einsum("ni,ij,nj->n", phi, matrix, phi)
     return matrix, float(np.quantile(levels, _TAUGHT))
+
+
+def _penalties(k: int, penalty: float) -> Array:
+    """Return the penalties (K, K) of terms; the first is a constant and has none."""
+    return np.diag(np.r_[0.0, np.full(k - 1, float(penalty))])

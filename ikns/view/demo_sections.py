@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from ikns.body.chains import SIDES
+from ikns.calibration.method_summary import recommendation
 from ikns.experiments.demo import Demo
 from ikns.view.elbow import elbow_widget
 from ikns.view.report import (
@@ -112,10 +113,7 @@ def methods_section(
             "this person with the hand there and pointing so. No method knows what a "
             "person wants: even `intent` only says how far the elbow departs from the "
             "usual.",
-            f"No method is recommended yet: {found['why']}."
-            if found["recommended"] is None
-            else f"Recommended for this subject: {found['recommended']}; "
-            f"{found['why']}.",
+            recommendation(found),
         ],
         [
             Picture(

@@ -84,12 +84,12 @@ def intent_signal(
     if numbers[GUARD] > 0 and beyond > 1.0:
         own = numbers[OFFSET] + (own - numbers[OFFSET]) / beyond
     z = numbers[MIRROR] * position[0, 1, 2]
-    near = _near(numbers, position[0, 1, 0], position[0, 1, 1], z)
+    near, pointing = _near(numbers, position[0, 1, 0], position[0, 1, 1], z), 0.0
     for i in range(3):
         for j in range(3):
             turned = rotation[0, 1, i, j] * numbers[HAND + j]
-            near += numbers[DIRECTION + i] * turned
-    rest = s - people - own - near
+            pointing += numbers[DIRECTION + i] * turned
+    rest = s - people - own - near - pointing
     rest -= 2 * math.pi * math.floor((rest + math.pi) / (2 * math.pi))
     width = numbers[UPPER] - numbers[LOWER]
     return (rest - numbers[LOWER]) / width, beyond <= 1.0

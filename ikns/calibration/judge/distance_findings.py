@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ikns.arrays import Array, Indices
@@ -10,9 +12,15 @@ from ikns.calibration.judge.sides import renaming
 
 
 def exchanged_names(
-    where: str, labels: tuple[str, ...], exchanges: list[tuple[int, int]]
+    where: str,
+    labels: tuple[str, ...],
+    exchanges: list[tuple[int, int]],
+    in_file: Sequence[str],
 ) -> list[Finding]:
-    """Name the markers of each exchange, those that share one together."""
+    """Name the markers of each exchange, those that share one together.
+
+    The recording's file names the markers `in_file`.
+    """
     groups: list[list[tuple[int, int]]] = []
     for pair in exchanges:
         joined = [g for g in groups if any(set(pair) & set(p) for p in g)]
@@ -31,7 +39,7 @@ def exchanged_names(
                 where,
                 f"{say_markers(names)} have swapped names: their distances to other "
                 "markers of their segments are off",
-                f"swap {steps}: then all distances fit ({renaming(labels, group)})",
+                f"swap {steps}: then all distances fit ({renaming(in_file, group)})",
                 names,
             )
         )

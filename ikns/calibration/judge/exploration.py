@@ -31,7 +31,7 @@ from ikns.calibration.judge.finding import (
     worst_first,
 )
 from ikns.calibration.judge.labels import judge_labels
-from ikns.calibration.judge.sides import other_side, sides_exchanged
+from ikns.calibration.judge.sides import labels_in_file, other_side, sides_exchanged
 from ikns.calibration.judge.static import body_size
 from ikns.calibration.judge.steps import judge_steps
 from ikns.calibration.judge.trace_findings import judge_traces
@@ -111,6 +111,7 @@ def _judge(
         worn = skeleton.marker_set
         pairs, apart = segment_pairs(skeleton, "both_arms")
     markers = worn.pick(recording.labels, recording.markers)
+    in_file = labels_in_file(worn, recording.labels)
     if skeleton is None or apart is None:
         size = body_size(where, markers, generic.with_nominal_markers(worn))
     else:
@@ -131,6 +132,7 @@ def _judge(
         pairs,
         apart,
         noisy=any(finding.kind == "noise" for finding in findings),
+        in_file=in_file,
     )
     findings += distant
     if not exchanges and len(pairs):
@@ -144,7 +146,7 @@ def _judge(
             order[[a, b]] = order[[b, a]]
         seconds = recording.time[~spoiled]
         findings += judge_tracking(
-            where, skeleton, seconds, good[:, order], usual=usual
+            where, skeleton, seconds, good[:, order], usual=usual, in_file=in_file
         )
     return findings
 
@@ -185,6 +187,7 @@ def _judge_distances(
     apart: Array | None,
     *,
     noisy: bool,
+    in_file: tuple[str, ...],
 ) -> tuple[list[Finding], list[tuple[int, int]]]:
     """Judge distances within segments; also return the exchanges that mend them.
 
@@ -202,7 +205,7 @@ def _judge_distances(
     if apart is not None and _sides_exchanged(found, pairs, apart, labels):
         return [sides_exchanged(where, "then all distances fit")], []
     exchanges, left = exchanged_by_distance(found, pairs, apart)
-    findings = exchanged_names(where, labels, exchanges)
+    findings = exchanged_names(where, labels, exchanges, in_file)
     if apart is not None and not exchanges:
         i, j = pairs.T
         off = np.abs(found.middle[i, j] - apart)

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from ikns.body.marker_set import MarkerSet, label_keys
-from ikns.body.set_choice import better_set, match_set, other_set
+from ikns.body.set_choice import better_set, match_set, other_set, set_worn
 from ikns.calibration.judge.finding import Finding, Severity, say_markers
+from ikns.calibration.judge.sides import other_side
 from ikns.motion.unseen import unseen_labels, unseen_words
 from ikns.recording.recording import Recording
 
@@ -50,7 +51,7 @@ def judge_unseen(recording: Recording, worn: MarkerSet) -> list[Finding]:
     named = [label for label in worn.labels if label in lost]
     others = _unknown(recording.labels, worn)
     found, right = unseen_words(named), "look whether it was worn and labeled"
-    alike = {name: _alike(name, others) for name in named}
+    alike = _alike(named, [x for x in others if not _of_other_side(x, worn)])
     meant = [
         f"--rename {other.rsplit(':', 1)[-1]}={name}"
         for name, other in alike.items()
@@ -69,7 +70,7 @@ def judge_unseen(recording: Recording, worn: MarkerSet) -> list[Finding]:
 def _unknown(labels: Sequence[str], worn: MarkerSet) -> list[str]:
     """Labels of a recording that no marker of a set has."""
     # A person's set is without the markers that were taken off after the static trial.
-    whole = MarkerSet.load(worn.name) if worn.name in MarkerSet.names() else worn
+    whole = set_worn(None, worn)
     known = {
         name.casefold()
         for m in (*worn.markers, *whole.markers)
@@ -78,8 +79,21 @@ def _unknown(labels: Sequence[str], worn: MarkerSet) -> list[str]:
     return [label for label in labels if not label_keys([label]) & known]
 
 
-def _alike(name: str, labels: Sequence[str]) -> str:
-    """Return the label that is spelled nearly as a marker; empty for none."""
-    keys = {label.rsplit(":", 1)[-1].casefold(): label for label in labels}
-    near = get_close_matches(name.casefold(), keys, n=1, cutoff=0.75)
-    return keys[near[0]] if near else ""
+def _of_other_side(label: str, worn: MarkerSet) -> bool:
+    """Whether a label is that of a marker of the set, but for R or L."""
+    own = label.rsplit(":", 1)[-1]
+    pair = (own, *worn.labels)
+    return bool(other_side(pair)[0])
+
+
+def _alike(names: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
+    """Return for each marker a label that is spelled nearly so; empty for none.
+
+    A label answers for one marker only.
+    """
+    left = {label.rsplit(":", 1)[-1].casefold(): label for label in labels}
+    found = {}
+    for name in names:
+        near = get_close_matches(name.casefold(), left, n=1, cutoff=0.75)
+        found[name] = left.pop(near[0]) if near else ""
+    return found

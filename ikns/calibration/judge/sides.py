@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ikns.arrays import Indices
+from ikns.body.marker_set import MarkerSet
 from ikns.calibration.judge.finding import Finding
 
 
@@ -25,6 +26,20 @@ def other_side(labels: Sequence[str]) -> Indices:
 
 #: How labels of all markers of a file are changed.
 _SIDES = "in a file: `ikns convert --labels FILE` with a line OLD=NEW for each marker"
+
+
+def labels_in_file(worn: MarkerSet, labels: Sequence[str]) -> tuple[str, ...]:
+    """Return how a file with these labels names each marker, without a subject.
+
+    >>> worn = MarkerSet.load("oxford24")
+    >>> labels_in_file(worn, ["Ann:RACR"])[worn.labels.index("RSHO")]
+    'RACR'
+    """
+    columns = worn.columns(labels).tolist()
+    return tuple(
+        own if c < 0 else labels[c].rsplit(":", 1)[-1]
+        for own, c in zip(worn.labels, columns, strict=True)
+    )
 
 
 def renaming(labels: Sequence[str], exchanges: Sequence[tuple[int, int]]) -> str:

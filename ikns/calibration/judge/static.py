@@ -123,6 +123,7 @@ def judge_posture(
     target: Array,
     fit: SizeFit,
     *,
+    in_file: Sequence[str],
     repair: bool = True,
 ) -> list[Finding]:
     """Judge what the fit to a static trial had to assume.
@@ -137,6 +138,8 @@ def judge_posture(
         Mean marker positions, m; NaN where never seen.
     fit : SizeFit
         What :func:`ikns.calibration.size_fit.fit_sizes` found.
+    in_file : sequence of M str
+        How the recording's file names the markers.
     repair : bool
         Whether to look for the exchange of names that explains it, which takes ten
         times as long as the fit.
@@ -145,7 +148,7 @@ def judge_posture(
     tried = repair and found.suspect
     mended = find_repair(reference, target, found) if tried else None
     if mended is not None:
-        return [_exchanged(where, reference.marker_set.labels, mended, found)]
+        return [_exchanged(where, reference.marker_set.labels, mended, found, in_file)]
     findings = _lengths(where, found, fit)
     if not fit.converged:
         findings.append(
@@ -161,7 +164,11 @@ def judge_posture(
 
 
 def _exchanged(
-    where: str, labels: Sequence[str], repair: Repair, found: Assumed
+    where: str,
+    labels: Sequence[str],
+    repair: Repair,
+    found: Assumed,
+    in_file: Sequence[str],
 ) -> Finding:
     severity: Severity = "refuse" if repair.sure else "warn"
     if repair.mirrored:
@@ -176,7 +183,7 @@ def _exchanged(
         where,
         f"{', '.join(pairs)} have swapped names ({_misfit(labels, worst, found)})",
         f"swap {', and '.join(pairs)}: then everything fits "
-        f"({renaming(labels, repair.exchanges)})",
+        f"({renaming(in_file, repair.exchanges)})",
         names,
     )
 

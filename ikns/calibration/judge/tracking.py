@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ikns.arrays import Array, Indices
@@ -57,11 +59,13 @@ def judge_tracking(
     time: Array,
     markers: Array,
     *,
+    in_file: Sequence[str],
     usual: float | None = None,
 ) -> list[Finding]:
     """Judge how a skeleton follows its markers (T, M, 3), m; NaN where not seen.
 
-    At times (T,), s. `usual` is the residual at calibration, m.
+    At times (T,), s. The recording's file names them `in_file`; `usual` is the residual
+    at calibration, m.
     """
     worn = skeleton.marker_set
     rows = _glances(markers)
@@ -88,7 +92,7 @@ def judge_tracking(
                 f"{first} and {second} have swapped names: no posture fits "
                 f"({1000 * residual:.0f} mm off)",
                 f"swap {first} and {second}: then a posture fits "
-                f"({renaming((first, second), [(0, 1)])})",
+                f"({renaming(in_file, [pair])})",
                 (first, second),
             )
         ]

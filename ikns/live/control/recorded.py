@@ -164,9 +164,8 @@ def uncertain_sentence(summary: dict[str, Any], max_uncertainty: float) -> str:
     if unknown <= _MANY * frames:
         return ""
     return (
-        f"c is unknown in {unknown} of {frames} frames, as its standard deviation "
-        f"({summary['uncertainty_median']:.2g} in the median frame) is above "
-        f"{max_uncertainty:g}: the range learned there is small, or markers are "
+        f"c is unknown in {unknown} of {frames} frames, as its standard deviation is "
+        f"above {max_uncertainty:g}: the range learned there is small, or markers are "
         "hidden; calibrate with wider swings of the elbow, or show c all the same with "
         "a larger --max-uncertainty."
     )

@@ -27,7 +27,7 @@ from ikns.live.stream.subjects import SubjectFeed, check_one_subject, subjects_o
 from ikns.recording.files import read
 
 _KNOWN = "replay:FILE, lsl:NAME, qualisys:HOST, vicon:HOST, natnet:HOST or ros2:TOPIC"
-#: So many frames of a recording show the size of the body.
+#: So many frames of a recording show the size of the body, and which side is which.
 _GLANCES = 1000
 
 Options = dict[str, str]
@@ -132,7 +132,7 @@ def open_source(
         if worn is not None:
             _check_labels(chosen, worn.without_static())
         if subject is not None:
-            _check_size(feed, options, names, subject)
+            _check_body(feed, options, names, subject)
         return Source(chosen, read_timeout=read_timeout, late_after=late_after)
     except BaseException:
         feed.close()
@@ -164,7 +164,7 @@ def _check_labels(source: Feed, needs: MarkerSet) -> None:
         )
 
 
-def _check_size(feed: Feed, options: Options, names: Names, subject: Subject) -> None:
+def _check_body(feed: Feed, options: Options, names: Names, subject: Subject) -> None:
     if isinstance(feed, Replay):  # looked at without starting its clock
         again = _chosen(Replay(feed.recording, speed=0), options, names)
         markers, labels = first_frames(again, _GLANCES), again.labels

@@ -173,6 +173,8 @@ def usable_points(found: BoundingBoxKMeans, need: int) -> list[int]:
                 stacklevel=3,
             )
     if few:
+        if not counts[few].all():
+            sentence += f"; use {len(used)} points, or record more places"
         warnings.warn(f"{sentence}.", MapWarning, stacklevel=3)
     return used
 
@@ -187,20 +189,20 @@ def _too_few(found: BoundingBoxKMeans, few: list[int]) -> str:
         )
     shared = {k for k, *_ in found.merged_}
     empty = [k for k in few if not counts[k] and k not in shared]
-    told = [
+    told = []
+    if len(empty) == 1:
+        told = [
+            f"{format_point(centers, empty[0])} has 0, as the hand was not held there"
+        ]
+    elif empty:
+        told = [f"{len(empty)} have 0, as the hand was not held there"]
+    told += [
         f"{format_point(centers, k)} has {counts[k]}"
         + ", as it lies between two places" * (k in shared)
         for k in few
         if k not in empty
     ]
-    if len(empty) == 1:
-        told.append(
-            f"{format_point(centers, empty[0])} has 0, as the hand was not held there"
-        )
-    elif empty:
-        told.append(f"{len(empty)} have 0, as the hand was not held there")
-    advice = f"; use {len(centers) - len(few)} points, or record more places"
-    return listed(told) + advice * bool(empty)
+    return listed(told)
 
 
 def _warn_of_merged(found: BoundingBoxKMeans) -> None:
