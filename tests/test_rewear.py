@@ -155,7 +155,7 @@ def test_the_markers_of_another_person_are_told():
     trials = [named(one.recording, "Ben") for one in (other.static, other.free)]
     found = rewear(ann, trials[0], trials[1:]).report
     assert any("was calibrated as ann" in told for told in found["warnings"])
-    assert found["static"]["subjects"] == ["ben"]
+    assert found["static"]["subjects"] == ["Ben"]
 
 
 def test_the_command_writes_another_folder(tmp_path, capfd):

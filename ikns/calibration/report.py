@@ -27,7 +27,7 @@ def static_report(
     """Results of the static trial; without one, what is assumed of the body."""
     return {
         "source": None if static is None else static.source,
-        "subjects": [] if static is None else sorted(subject_names(static, worn)),
+        "subjects": [] if static is None else subject_names(static, worn),
         "duration_s": scaling.duration,
         "converged": bool(scaling.converged),
         "lengths_m": scaling.lengths,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -48,16 +48,16 @@ def other_subject(
     static: Recording, recording: Recording, worn: MarkerSet
 ) -> list[Finding]:
     """Say that two recordings name different subjects before their labels."""
-    names = [subject_names(one, worn) for one in (static, recording)]
-    if not all(names) or names[0] & names[1]:
+    of, found = subject_names(static, worn), subject_names(recording, worn)
+    if not _differ(of, found):
         return []
     return [
         Finding(
             "another person",
             "refuse",
             recording.source,
-            f"the markers are those of {_spelled(recording, worn)}, but the static "
-            f"trial {Path(static.source).name} is of {_spelled(static, worn)}",
+            f"the markers are those of {' and '.join(found)}, but the static trial "
+            f"{Path(static.source).name} is of {' and '.join(of)}",
             "use the static trial of this person",
         )
     ]
@@ -74,17 +74,17 @@ def other_than_calibrated(
     static = report.get("static")
     names = static.get("subjects") if isinstance(static, Mapping) else None
     # Folders of before these were kept do not have them.
-    of = {str(name) for name in names} if isinstance(names, list) else set()
+    of = [str(name) for name in names] if isinstance(names, list) else []
     found = subject_names(recording, worn)
-    if not of or not found or of & found:
+    if not _differ(of, found):
         return []
     return [
         Finding(
             "another person",
             "warn",
             recording.source,
-            f"the markers are those of {_spelled(recording, worn)}, but the subject "
-            f"was calibrated as {' and '.join(sorted(of))}",
+            f"the markers are those of {' and '.join(found)}, but the subject was "
+            f"calibrated as {' and '.join(of)}",
             "use the subject folder of this person",
         )
     ]
@@ -105,18 +105,15 @@ def usual_residual(report: Mapping[str, Any]) -> float | None:
     return max((float(one) for one in known if isinstance(one, float)), default=None)
 
 
-def subject_names(recording: Recording, worn: MarkerSet) -> set[str]:
-    """Return the subjects before the labels of a set's markers, in lower case."""
-    return {*_subjects(recording, worn)}
-
-
-def _subjects(recording: Recording, worn: MarkerSet) -> dict[str, str]:
-    """Subjects of a set's markers as they are spelled, by their lower case."""
+def subject_names(recording: Recording, worn: MarkerSet) -> list[str]:
+    """Return the subjects before the labels of a set's markers, as they are spelled."""
     columns = worn.columns(recording.labels)
     used = [recording.labels[i] for i in columns[columns >= 0]]
     names = [label.rsplit(":", 1)[0] for label in used if ":" in label]
-    return {name.casefold(): name for name in sorted(names)}
+    return sorted({name.casefold(): name for name in sorted(names)}.values())
 
 
-def _spelled(recording: Recording, worn: MarkerSet) -> str:
-    return " and ".join(sorted(_subjects(recording, worn).values()))
+def _differ(of: Sequence[str], found: Sequence[str]) -> bool:
+    """Whether names are known on both sides, and none is the same but for case."""
+    one, other = ({name.casefold() for name in names} for names in (of, found))
+    return bool(one and other and not one & other)

@@ -140,9 +140,9 @@ def recorded_signal(
             f"max_uncertainty must be above 0, found {max_uncertainty:g}."
         )
     readout, n = subject.readout(method), len(motion.time)
-    inside = readout.inside(subject.skeleton, motion)
-    uncertainty, uncertain = np.full((n, learned.directions_.shape[1]), np.nan), 0
     if recording is None or not _knows(readout):
+        inside = readout.inside(subject.skeleton, motion)
+        uncertainty, uncertain = np.full((n, learned.directions_.shape[1]), np.nan), 0
         raw = readout.control_signal(subject.skeleton, motion)
     else:
         uncertainty = _uncertainty(subject, readout, motion, recording)
