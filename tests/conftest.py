@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,18 @@ for number, usual in (
 ):
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, usual)
+
+_leave = subprocess.Popen.__exit__
+
+
+def _leave_killed(self: Any, kind: Any, *more: Any) -> None:
+    """A test that fails does not wait for the program that it started."""
+    if kind is not None:
+        self.kill()
+    _leave(self, kind, *more)
+
+
+subprocess.Popen.__exit__ = _leave_killed  # type: ignore[method-assign]
 
 _BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 DATA = Path(os.environ.get("IKNS_TEST_DATA", _BESIDE))

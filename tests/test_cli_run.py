@@ -327,7 +327,8 @@ def test_a_stopped_finger_is_armed_again_with_a_key(files, tmp_path):
         time.sleep(1.0)
         os.kill(process.pid, signal.SIGCONT)
         said = until(ours, "press Shift+R to arm again")
-        assert said.count("FINGER STOPPED: no ") == 1
+        # No pose, or no command for the finger: either may be noticed first.
+        assert said.count("FINGER STOPPED: ") == 1
         os.write(ours, b"r\n")
         time.sleep(0.5)
         said = until(ours, "\x1b[K")
