@@ -131,9 +131,10 @@ def test_a_function_is_found_though_its_module_has_the_same_name() -> None:
 
 
 def test_a_command_called_from_python_leaves_its_garbage_collector_alone() -> None:
-    before = gc.get_threshold(), gc.get_freeze_count()
+    threshold, frozen = gc.get_threshold(), gc.get_freeze_count()
     assert main(["--version"]) == 0
-    assert (gc.get_threshold(), gc.get_freeze_count()) == before
+    assert gc.get_threshold() == threshold
+    assert gc.get_freeze_count() <= frozen  # some of those may be gone
 
 
 def test_the_version_is_that_of_the_project(capsys: pytest.CaptureFixture[str]) -> None:

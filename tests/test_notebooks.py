@@ -9,7 +9,7 @@ import nbformat
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
-RUN = Path(__file__).with_name("run_notebook.py")
+RUN = Path(__file__).with_name("run_notebooks.py")
 
 
 def code_cells(path: Path) -> list:
@@ -26,21 +26,22 @@ def test_there_are_notebooks() -> None:
     assert NOTEBOOKS
 
 
-def test_a_notebook_runs(notebook: Path, tmp_path: Path) -> None:
-    executed = tmp_path / "executed.ipynb"
+def test_the_notebooks_run(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, RUN, notebook, executed],
+        [sys.executable, RUN, tmp_path, *NOTEBOOKS],
         capture_output=True,
         text=True,
-        # As in a clean clone: no real recordings but those beside the notebooks.
+        # As in a clean clone: no real recordings but those next to the notebooks.
         env={k: v for k, v in os.environ.items() if k != "IKNS_TEST_DATA"},
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    shown = [output for cell in code_cells(executed) for output in cell.outputs]
-    assert any("image/png" in output.get("data", {}) for output in shown)
-    # Warnings go there; a reader should meet none.
-    assert not [output.text for output in shown if output.get("name") == "stderr"]
+    for notebook in NOTEBOOKS:
+        executed = code_cells(tmp_path / notebook.name)
+        shown = [output for cell in executed for output in cell.outputs]
+        assert any("image/png" in output.get("data", {}) for output in shown)
+        # Warnings go there; a reader should meet none.
+        assert not [output.text for output in shown if output.get("name") == "stderr"]
 
 
 def test_a_notebook_has_its_point_and_its_lesson(notebook: Path) -> None:

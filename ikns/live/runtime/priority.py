@@ -48,15 +48,12 @@ def realtime_priority(
     with _realtime_scheduling(wanted=realtime):
         if exclusive:
             gc.collect()
-            gc.freeze()
             gc.disable()
         sys.setswitchinterval(min(interval, _SWITCH_INTERVAL))
         try:
             yield
         finally:
             sys.setswitchinterval(interval)
-            if exclusive:
-                gc.unfreeze()
             if exclusive and was_on:
                 gc.enable()
 
