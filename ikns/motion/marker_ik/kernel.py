@@ -9,7 +9,8 @@ import numpy as np
 from ikns._kernels.body.frame_sequence import new_memory, solve_frames
 from ikns._kernels.body.marker_gate import pack_gate
 from ikns._kernels.body.marker_problem import MarkerProblem, pack, scratch_size
-from ikns.arrays import Array
+from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array, Indices
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik.gate import GateLimits, marker_gate
@@ -46,12 +47,14 @@ def marker_problem(
     q_branch = np.full(starts.shape[1], -1, dtype=np.int64)
     q_branch[-n_joints:] = [_side(name) for name in skeleton.joint_names]
     turn_joint, turn = turning_clusters(skeleton)
+    tree, at = limbs_in_turn(skeleton.tree)
+    joint = at[joint]
     return MarkerProblem(
-        tree=skeleton.tree,
+        tree=tree,
         marker_joint=joint,
-        marker_carrier=np.where(turn >= 0, skeleton.tree.parent[joint], joint),
+        marker_carrier=np.where(turn >= 0, tree.parent[joint], joint),
         marker_turn=turn,
-        turn_joint=turn_joint,
+        turn_joint=at[turn_joint],
         marker_position=position,
         marker_weight=np.array(weight, dtype=np.float64),
         free=free,
@@ -69,6 +72,22 @@ def marker_problem(
         lost=LOST,
         max_iterations=max_iterations,
     )
+
+
+def limbs_in_turn(tree: Tree) -> tuple[Tree, Indices]:
+    """Return the tree by depth, the first joint of each limb, the second and so on.
+
+    In a limb each joint waits for the one before; the processor works on the other limb
+    meanwhile, if its joints come in between. Also returns where each joint is now.
+    """
+    depth = np.zeros(len(tree.parent), dtype=np.int64)
+    for j, parent in enumerate(tree.parent):
+        depth[j] = depth[parent] + 1 if parent >= 0 else 0
+    order = np.argsort(depth, kind="stable")
+    at = np.argsort(order)
+    moved = Tree(*(np.ascontiguousarray(part[order]) for part in tree))
+    parent = np.where(moved.parent >= 0, at[moved.parent], -1)
+    return moved._replace(parent=parent), at
 
 
 class KernelSolver:
