@@ -386,8 +386,9 @@ def test_a_recording_is_its_frames_one_by_one(skeleton):
         pose = solver.solve(seen, before)
         poses.append(pose)
         before = pose.q
-    batch = SolvedFrames.empty(30, 25)
-    solver.solver.solve(np.array(frames), (0, 30, 1), None, batch)
+    rows = solver.solver.new_rows(30)
+    solver.solver.solve(np.array(frames), (0, 30, 1), None, rows)
+    batch = SolvedFrames.of(rows)
     np.testing.assert_array_equal(batch.q, [pose.q for pose in poses])
     np.testing.assert_array_equal(batch.residual, [pose.residual for pose in poses])
 

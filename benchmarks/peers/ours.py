@@ -10,7 +10,7 @@ import numpy as np
 
 import ikns
 from ikns import MarkerIK
-from ikns._kernels.body.marker_problem import pack
+from ikns._kernels.body.frame_sequence import pack_frames
 from ikns.motion.marker_ik.pose import PRIOR_FROM_SCRATCH
 from peers.problem import Problem
 from peers.timing import FrameByFrame
@@ -72,7 +72,7 @@ class WithoutPull(Live):
         super().__init__(problem, max_iterations=1000)
         kernel = self.solver.solver
         kernel.problem = kernel.problem._replace(pull=PRIOR_FROM_SCRATCH, limit=0.0)
-        kernel.packed = pack(kernel.problem)
+        kernel.packed = pack_frames(kernel.problem, kernel.gate)
 
 
 class Batch:

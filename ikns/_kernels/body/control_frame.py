@@ -27,7 +27,7 @@ from ikns._kernels.body.marker_gate import THORAX
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
 from ikns._kernels.body.paths import Paths, follow_path, place_frames
 from ikns._kernels.body.uncertainty import deviation, factor_information, note_markers
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import borrowing, compiled
 from ikns._kernels.voronoi.diagram import INSIDE_HULL, NOT_FINITE, OUTSIDE_HULL
 from ikns._kernels.voronoi.query import natural_weights
 from ikns.arrays import Array, Indices, Mask
@@ -39,7 +39,7 @@ REACH = 5e-3
 DOUBTFUL = 0.0125
 
 
-@compiled
+@borrowing
 def control_frame(
     whole: Indices,
     real: Array,
@@ -95,28 +95,18 @@ def control_frame(
     s = cut(problem, work)
     constants = unpack_constants(whole_constants, real_constants)
     gate, control_map = constants.gate, constants.control_map
-    figures, passed = np.empty((2, 3)), np.empty(2, dtype=np.bool_)
-    known = cut_memory(memory, len(passed))
+    known = cut_memory(memory, problem.n_branches)
     residual, iterations, converged = follow_frame(
-        problem,
-        s,
-        gate,
-        markers,
-        known,
-        from_scratch,
-        q,
-        figures[0],
-        figures[1],
-        passed,
+        problem, s, gate, markers, known, from_scratch, q
     )
-    worst, intermarker = figures[0, THORAX], figures[1, THORAX]
+    worst, intermarker = s.worst[THORAX], s.intermarker[THORAX]
     believed = True
     for side in control_map.sides:
         # The first is NaN where nothing of the thorax is seen.
-        if not worst >= figures[0, 1 + side]:
-            worst = figures[0, 1 + side]
-        intermarker = max(intermarker, figures[1, 1 + side])
-        believed = believed and passed[side]
+        if not worst >= s.worst[1 + side]:
+            worst = s.worst[1 + side]
+        intermarker = max(intermarker, s.intermarker[1 + side])
+        believed = believed and s.passed[side] > 0
     seen = _in_sight(markers, control_map.link, control_map.need)
     status = _read_pose(
         problem, s, constants, q, dt, believed, seen_before, np.isfinite(residual),
@@ -125,7 +115,7 @@ def control_frame(
     return residual, worst, intermarker, iterations, converged, seen, status
 
 
-@compiled
+@borrowing
 def recorded_signals(
     whole: Indices,
     real: Array,
@@ -141,6 +131,7 @@ def recorded_signals(
     rotation: Array,
     position: Array,
     weights: Array,
+    place: Array,
     c: Array,
     deviations: Array,
 ) -> None:
@@ -152,7 +143,6 @@ def recorded_signals(
     problem = unpack(whole, real)
     s = cut(problem, work)
     constants = unpack_constants(whole_constants, real_constants)
-    place = np.empty(3)
     for i in range(len(q)):
         n_seen, _ = take_markers(problem.marker_weight, markers[i], s.weight, s.target)
         errors_at(problem, s, q[i])
@@ -194,8 +184,7 @@ def _read_pose(
     hidden = note_markers(problem, s, dt, believed, segments, seen_before)
     if not posed:
         return NOT_FINITE
-    spread = np.empty((2, len(problem.free)))
-    solvable = factor_information(problem, s, q, segments, seen_before, spread)
+    solvable = factor_information(problem, s, q, segments, seen_before)
     status = _weights(control_map, place, cavity_work, weights)
     for k in range(len(c)):
         if k == 0 and len(intent.numbers):
@@ -207,16 +196,14 @@ def _read_pose(
             c[k] = _signal(weights, control_map, k, q[7:], s.gradient)
         if not (solvable and np.isfinite(c[k])):
             continue
-        deviations[k] = deviation(
-            problem, s, s.gradient, segments, seen_before, spread, hidden
-        )
+        deviations[k] = deviation(problem, s, s.gradient, segments, seen_before, hidden)
         by_map = k > 0 or len(intent.numbers) == 0
         if hidden and by_map and deviations[k] > DOUBTFUL:
             _add_slopes(
                 paths, control_map, k, q[7:], place, cavity_work, c[k], s.gradient
             )
             deviations[k] = deviation(
-                problem, s, s.gradient, segments, seen_before, spread, hidden
+                problem, s, s.gradient, segments, seen_before, hidden
             )
     return status
 

@@ -13,7 +13,7 @@ import numpy as np
 from ikns._kernels.body.marker_gate import MarkerGate
 from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.uncertainty import Segments
-from ikns._kernels.compiled import compiled, inner
+from ikns._kernels.compiled import borrowing, inner_borrowing
 from ikns.arrays import Array, Indices
 
 
@@ -81,9 +81,9 @@ def pack_constants(constants: FrameConstants) -> tuple[Indices, Array]:
     )
 
 
-@inner
+@inner_borrowing
 def unpack_constants(whole: Indices, real: Array) -> FrameConstants:
-    """Unpack them."""
+    """Unpack them, for a kernel that borrows its arrays, too."""
     E, F, K, L = whole[0], whole[1], whole[2], whole[3]
     M, N, P, d, n = whole[4], whole[5], whole[6], whole[7], whole[8]
     size, count, sides, links = whole[9], whole[10], whole[11], whole[12]
@@ -144,7 +144,7 @@ def unpack_constants(whole: Indices, real: Array) -> FrameConstants:
     )
 
 
-@compiled
+@borrowing
 def _paths(whole: Indices, real: Array, a: int, r: int, E: int, K: int) -> Paths:
     turned = r + 9 * (K + E)
     return Paths(

@@ -17,12 +17,19 @@ from ikns._kernels.body.marker_gate import (
     MarkerGate,
     fits,
     gate_figures,
+    pack_gate,
     unpack_gate,
 )
 from ikns._kernels.body.marker_ik import far_cost, solve_frame
-from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
-from ikns._kernels.compiled import borrowing, compiled, inner, inner_borrowing
-from ikns.arrays import Array, Indices, Mask
+from ikns._kernels.body.marker_problem import (
+    MarkerProblem,
+    Scratch,
+    cut,
+    pack,
+    unpack,
+)
+from ikns._kernels.compiled import borrowing, inner_borrowing
+from ikns.arrays import Array, Indices
 
 #: Suspicious: so many times the usual root mean square error, which is of this size at
 #: least, m; joints far beyond their limits; markers that do not fit.
@@ -55,73 +62,64 @@ def new_memory(nq: int, limbs: int) -> Array:
     return memory
 
 
-@inner
+@inner_borrowing
 def cut_memory(memory: Array, limbs: int) -> FrameMemory:
-    """Divide it."""
+    """Divide it, for a kernel that borrows its arrays, too."""
     good = _AGE + limbs
     start = (good + len(memory)) // 2
     return FrameMemory(memory[:good], memory[good:start], memory[start:])
 
 
-@compiled
+def pack_frames(problem: MarkerProblem, gate: MarkerGate) -> tuple[Indices, Array]:
+    """Pack a problem and a gate behind it into integers and reals."""
+    whole, real = pack(problem)
+    own_whole, own_real = pack_gate(gate)
+    return np.concatenate([whole, own_whole]), np.concatenate([real, own_real])
+
+
+@borrowing
 def solve_frames(
     whole: Indices,
     real: Array,
-    whole_gate: Indices,
-    real_gate: Array,
     markers: Array,
     first: int,
     last: int,
     way: int,
-    before: Array,
     from_scratch: bool,
     patience: int,
     memory: Array,
     work: Array,
-    q: Array,
-    residual: Array,
-    iterations: Indices,
-    converged: Mask,
-    passed: Mask,
+    rows: Array,
 ) -> None:
     """Solve frames from `first` to before `last`, `way` (1 or -1) one after the other.
 
-    `whole` and `real` are a packed
-    :class:`ikns._kernels.body.marker_problem.MarkerProblem`, the next two a packed
-    :class:`ikns._kernels.body.marker_gate.MarkerGate`, `markers` (T, M, 3) in the
-    world, m, NaN where not seen; `before` (nq,) is the pose before the first frame,
-    unless it is solved `from_scratch`. Later frames start from the previous one, or
-    after frames that do not fit from the last that did, if no more than `patience`
-    frames passed. `memory` is that of :func:`new_memory`, and `work` scratch of
+    `whole` and `real` are those of :func:`pack_frames`, `markers` (T, M, 3) in the
+    world, m, NaN where not seen. `memory` is that of :func:`new_memory` and ends with
+    the pose before the first frame, unless that is solved `from_scratch`. Later frames
+    start from the previous one, or after frames that do not fit from the last that did,
+    if no more than `patience` frames passed. `work` is scratch of
     :func:`ikns._kernels.body.marker_problem.scratch_size` reals.
 
-    Written are the solutions `q` (T, nq), the previous pose where no marker is seen,
-    and by frame (T,) the `residual`, the root mean square distance of the seen markers
-    (m; NaN without any, infinite where the previous pose is not finite), whether it
-    `converged`, and `iterations`: `INFINITE` where a marker is infinite, not seen and
-    not NaN; and whether the markers of each limb `passed` the gate, (T, limbs).
+    Written are the `rows` (T, nq + 3 + limbs): the solution, the previous pose where no
+    marker is seen; the residual, the root mean square distance of the seen markers (m;
+    NaN without any, infinite where the previous pose is not finite); the iterations,
+    `INFINITE` where a marker is infinite, not seen and not NaN; and 1 where it
+    converged, and for each limb where its markers passed the gate, else 0.
     """
     problem = unpack(whole, real)
     s = cut(problem, work)
-    gate = unpack_gate(whole_gate, real_gate)
-    known = cut_memory(memory, passed.shape[1])
-    groups = 1 + passed.shape[1]
-    worst, intermarker = np.empty(groups), np.empty(groups)
-    copy(before, known.start)
+    gate = unpack_gate(whole[whole[8] :], real[whole[9] :])
+    known = cut_memory(memory, problem.n_branches)
+    nq = len(s.q)
     for i in range(first, last, way):
-        residual[i], iterations[i], converged[i] = follow_frame(
-            problem,
-            s,
-            gate,
-            markers[i],
-            known,
-            from_scratch and i == first,
-            q[i],
-            worst,
-            intermarker,
-            passed[i],
+        row, q = rows[i], rows[i, :nq]
+        residual, iterations, converged = follow_frame(
+            problem, s, gate, markers[i], known, from_scratch and i == first, q
         )
-        _remember(problem, known, passed[i], q[i], patience)
+        row[nq], row[nq + 1] = residual, iterations
+        row[nq + 2] = 1.0 if converged else 0.0
+        copy(s.passed, row[nq + 3 :])
+        _remember(problem, known, s.passed, q, patience)
 
 
 @inner_borrowing
@@ -133,23 +131,19 @@ def follow_frame(
     memory: FrameMemory,
     from_scratch: bool,
     q: Array,
-    worst: Array,
-    intermarker: Array,
-    passed: Mask,
 ) -> tuple[float, int, bool]:
     """Solve one frame from `memory.start`, and from scratch where that is suspicious.
 
-    Written are the pose `q` (nq,), the figures of
-    :func:`ikns._kernels.body.marker_gate.gate_figures` and whether each limb `passed`;
-    `s` is left with the errors at that pose.
+    Written is the pose `q` (nq,); `s` is left with the errors at that pose, the figures
+    of :func:`ikns._kernels.body.marker_gate.gate_figures` and whether each limb passed.
     """
     before = memory.numbers[_BEFORE]
     loose = before == _LATELY
     residual, iterations, converged = solve_frame(
         problem, s, markers, memory.start, from_scratch, loose, q
     )
-    gate_figures(s, gate, markers, worst, intermarker)
-    fit = fits(gate, residual, worst, intermarker, passed)
+    gate_figures(s, gate, markers)
+    fit = fits(s, gate, residual)
     if not np.isfinite(residual):
         return residual, iterations, converged
     beyond = far_cost(problem, q)
@@ -169,8 +163,8 @@ def follow_frame(
         other = again[0] ** 2 + far_cost(problem, q) / n_seen
         if other < better * cost:
             residual, iterations, converged = again
-            gate_figures(s, gate, markers, worst, intermarker)
-            fits(gate, residual, worst, intermarker, passed)
+            gate_figures(s, gate, markers)
+            fits(s, gate, residual)
             memory.numbers[_WAIT] = 0.0
         else:
             copy(s.kept, q)
@@ -200,14 +194,14 @@ def _due(memory: FrameMemory, fit: bool, beyond: float, cost: float) -> bool:
 
 @borrowing
 def _remember(
-    problem: MarkerProblem, memory: FrameMemory, passed: Mask, q: Array, patience: int
+    problem: MarkerProblem, memory: FrameMemory, passed: Array, q: Array, patience: int
 ) -> None:
     """Write where the next frame starts, limb by limb."""
     ages = memory.numbers[_AGE:]
     every, recent = True, False
     memory.numbers[_BEFORE] = _JUST_NOW
     for limb in range(len(passed)):
-        ages[limb] = 0.0 if passed[limb] else ages[limb] + 1.0
+        ages[limb] = 0.0 if passed[limb] > 0 else ages[limb] + 1.0
         every = every and ages[limb] > 0
         recent = recent or ages[limb] <= patience
         if ages[limb] > patience:

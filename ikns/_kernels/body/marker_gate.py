@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ikns._kernels.body.marker_problem import Scratch
-from ikns._kernels.compiled import inner, inner_borrowing
-from ikns.arrays import Array, Indices, Mask
+from ikns._kernels.compiled import inner_borrowing
+from ikns.arrays import Array, Indices
 
 #: Entries of figures by group: the thorax, then the limbs.
 THORAX = 0
@@ -37,9 +37,9 @@ def pack_gate(gate: MarkerGate) -> tuple[Indices, Array]:
     )
 
 
-@inner
+@inner_borrowing
 def unpack_gate(whole: Indices, real: Array) -> MarkerGate:
-    """Unpack it."""
+    """Unpack it, for a kernel that borrows its arrays, too."""
     n = len(real) - 3
     return MarkerGate(
         whole[3 * n :], whole[: 2 * n].reshape(n, 2), real[3:], whole[2 * n : 3 * n],
@@ -48,18 +48,13 @@ def unpack_gate(whole: Indices, real: Array) -> MarkerGate:
 
 
 @inner_borrowing
-def gate_figures(
-    s: Scratch,
-    gate: MarkerGate,
-    markers: Array,
-    worst: Array,
-    intermarker: Array,
-) -> None:
-    """Write the figures of markers whose errors are in `s` by group, (G,) m.
+def gate_figures(s: Scratch, gate: MarkerGate, markers: Array) -> None:
+    """Write the figures of markers whose errors are in `s` by group, (G,) m, into `s`.
 
     The worst residual is NaN where no marker of the group is seen, the intermarker
     error 0 where no pair is.
     """
+    worst, intermarker = s.worst, s.intermarker
     for g in range(len(worst)):
         worst[g], intermarker[g] = -1.0, 0.0
     for m in range(len(gate.group)):
@@ -84,21 +79,17 @@ def gate_figures(
 
 
 @inner_borrowing
-def fits(
-    gate: MarkerGate, residual: float, worst: Array, intermarker: Array, passed: Mask
-) -> bool:
+def fits(s: Scratch, gate: MarkerGate, residual: float) -> bool:
     """Write whether each limb with the thorax is within the limits; return if all are.
 
-    What was not seen has no figure and disproves nothing.
+    The figures are in `s`. What was not seen has none and disproves nothing.
     """
     every = True
-    for limb in range(len(passed)):
-        passed[limb] = not residual > gate.limits[0]
+    for limb in range(len(s.passed)):
+        within = not residual > gate.limits[0]
         for g in (THORAX, 1 + limb):
-            passed[limb] = (
-                passed[limb]
-                and not worst[g] > gate.limits[1]
-                and not intermarker[g] > gate.limits[2]
-            )
-        every = every and passed[limb]
+            within = within and not s.worst[g] > gate.limits[1]
+            within = within and not s.intermarker[g] > gate.limits[2]
+        s.passed[limb] = 1.0 if within else 0.0
+        every = every and within
     return every

@@ -12,9 +12,11 @@ import numpy as np
 
 from ikns._kernels.body.articulated import INERTIA, MOMENTS, ROW
 from ikns._kernels.body.tree import Tree
-from ikns._kernels.compiled import compiled, inner
+from ikns._kernels.compiled import inner_borrowing
 from ikns.arrays import Array, Indices
 
+#: Integers before all others; the last two are how many integers and reals there are.
+HEADER = 10
 #: Reals of scratch memory for each joint, and for each rate.
 _OF_JOINT, _OF_RATE = 12 + MOMENTS + INERTIA + 12, 6 + ROW + 6
 
@@ -83,6 +85,10 @@ class Scratch(NamedTuple):
     residuals: Array
     N: Array
     V: Array
+    worst: Array  # figures of the gate, of the thorax and each limb
+    intermarker: Array
+    passed: Array  # 1 for limbs that pass it
+    spread: Array  # (2, n) of how uncertain a signal is
 
 
 def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
@@ -91,9 +97,8 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
     J, n, M = len(tree.kind), len(p.free), len(p.marker_joint)
     S, nq = p.starts.shape
     K = len(p.turn_joint)
-    header = [J, n, M, S, nq, p.n_branches, p.max_iterations, K]
+    sizes = [J, n, M, S, nq, p.n_branches, p.max_iterations, K]
     whole = [
-        np.array(header),
         tree.kind,
         tree.parent,
         tree.first_q,
@@ -118,17 +123,20 @@ def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
         p.upper,
         p.starts,
     ]
-    return (
-        np.concatenate([np.ravel(part) for part in whole]).astype(np.int64),
-        np.concatenate([np.ravel(part) for part in real]).astype(np.float64),
-    )
+    integers = np.concatenate([np.ravel(part) for part in whole]).astype(np.int64)
+    reals = np.concatenate([np.ravel(part) for part in real]).astype(np.float64)
+    header = [*sizes, HEADER + len(integers), len(reals)]
+    return np.concatenate([np.array(header, dtype=np.int64), integers]), reals
 
 
-@inner
+@inner_borrowing
 def unpack(whole: Indices, real: Array) -> MarkerProblem:
-    """Unpack a problem."""
+    """Unpack a problem, for a kernel that borrows its arrays, too.
+
+    Counting references to the parts took as long as solving a tenth of a frame.
+    """
     J, n, M, S, nq = whole[0], whole[1], whole[2], whole[3], whole[4]
-    i, K = 8, whole[7]
+    i, K = HEADER, whole[7]
     tree_at, i = i, i + 4 * J
     angle_at, i = i, i + n
     marker_at, i = i, i + 4 * M
@@ -147,7 +155,7 @@ def unpack(whole: Indices, real: Array) -> MarkerProblem:
         whole[tree_at + 2 * J : tree_at + 3 * J],
         whole[tree_at + 3 * J : tree_at + 4 * J],
         real[rotation_at : rotation_at + 9 * J].reshape(J, 3, 3),
-        _table(real, translation_at, J, 3),
+        real[translation_at : translation_at + J * 3].reshape(J, 3),
     )
     return MarkerProblem(
         tree,
@@ -155,13 +163,13 @@ def unpack(whole: Indices, real: Array) -> MarkerProblem:
         whole[marker_at + M : marker_at + 2 * M],
         whole[marker_at + 2 * M : marker_at + 3 * M],
         whole[turn_at : turn_at + K],
-        _table(real, position_at, M, 3),
+        real[position_at : position_at + M * 3].reshape(M, 3),
         real[weight_at : weight_at + M],
         real[dof_at : dof_at + n],
         whole[angle_at : angle_at + n],
         real[dof_at + n : dof_at + 2 * n],
         real[dof_at + 2 * n : dof_at + 3 * n],
-        _table(real, starts_at, S, nq),
+        real[starts_at : starts_at + S * nq].reshape(S, nq),
         whole[marker_at + 3 * M : marker_at + 4 * M],
         whole[branch_at : branch_at + nq],
         whole[5],
@@ -185,12 +193,15 @@ def scratch_size(problem: MarkerProblem) -> int:
         + 13 * M
         + nq * (4 + S)
         + S * (1 + problem.n_branches)
+        + 2
+        + 3 * problem.n_branches
+        + 2 * n
     )
 
 
-@inner
+@inner_borrowing
 def cut(problem: MarkerProblem, work: Array) -> Scratch:
-    """Divide memory of :func:`scratch_size` reals into arrays."""
+    """Divide memory of :func:`scratch_size` reals into arrays; as :func:`unpack`."""
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
     S, nq = problem.starts.shape
     a = 35
@@ -202,21 +213,23 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
     h = g + M * 13
     k = h + nq * 4
     m = k + nq * S
+    groups = 1 + problem.n_branches
+    r = m + S * groups
     return Scratch(
         work[0:3],
         work[a : a + 9 * J].reshape(J, 3, 3),
-        _table(work, a + 9 * J, J, 3),
-        _table(work, d, n, 6),
+        work[a + 9 * J : a + 9 * J + J * 3].reshape(J, 3),
+        work[d : d + n * 6].reshape(n, 6),
         work[g : g + M],
-        _table(work, g + M, M, 3),
-        _table(work, g + 4 * M, M, 3),
-        _table(work, g + 7 * M, M, 3),
-        _table(work, g + 10 * M, M, 3),
-        _table(work, b, J, MOMENTS),
-        _table(work, b + J * MOMENTS, J, INERTIA),
-        _table(work, c, J, 6),
-        _table(work, c + 6 * J, J, 6),
-        _table(work, d + 6 * n, n, ROW),
+        work[g + M : g + M + M * 3].reshape(M, 3),
+        work[g + 4 * M : g + 4 * M + M * 3].reshape(M, 3),
+        work[g + 7 * M : g + 7 * M + M * 3].reshape(M, 3),
+        work[g + 10 * M : g + 10 * M + M * 3].reshape(M, 3),
+        work[b : b + J * MOMENTS].reshape(J, MOMENTS),
+        work[b + J * MOMENTS : b + J * MOMENTS + J * INERTIA].reshape(J, INERTIA),
+        work[c : c + J * 6].reshape(J, 6),
+        work[c + 6 * J : c + 6 * J + J * 6].reshape(J, 6),
+        work[d + 6 * n : d + 6 * n + n * ROW].reshape(n, ROW),
         work[e : e + n],
         work[e + n : e + 2 * n],
         work[e + 2 * n : e + 3 * n],
@@ -227,13 +240,12 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
         work[h + nq : h + 2 * nq],
         work[h + 2 * nq : h + 3 * nq],
         work[h + 3 * nq : h + 4 * nq],
-        _table(work, k, S, nq),
-        _table(work, m, S, 1 + problem.n_branches),
-        _table(work, 3, 4, 4),
-        _table(work, 19, 4, 4),
+        work[k : k + S * nq].reshape(S, nq),
+        work[m : m + S * groups].reshape(S, groups),
+        work[3 : 3 + 4 * 4].reshape(4, 4),
+        work[19 : 19 + 4 * 4].reshape(4, 4),
+        work[r : r + groups],
+        work[r + groups : r + 2 * groups],
+        work[r + 2 * groups : r + 3 * groups - 1],
+        work[r + 3 * groups - 1 : r + 3 * groups - 1 + 2 * n].reshape(2, n),
     )
-
-
-@compiled
-def _table(flat: Array, at: int, rows: int, columns: int) -> Array:
-    return flat[at : at + rows * columns].reshape(rows, columns)

@@ -11,11 +11,11 @@ import numpy as np
 from ikns._kernels.body.marker_problem import cut, unpack
 from ikns._kernels.body.proximal_signal import ProximalNumbers, proximal_signal
 from ikns._kernels.body.uncertainty import Segments, deviation, factor_information
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import borrowing
 from ikns.arrays import Array, Indices
 
 
-@compiled
+@borrowing
 def proximal_frame(
     whole: Indices,
     real: Array,
@@ -47,13 +47,10 @@ def proximal_frame(
             hidden = True
     if not posed:
         return False
-    spread = np.empty((2, len(problem.free)))
-    solvable = factor_information(problem, s, q, segments, seen_before, spread)
+    solvable = factor_information(problem, s, q, segments, seen_before)
     for a in range(6):
         s.gradient[a] = 0.0
     c[0], inside = proximal_signal(numbers, q[7:], place, s.gradient[6:])
     if solvable and np.isfinite(c[0]):
-        deviations[0] = deviation(
-            problem, s, s.gradient, segments, seen_before, spread, hidden
-        )
+        deviations[0] = deviation(problem, s, s.gradient, segments, seen_before, hidden)
     return inside

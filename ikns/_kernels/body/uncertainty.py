@@ -118,12 +118,11 @@ def factor_information(
     q: Array,
     segments: Segments,
     memory: Array,
-    spread: Array,
 ) -> bool:
     """Factor H into `s.rows` after :func:`note_markers`; False where it cannot be.
 
     Written are the weights of the pull and what the joints may have turned, rad, into
-    `spread` (2, n).
+    `s.spread` (2, n).
     """
     penalties(
         problem.tree,
@@ -151,9 +150,9 @@ def factor_information(
                 unseen = max(unseen, ages[k, _UNSEEN])
                 frames = max(frames, ages[k, _FRAMES])
         n = min(frames, SETTLED) if frames > 0 else SETTLED
-        spread[0, d] = problem.pull**2 / n
-        spread[1, d] = segments.speed[d] * min(unseen, LONGEST)
-        s.extra[d] = spread[0, d]
+        s.spread[0, d] = problem.pull**2 / n
+        s.spread[1, d] = segments.speed[d] * min(unseen, LONGEST)
+        s.extra[d] = s.spread[0, d]
         if s.beyond[d] != 0:
             s.extra[d] += problem.limit**2
     joint_axes(problem.tree, s.rotation, s.translation, s.axes)
@@ -167,7 +166,6 @@ def deviation(
     gradient: Array,
     segments: Segments,
     memory: Array,
-    spread: Array,
     hidden: bool,
 ) -> float:
     """Return the standard deviation of a signal with this `gradient` (n,) over joints.
@@ -175,7 +173,7 @@ def deviation(
     After :func:`factor_information`; `hidden` as :func:`note_markers` returns. Degrees
     of freedom that are held do not count.
     """
-    v = s.step
+    v, spread = s.step, s.spread
     for d in range(len(v)):
         v[d] = gradient[d] * problem.free[d]
     solve(problem.tree, s.rows, s.twist, v)

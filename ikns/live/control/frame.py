@@ -271,6 +271,7 @@ class FrameSolver:
                 self._rotation,
                 self._position,
                 self._weights,
+                np.empty(3),
                 c[rows],
                 uncertainty[rows],
             )

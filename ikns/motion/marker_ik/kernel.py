@@ -6,9 +6,8 @@ import threading
 
 import numpy as np
 
-from ikns._kernels.body.frame_sequence import new_memory, solve_frames
-from ikns._kernels.body.marker_gate import pack_gate
-from ikns._kernels.body.marker_problem import MarkerProblem, pack, scratch_size
+from ikns._kernels.body.frame_sequence import new_memory, pack_frames, solve_frames
+from ikns._kernels.body.marker_problem import MarkerProblem, scratch_size
 from ikns._kernels.body.tree import Tree
 from ikns.arrays import Array, Indices
 from ikns.body.chains import SIDES
@@ -22,7 +21,6 @@ from ikns.motion.marker_ik.pose import (
     PRIOR_FROM_SCRATCH,
     STEP_TOLERANCE,
     Pose,
-    SolvedFrames,
     starting_poses,
 )
 from ikns.motion.marker_ik.turns import turning_clusters
@@ -105,8 +103,7 @@ class KernelSolver:
         self.problem = marker_problem(
             skeleton, max_iterations=max_iterations, tolerance=tolerance
         )
-        self.packed = pack(self.problem)
-        self._packed_gate = pack_gate(self.gate)
+        self.packed = pack_frames(self.problem, self.gate)
         self._neutral = skeleton.neutral()
         self._of_thread = _OfThread(self)
 
@@ -122,71 +119,50 @@ class KernelSolver:
         """
         return new_memory(len(self._neutral), len(SIDES))
 
+    def new_rows(self, n: int) -> Array:
+        """Make room for the solutions of n frames, see :class:`SolvedFrames`."""
+        return np.empty((n, len(self._neutral) + 3 + len(SIDES)))
+
     def solve_one(self, markers: Array, before: Array | None) -> Pose:
-        """Solve one frame of markers (M, 3), as :meth:`solve` does."""
+        """Solve one frame of markers (M, 3), as :meth:`solve` does.
+
+        Iterations of -1 stand for an infinite marker, an infinite residual for a pose
+        before that is not finite.
+        """
         own = self._of_thread
-        _, residual, iterations, converged, fits = own.frames
         own.markers[0] = markers
         own.memory[:] = own.new_memory
         own.start[:] = self._neutral if before is None else before
-        q = np.empty((1, len(own.start)))
         solve_frames(
-            *self.packed,
-            *self._packed_gate,
-            own.markers,
-            0,
-            1,
-            1,
-            own.start,
-            before is None,
-            0,
-            own.memory,
-            own.work,
-            q,
-            residual,
-            iterations,
-            converged,
-            fits,
-        )
-        return Pose(q[0], residual.item(0), iterations.item(0), converged.item(0))
+            *self.packed, own.markers, 0, 1, 1, before is None, 0, own.memory, own.work,
+            own.row,
+        )  # fmt: skip
+        residual, iterations, converged = own.report.tolist()
+        return Pose(own.q.copy(), residual, int(iterations), converged > 0)
 
     def solve(
         self,
         markers: Array,
         span: tuple[int, int, int],
         before: Array | None,
-        frames: SolvedFrames,
+        rows: Array,
         *,
         patience: int = 0,
         memory: Array | None = None,
     ) -> None:
         """Solve the frames of ``range(*span)``; the step is 1 or -1.
 
-        Markers are (T, M, 3), NaN where not seen. The first frame starts from the pose
-        before, or from scratch; others from the one next to them, or the last that fit
-        within so many frames of `patience`. Iterations of -1 stand for an infinite
-        marker, an infinite residual for a pose before that is not finite.
+        Markers are (T, M, 3), NaN where not seen, `rows` those of :meth:`new_rows`. The
+        first frame starts from the pose before, or from scratch; others from the one
+        next to them, or the last that fit within so many frames of `patience`.
         """
-        scratch = before is None
-        start = self._neutral if before is None else before
         known = self.new_memory() if memory is None else memory
+        known[-len(self._neutral) :] = self._neutral if before is None else before
+        # A kernel is compiled again for arrays that cannot be written.
+        seen = markers if markers.flags.writeable else markers.copy()
         solve_frames(
-            *self.packed,
-            *self._packed_gate,
-            _writable(markers),
-            *span,
-            _writable(start),
-            scratch,
-            patience,
-            known,
-            self.work,
-            *frames,
+            *self.packed, seen, *span, before is None, patience, known, self.work, rows
         )
-
-
-def _writable(array: Array) -> Array:
-    """Return an array for which the kernel is compiled: it is again for others."""
-    return array if array.flags.writeable else array.copy()
 
 
 class _OfThread(threading.local):
@@ -196,9 +172,10 @@ class _OfThread(threading.local):
         nq = solver.problem.starts.shape[1]
         self.work = np.empty(scratch_size(solver.problem))
         self.markers = np.empty((1, len(solver.problem.marker_joint), 3))
-        self.start = np.empty(nq)
         self.memory, self.new_memory = solver.new_memory(), solver.new_memory()
-        self.frames = SolvedFrames.empty(1, nq)
+        self.start = self.memory[-nq:]
+        self.row = solver.new_rows(1)
+        self.q, self.report = self.row[0, :nq], self.row[0, nq : nq + 3]
 
 
 def _side(name: str) -> int:

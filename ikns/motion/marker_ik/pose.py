@@ -73,14 +73,18 @@ class SolvedFrames(NamedTuple):
     fits: Mask
 
     @classmethod
-    def empty(cls, n: int, nq: int) -> Self:
-        """Make room for `n` frames."""
+    def of(cls, rows: Array) -> Self:
+        """Take them from the kernel's rows, one a frame.
+
+        See :func:`ikns._kernels.body.frame_sequence.solve_frames`.
+        """
+        nq = rows.shape[1] - 3 - len(SIDES)
         return cls(
-            np.empty((n, nq)),
-            np.empty(n),
-            np.empty(n, dtype=np.int64),
-            np.empty(n, dtype=np.bool_),
-            np.empty((n, len(SIDES)), dtype=np.bool_),
+            rows[:, :nq].copy(),
+            rows[:, nq].copy(),
+            rows[:, nq + 1].astype(np.int64),
+            rows[:, nq + 2] > 0,
+            rows[:, nq + 3 :] > 0,
         )
 
 

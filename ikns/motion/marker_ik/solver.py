@@ -198,7 +198,7 @@ class MarkerIK:
         # Start where most markers are seen, then go both ways.
         visible = seen_markers(markers)[:, self._tracked].sum(axis=1)
         start = int(np.argmax(visible))
-        frames = SolvedFrames.empty(n, *self._pose_shape)
+        rows = self.solver.new_rows(n)
         # A single frame has no rate.
         patience = round(PATIENCE * recording.rate) if n > 1 else 0
         first = self.solver.new_memory()
@@ -206,7 +206,7 @@ class MarkerIK:
             markers,
             (start, start + 1, 1),
             None,
-            frames,
+            rows,
             patience=patience,
             memory=first,
         )
@@ -219,13 +219,14 @@ class MarkerIK:
                     markers,
                     (at, stop, way),
                     memory[-self._pose_shape[0] :],
-                    frames,
+                    rows,
                     patience=patience,
                     memory=memory,
                 )
                 done += abs(stop - at)
                 if progress is not None:
                     progress(done, n)
+        frames = SolvedFrames.of(rows)
         rejected, reasons = recorded_reasons(
             self.skeleton, self.solver.gate, markers, frames, recording.rate
         )
