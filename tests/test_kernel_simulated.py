@@ -95,7 +95,7 @@ def test_markers_are_pinocchios_moved_by_skin_and_noise(seed: int) -> None:
     turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     joints = len(BODY.joint_names) + 1
     markers = np.empty((len(joint), 3))
-    work = np.empty((joints, 3, 3)), np.empty((joints, 3))
+    work = np.empty((2, 25)), np.empty((joints, 3, 3)), np.empty((joints, 3))
     write_markers(
         BODY.tree, q, joint, in_joint, skin.ravel(), turned, noise, *work, markers
     )

@@ -50,7 +50,7 @@ def test_poses_and_axes_of_any_tree_are_pinocchios(seed):
     q, data = any_configuration(model, rng), model.createData()
     twists = pin.computeJointJacobians(model, data, q)
     rotation, translation = np.empty((12, 3, 3)), np.empty((12, 3))
-    place_joints(tree, q, rotation, translation)
+    place_joints(tree, q, np.empty((2, len(q))), rotation, translation)
     for i in range(12):
         pose = data.oMi[i + 1]
         # A joint of the tree is the model's, turned until its axis is z.
@@ -82,7 +82,7 @@ def test_markers_and_hands_in_the_tree_are_where_the_skeleton_has_them():
     q = skeleton.integrate(skeleton.neutral(), rng.normal(size=skeleton.nv))
     n = len(skeleton.tree.kind)
     rotation, translation = np.empty((n, 3, 3)), np.empty((n, 3))
-    place_joints(skeleton.tree, q, rotation, translation)
+    place_joints(skeleton.tree, q, np.empty((2, len(q))), rotation, translation)
     joint, place = skeleton.tree_markers
     markers = np.einsum("mij,mj->mi", rotation[joint], place) + translation[joint]
     np.testing.assert_allclose(

@@ -70,6 +70,7 @@ class BodyFrames:
         joint, in_joint = arm.skeleton.tree_markers
         self._joint, self._in_joint = joint[self.columns], in_joint[self.columns]
         joints = len(arm.skeleton.joint_names) + 1
+        self._turns = np.empty((2, 7 + len(arm.skeleton.joint_names)))
         self._rotation = np.empty((joints, 3, 3))
         self._translation = np.empty((joints, 3))
 
@@ -93,6 +94,7 @@ class BodyFrames:
             row[51:],
             self._to_world[frame],
             self._noise[frame],
+            self._turns,
             self._rotation,
             self._translation,
             markers,

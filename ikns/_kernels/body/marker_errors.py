@@ -44,6 +44,7 @@ def marker_errors(
     target: Array,
     q: Array,
     origin: Array,
+    turns: Array,
     rotation: Array,
     translation: Array,
     x: Array,
@@ -55,7 +56,7 @@ def marker_errors(
     Clusters are turned; their markers' places in the joint are written too. Returns the
     sum of squared errors, weighted and unweighted.
     """
-    place_joints(tree, q, rotation, translation)
+    place_joints(tree, q, turns, rotation, translation)
     for k in range(3):
         origin[k] = translation[0, k]
     for j in range(len(translation)):

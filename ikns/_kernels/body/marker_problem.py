@@ -89,6 +89,7 @@ class Scratch(NamedTuple):
     intermarker: Array
     passed: Array  # 1 for limbs that pass it
     spread: Array  # (2, n) of how uncertain a signal is
+    turns: Array  # (2, nq) sine and cosine of each entry of q
 
 
 def pack(problem: MarkerProblem) -> tuple[Indices, Array]:
@@ -191,7 +192,7 @@ def scratch_size(problem: MarkerProblem) -> int:
         + J * _OF_JOINT
         + n * _OF_RATE
         + 13 * M
-        + nq * (4 + S)
+        + nq * (6 + S)
         + S * (1 + problem.n_branches)
         + 2
         + 3 * problem.n_branches
@@ -215,6 +216,7 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
     m = k + nq * S
     groups = 1 + problem.n_branches
     r = m + S * groups
+    t = r + 3 * groups - 1
     return Scratch(
         work[0:3],
         work[a : a + 9 * J].reshape(J, 3, 3),
@@ -246,6 +248,7 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
         work[19 : 19 + 4 * 4].reshape(4, 4),
         work[r : r + groups],
         work[r + groups : r + 2 * groups],
-        work[r + 2 * groups : r + 3 * groups - 1],
-        work[r + 3 * groups - 1 : r + 3 * groups - 1 + 2 * n].reshape(2, n),
+        work[r + 2 * groups : t],
+        work[t : t + 2 * n].reshape(2, n),
+        work[t + 2 * n : t + 2 * n + 2 * nq].reshape(2, nq),
     )

@@ -51,6 +51,7 @@ def write_markers(
     skin: Array,
     to_world: Array,
     noise: Array,
+    turns: Array,
     rotation: Array,
     translation: Array,
     markers: Array,
@@ -59,9 +60,10 @@ def write_markers(
 
     `joint` (M,) carries each marker at `in_joint` (M, 3); `skin` (3 M,) is their
     displacement in the thorax, turned by `to_world` (3, 3); `noise` (M, 3) is added.
-    `rotation` and `translation` get the poses of the joints.
+    `rotation` and `translation` get the poses of the joints; `turns` (2, nq) is
+    scratch.
     """
-    place_joints(tree, q, rotation, translation)
+    place_joints(tree, q, turns, rotation, translation)
     for m in range(len(joint)):
         j = joint[m]
         for a in range(3):

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ikns._kernels.body.sine_cosine import sine_cosine
-from ikns._kernels.compiled import borrowing, inner_borrowing
+from ikns._kernels.body.sine_cosine import sines_cosines
+from ikns._kernels.compiled import borrowing
 from ikns.arrays import Array, Indices
 
 REVOLUTE, PRISMATIC, FREE_FLYER = 0, 1, 2
@@ -33,63 +33,72 @@ class Tree(NamedTuple):
 
 
 @borrowing
-def place_joints(tree: Tree, q: Array, rotation: Array, translation: Array) -> None:
-    """Write the joints' poses in the world, (J, 3, 3) and (J, 3) m."""
-    for j in range(len(tree.kind)):
-        place_joint(tree, j, q, rotation, translation)
-
-
-@inner_borrowing
-def place_joint(
-    tree: Tree, j: int, q: Array, rotation: Array, translation: Array
+def place_joints(
+    tree: Tree, q: Array, turns: Array, rotation: Array, translation: Array
 ) -> None:
-    """Write the pose of joint `j` from that of its parent."""
-    parent, at, kind = tree.parent[j], tree.first_q[j], tree.kind[j]
-    c, s, shift = 1.0, 0.0, 0.0
-    if kind == REVOLUTE:
-        s, c = sine_cosine(q[at])
-    elif kind == PRISMATIC:
-        shift = q[at]
-    # Entries and not slices: counting references to a slice takes longer than this.
-    for a in range(3):
-        if parent < 0:
-            r0, r1 = tree.rotation[j, a, 0], tree.rotation[j, a, 1]
-            r2 = tree.rotation[j, a, 2]
-            p = tree.translation[j, a]
+    """Write the joints' poses in the world, (J, 3, 3) and (J, 3) m.
+
+    `turns` (2, nq) is scratch.
+    """
+    R, p = tree.rotation, tree.translation
+    sines_cosines(q, turns)
+    # In one function: passing so many arrays on for each joint takes as long.
+    for j in range(len(tree.kind)):
+        parent, at, kind = tree.parent[j], tree.first_q[j], tree.kind[j]
+        # Entries and not slices: counting references to a slice takes longer than this.
+        # Its placement in the parent's frame,
+        a00, a01, a02 = R[j, 0, 0], R[j, 0, 1], R[j, 0, 2]
+        a10, a11, a12 = R[j, 1, 0], R[j, 1, 1], R[j, 1, 2]
+        a20, a21, a22 = R[j, 2, 0], R[j, 2, 1], R[j, 2, 2]
+        p0, p1, p2 = p[j, 0], p[j, 1], p[j, 2]
+        # moved by the joint itself,
+        if kind == REVOLUTE:
+            s, c = turns[0, at], turns[1, at]
+            a00, a01 = c * a00 + s * a01, c * a01 - s * a00
+            a10, a11 = c * a10 + s * a11, c * a11 - s * a10
+            a20, a21 = c * a20 + s * a21, c * a21 - s * a20
         else:
-            u0, u1 = rotation[parent, a, 0], rotation[parent, a, 1]
-            u2 = rotation[parent, a, 2]
-            r0 = u0 * tree.rotation[j, 0, 0] + u1 * tree.rotation[j, 1, 0]
-            r1 = u0 * tree.rotation[j, 0, 1] + u1 * tree.rotation[j, 1, 1]
-            r2 = u0 * tree.rotation[j, 0, 2] + u1 * tree.rotation[j, 1, 2]
-            r0 += u2 * tree.rotation[j, 2, 0]
-            r1 += u2 * tree.rotation[j, 2, 1]
-            r2 += u2 * tree.rotation[j, 2, 2]
-            p = u0 * tree.translation[j, 0] + u1 * tree.translation[j, 1]
-            p += u2 * tree.translation[j, 2] + translation[parent, a]
-        rotation[j, a, 0], rotation[j, a, 1] = c * r0 + s * r1, c * r1 - s * r0
-        rotation[j, a, 2] = r2
-        translation[j, a] = p + shift * r2
-    if kind == FREE_FLYER:
-        x, y, z, w = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
+            x, y, z = 0.0, 0.0, q[at]
+            if kind == FREE_FLYER:
+                x, y, z = q[at], q[at + 1], q[at + 2]
+            p0 += a00 * x + a01 * y + a02 * z
+            p1 += a10 * x + a11 * y + a12 * z
+            p2 += a20 * x + a21 * y + a22 * z
+        if kind == FREE_FLYER:
+            a00, a01, a02 = _turned_row(a00, a01, a02, q, at + 3)
+            a10, a11, a12 = _turned_row(a10, a11, a12, q, at + 3)
+            a20, a21, a22 = _turned_row(a20, a21, a22, q, at + 3)
+        # and in the world.
         for a in range(3):
-            r0, r1, r2 = rotation[j, a, 0], rotation[j, a, 1], rotation[j, a, 2]
-            translation[j, a] += r0 * q[at] + r1 * q[at + 1] + r2 * q[at + 2]
-            rotation[j, a, 0] = (
-                r0 * (1 - 2 * (y * y + z * z))
-                + r1 * 2 * (x * y + w * z)
-                + r2 * 2 * (x * z - w * y)
-            )
-            rotation[j, a, 1] = (
-                r0 * 2 * (x * y - w * z)
-                + r1 * (1 - 2 * (x * x + z * z))
-                + r2 * 2 * (y * z + w * x)
-            )
-            rotation[j, a, 2] = (
-                r0 * 2 * (x * z + w * y)
-                + r1 * 2 * (y * z - w * x)
-                + r2 * (1 - 2 * (x * x + y * y))
-            )
+            if parent >= 0:
+                u0, u1 = rotation[parent, a, 0], rotation[parent, a, 1]
+                u2, shift = rotation[parent, a, 2], translation[parent, a]
+            else:
+                u0, u1 = 1.0 if a == 0 else 0.0, 1.0 if a == 1 else 0.0
+                u2, shift = 1.0 if a == 2 else 0.0, 0.0
+            rotation[j, a, 0] = u0 * a00 + u1 * a10 + u2 * a20
+            rotation[j, a, 1] = u0 * a01 + u1 * a11 + u2 * a21
+            rotation[j, a, 2] = u0 * a02 + u1 * a12 + u2 * a22
+            translation[j, a] = u0 * p0 + u1 * p1 + u2 * p2 + shift
+
+
+@borrowing
+def _turned_row(
+    r0: float, r1: float, r2: float, q: Array, at: int
+) -> tuple[float, float, float]:
+    """Return a row of a rotation matrix times that of the quaternion in `q`."""
+    x, y, z, w = q[at], q[at + 1], q[at + 2], q[at + 3]
+    return (
+        r0 * (1 - 2 * (y * y + z * z))
+        + r1 * 2 * (x * y + w * z)
+        + r2 * 2 * (x * z - w * y),
+        r0 * 2 * (x * y - w * z)
+        + r1 * (1 - 2 * (x * x + z * z))
+        + r2 * 2 * (y * z + w * x),
+        r0 * 2 * (x * z + w * y)
+        + r1 * 2 * (y * z - w * x)
+        + r2 * (1 - 2 * (x * x + y * y)),
+    )
 
 
 @borrowing
