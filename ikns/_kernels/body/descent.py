@@ -27,6 +27,8 @@ from ikns.arrays import Array
 #: the Hessian changes, up to 50 per radian where markers barely determine a joint. So
 #: after a step of this times the root of the tolerance less than 5 % of it remain.
 _NEWTON = 0.03
+#: Damping after a first step that was too long; from 1e-6 on several more were.
+_FIRST = 1e-4
 #: Damping from which on no equation is solvable: numbers are too large to square.
 _HOPELESS = 1e30
 
@@ -130,7 +132,7 @@ def descend(
         elif true_hessian:
             true_hessian = False
         else:
-            damping = max(10 * damping, 1e-6)
+            damping = max(10 * damping, _FIRST)
         if converged or iterations >= problem.max_iterations:
             return np.sqrt(distance / n_seen), iterations, converged
         if not back:
@@ -151,7 +153,7 @@ def descend(
             if not solvable and true_hessian:
                 definite = true_hessian = False
             elif not solvable:
-                damping = max(10 * damping, 1e-6)
+                damping = max(10 * damping, _FIRST)
                 if damping > _HOPELESS:
                     return np.sqrt(distance / n_seen), iterations, False
         for d in range(len(s.step)):
