@@ -17,8 +17,6 @@ from ikns.arrays import Array, Indices
 
 #: Integers before all others; the last two are how many integers and reals there are.
 HEADER = 10
-#: Reals of scratch memory for each joint, and for each rate.
-_OF_JOINT, _OF_RATE = 12 + MOMENTS + INERTIA + 12, 6 + ROW + 6
 
 
 class MarkerProblem(NamedTuple):
@@ -88,7 +86,8 @@ class Scratch(NamedTuple):
     worst: Array  # figures of the gate, of the thorax and each limb
     intermarker: Array
     passed: Array  # 1 for limbs that pass it
-    spread: Array  # (2, n) of how uncertain a signal is
+    weak_pull: Array  # (n,) of how uncertain a signal is: weights of the pull
+    unseen_turn: Array  # (n,) what joints may have turned, rad
     turns: Array  # (2, nq) sine and cosine of each entry of q
 
 
@@ -187,68 +186,71 @@ def scratch_size(problem: MarkerProblem) -> int:
     """Return how many reals a frame's scratch memory has, in the order of `cut`."""
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
     S, nq = problem.starts.shape
-    return (
-        35
-        + J * _OF_JOINT
-        + n * _OF_RATE
-        + 13 * M
-        + nq * (6 + S)
-        + S * (1 + problem.n_branches)
-        + 2
-        + 3 * problem.n_branches
-        + 2 * n
+    groups = 1 + problem.n_branches
+    of_joint = 9 + 3 + 12 + MOMENTS + INERTIA
+    return (3 + 32 + J * of_joint + n * (6 + ROW + 8)) + (
+        13 * M + nq * (6 + S) + groups * (3 + S)
     )
 
 
 @inner_borrowing
 def cut(problem: MarkerProblem, work: Array) -> Scratch:
-    """Divide memory of :func:`scratch_size` reals into arrays; as :func:`unpack`."""
+    """Divide memory of :func:`scratch_size` reals into arrays; as :func:`unpack`.
+
+    Tables of the same width are rows of one: to reshape takes 50 ns.
+    """
     J, n, M = len(problem.tree.kind), len(problem.free), len(problem.marker_joint)
     S, nq = problem.starts.shape
-    a = 35
-    b = a + J * 12
-    c = b + J * (MOMENTS + INERTIA)
-    d = a + J * _OF_JOINT
-    e = d + n * (6 + ROW)
-    g = d + n * _OF_RATE
-    h = g + M * 13
-    k = h + nq * 4
-    m = k + nq * S
     groups = 1 + problem.n_branches
-    r = m + S * groups
-    t = r + 3 * groups - 1
+    rotation_at = 3
+    three_at = rotation_at + 9 * J
+    six_at = three_at + 3 * (J + 4 * M)
+    moments_at = six_at + 6 * (n + 2 * J)
+    inertia_at = moments_at + MOMENTS * J
+    rows_at = inertia_at + INERTIA * J
+    q_at = rows_at + ROW * n
+    residuals_at = q_at + nq * (6 + S)
+    four_at = residuals_at + S * groups
+    weight_at = four_at + 32
+    rate_at = weight_at + M
+    group_at = rate_at + 8 * n
+    three = work[three_at:six_at].reshape(J + 4 * M, 3)
+    six = work[six_at:moments_at].reshape(n + 2 * J, 6)
+    of_q = work[q_at:residuals_at].reshape(6 + S, nq)
+    four = work[four_at:weight_at].reshape(8, 4)
     return Scratch(
         work[0:3],
-        work[a : a + 9 * J].reshape(J, 3, 3),
-        work[a + 9 * J : a + 9 * J + J * 3].reshape(J, 3),
-        work[d : d + n * 6].reshape(n, 6),
-        work[g : g + M],
-        work[g + M : g + M + M * 3].reshape(M, 3),
-        work[g + 4 * M : g + 4 * M + M * 3].reshape(M, 3),
-        work[g + 7 * M : g + 7 * M + M * 3].reshape(M, 3),
-        work[g + 10 * M : g + 10 * M + M * 3].reshape(M, 3),
-        work[b : b + J * MOMENTS].reshape(J, MOMENTS),
-        work[b + J * MOMENTS : b + J * MOMENTS + J * INERTIA].reshape(J, INERTIA),
-        work[c : c + J * 6].reshape(J, 6),
-        work[c + 6 * J : c + 6 * J + J * 6].reshape(J, 6),
-        work[d + 6 * n : d + 6 * n + n * ROW].reshape(n, ROW),
-        work[e : e + n],
-        work[e + n : e + 2 * n],
-        work[e + 2 * n : e + 3 * n],
-        work[e + 3 * n : e + 4 * n],
-        work[e + 4 * n : e + 5 * n],
-        work[e + 5 * n : e + 6 * n],
-        work[h : h + nq],
-        work[h + nq : h + 2 * nq],
-        work[h + 2 * nq : h + 3 * nq],
-        work[h + 3 * nq : h + 4 * nq],
-        work[k : k + S * nq].reshape(S, nq),
-        work[m : m + S * groups].reshape(S, groups),
-        work[3 : 3 + 4 * 4].reshape(4, 4),
-        work[19 : 19 + 4 * 4].reshape(4, 4),
-        work[r : r + groups],
-        work[r + groups : r + 2 * groups],
-        work[r + 2 * groups : t],
-        work[t : t + 2 * n].reshape(2, n),
-        work[t + 2 * n : t + 2 * n + 2 * nq].reshape(2, nq),
+        work[rotation_at:three_at].reshape(J, 3, 3),
+        three[:J],
+        six[:n],
+        work[weight_at:rate_at],
+        three[J : J + M],
+        three[J + M : J + 2 * M],
+        three[J + 2 * M : J + 3 * M],
+        three[J + 3 * M :],
+        work[moments_at:inertia_at].reshape(J, MOMENTS),
+        work[inertia_at:rows_at].reshape(J, INERTIA),
+        six[n : n + J],
+        six[n + J :],
+        work[rows_at:q_at].reshape(n, ROW),
+        work[rate_at : rate_at + n],
+        work[rate_at + n : rate_at + 2 * n],
+        work[rate_at + 2 * n : rate_at + 3 * n],
+        work[rate_at + 3 * n : rate_at + 4 * n],
+        work[rate_at + 4 * n : rate_at + 5 * n],
+        work[rate_at + 5 * n : rate_at + 6 * n],
+        of_q[0],
+        of_q[1],
+        of_q[2],
+        of_q[3],
+        of_q[6:],
+        work[residuals_at:four_at].reshape(S, groups),
+        four[:4],
+        four[4:],
+        work[group_at : group_at + groups],
+        work[group_at + groups : group_at + 2 * groups],
+        work[group_at + 2 * groups : group_at + 3 * groups - 1],
+        work[rate_at + 6 * n : rate_at + 7 * n],
+        work[rate_at + 7 * n : group_at],
+        of_q[4:6],
     )

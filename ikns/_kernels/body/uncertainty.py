@@ -121,8 +121,7 @@ def factor_information(
 ) -> bool:
     """Factor H into `s.rows` after :func:`note_markers`; False where it cannot be.
 
-    Written are the weights of the pull and what the joints may have turned, rad, into
-    `s.spread` (2, n).
+    Written are `s.weak_pull` and `s.unseen_turn`.
     """
     penalties(
         problem.tree,
@@ -150,9 +149,9 @@ def factor_information(
                 unseen = max(unseen, ages[k, _UNSEEN])
                 frames = max(frames, ages[k, _FRAMES])
         n = min(frames, SETTLED) if frames > 0 else SETTLED
-        s.spread[0, d] = problem.pull**2 / n
-        s.spread[1, d] = segments.speed[d] * min(unseen, LONGEST)
-        s.extra[d] = s.spread[0, d]
+        s.weak_pull[d] = problem.pull**2 / n
+        s.unseen_turn[d] = segments.speed[d] * min(unseen, LONGEST)
+        s.extra[d] = s.weak_pull[d]
         if s.beyond[d] != 0:
             s.extra[d] += problem.limit**2
     joint_axes(problem.tree, s.rotation, s.translation, s.axes)
@@ -173,14 +172,14 @@ def deviation(
     After :func:`factor_information`; `hidden` as :func:`note_markers` returns. Degrees
     of freedom that are held do not count.
     """
-    v, spread = s.step, s.spread
+    v = s.step
     for d in range(len(v)):
         v[d] = gradient[d] * problem.free[d]
     solve(problem.tree, s.rows, s.twist, v)
     noise = turned = 0.0
     for d in range(len(v)):
-        noise += v[d] * (gradient[d] - spread[0, d] * v[d])
-        turned += (spread[0, d] * v[d] * spread[1, d]) ** 2
+        noise += v[d] * (gradient[d] - s.weak_pull[d] * v[d])
+        turned += (s.weak_pull[d] * v[d] * s.unseen_turn[d]) ** 2
     variance = NOISE**2 * max(noise, 0.0) + turned
     if hidden:
         variance += _misfit(problem, s, segments, memory)

@@ -178,7 +178,7 @@ class FrameSolver:
             raise InvalidInput(
                 f"expected markers {self._markers.shape}, found {seen.shape}."
             )
-        self._markers[:] = seen
+        self._markers[...] = seen
         place, d = np.empty(3), self.null_space_map.directions_.shape[1]
         c, uncertainty = np.empty(d), np.empty(d)
         residual, worst, apart, iterations, converged, seen_all, status = control_frame(

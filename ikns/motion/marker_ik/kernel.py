@@ -130,9 +130,9 @@ class KernelSolver:
         before that is not finite.
         """
         own = self._of_thread
-        own.markers[0] = markers
-        own.memory[:] = own.new_memory
-        own.start[:] = self._neutral if before is None else before
+        own.seen[...] = markers
+        own.memory[...] = own.new_memory
+        own.start[...] = self._neutral if before is None else before
         solve_frames(
             *self.packed, own.markers, 0, 1, 1, before is None, 0, own.memory, own.work,
             own.row,
@@ -172,6 +172,7 @@ class _OfThread(threading.local):
         nq = solver.problem.starts.shape[1]
         self.work = np.empty(scratch_size(solver.problem))
         self.markers = np.empty((1, len(solver.problem.marker_joint), 3))
+        self.seen = self.markers[0]
         self.memory, self.new_memory = solver.new_memory(), solver.new_memory()
         self.start = self.memory[-nq:]
         self.row = solver.new_rows(1)
