@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -141,6 +143,7 @@ class FrameSolver:
         self._weights = np.empty(len(null_space_map.centers_))
         self._markers = np.empty((len(skeleton.marker_set.markers), 3))
         self._memory = self._ik.new_memory()
+        self._start = self._memory[-len(skeleton.neutral()) :]
         self.reset()
         if self._proximal is not None:
             self._ik.work[:] = 0.0  # no marker is seen: compile, and do nothing
@@ -159,7 +162,7 @@ class FrameSolver:
                     f"expected a finite pose {self._q.shape}, found {given.shape}."
                 )
             self._q[:] = given
-        self._memory[-len(self._q) :] = self._q
+        self._start[...] = self._q
 
     def solve(self, markers: ArrayLike, dt: float = 0.01) -> ControlFrame:
         """Solve the next frame.
@@ -204,8 +207,8 @@ class FrameSolver:
                 self._seen_before, self._q, place, c, uncertainty
             )
             status = INSIDE_HULL if inside else OUTSIDE_HULL
-        self._lost = self._lost and not np.isfinite(residual)
-        self._memory[-len(self._q) :] = self._q
+        self._lost = self._lost and not math.isfinite(residual)
+        self._start[...] = self._q
         limit = self.max_uncertainty
         # A deviation that is NaN is not certain either.
         certain = [

@@ -157,10 +157,9 @@ def label_changes(time: Array, markers: Array) -> tuple[bool, Indices]:
         Which label of the first frame carried the marker that each one has.
     """
     owners = np.empty(markers.shape[:2], dtype=np.int64)
-    # Copies, as the kernel is compiled again for arrays that are read-only.
-    changed = label_owners(
-        np.array(time, order="C"), np.array(markers, order="C"), _LONGEST, owners
-    )
+    # The kernel is compiled again for arrays that are read-only.
+    own = (np.require(part, requirements="CW") for part in (time, markers))
+    changed = label_owners(*own, _LONGEST, owners)
     return bool(changed), owners
 
 
