@@ -9,10 +9,10 @@ from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
+from ikns.calibration.judge.offsets import usual_fit
 from ikns.calibration.judge.subjects import (
     other_session,
     other_than_calibrated,
-    usual_residual,
 )
 from ikns.errors import MarkerMismatch, naming
 from ikns.motion.marker_ik import MarkerIK
@@ -131,7 +131,7 @@ def known_findings(
             skeleton,
             skeleton=skeleton if measured else None,
             chain=chain,
-            usual=usual_residual(of),
+            usual=usual_fit(of),
         )
         others = other_than_calibrated(of, recording, skeleton.marker_set)
     return worst_first([*others, *findings])

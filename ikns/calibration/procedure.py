@@ -15,6 +15,7 @@ from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton, check_chain
 from ikns.calibration.elbow import elbow_reference, two_arms_fault
 from ikns.calibration.freedoms import check_freedoms, freedom_motions
+from ikns.calibration.judge.offsets import offsets_report
 from ikns.calibration.measured_body import measured_body
 from ikns.calibration.method_summary import method_summary, no_range_learned
 from ikns.calibration.places import check_places, recorded_places
@@ -196,6 +197,7 @@ def calibrate(
             exploration_report(recording, motion, gate, chain)
             for recording, (motion, gate) in zip(explorations, pairs, strict=True)
         ],
+        "offsets_m": offsets_report(skeleton, chain, explorations, motions),
         "points": points_report(learned, rate=explorations[0].rate),
         "extrinsic": extrinsic_report(skeleton, pairs, chain),
         "warnings": [

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ikns.body.marker_set import MarkerSet
+from ikns.calibration.judge.offsets import offsets_report
 from ikns.calibration.judge.subjects import other_than_calibrated
 from ikns.calibration.measured_body import measured_body
 from ikns.calibration.method_summary import method_summary
@@ -126,6 +127,7 @@ def rewear(
     report: dict[str, Any] = {
         **subject.report,
         "static": static_report(static, measured.scaling, measured.skeleton.marker_set),
+        "offsets_m": offsets_report(new.skeleton, chain, natural, motions),
         "rewear": about
         | {
             "natural": [

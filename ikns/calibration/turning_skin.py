@@ -10,10 +10,10 @@ from ikns.body.chains import SIDES
 from ikns.body.marker_set import Marker, MarkerSet
 
 #: So many markers show how their segment lies.
-_CLUSTER = 3
+CLUSTER = 3
 #: A marker whose place varies by more, standard deviation of all directions together,
 #: m, is on no landmark: those of the shipped sets have 8 to 26 mm, clusters 49 or more.
-_ANYWHERE = 0.03
+ANYWHERE = 0.03
 #: Weight of a cluster that sits on bone beside one on skin, as in `ue_adl`.
 _ON_BONE = 10.0
 
@@ -43,8 +43,8 @@ def turning_labels(worn: MarkerSet) -> tuple[str, ...]:
         skin = _tracked(worn, f"{side}_forearm")
         hand = [m for m in _tracked(worn, f"{side}_hand") if m.weight >= 1]
         if (
-            min(len(skin), len(hand)) >= _CLUSTER
-            and all(np.linalg.norm(m.placement_sd) > _ANYWHERE for m in skin)
+            min(len(skin), len(hand)) >= CLUSTER
+            and all(np.linalg.norm(m.placement_sd) > ANYWHERE for m in skin)
             and not any(m.free_turn for m in skin)
         ):
             found += tuple(m.label for m in skin)
@@ -71,7 +71,7 @@ def with_firm_hands(worn: MarkerSet, labels: tuple[str, ...]) -> MarkerSet:
         worn,
         markers=tuple(
             replace(m, weight=_ON_BONE)
-            if m.link in hands and np.linalg.norm(m.placement_sd) > _ANYWHERE
+            if m.link in hands and np.linalg.norm(m.placement_sd) > ANYWHERE
             else m
             for m in worn.markers
         ),

@@ -10,7 +10,9 @@ from ikns.arrays import Array, Indices, Mask
 from ikns.body.chains import ChainLike, chain_sides
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.axes import judge_axes
 from ikns.calibration.judge.distance_findings import (
+    another_shape,
     exchanged_names,
     moved_marker,
     unsteady_pair,
@@ -31,6 +33,8 @@ from ikns.calibration.judge.finding import (
     worst_first,
 )
 from ikns.calibration.judge.labels import judge_labels
+from ikns.calibration.judge.lags import judge_lags
+from ikns.calibration.judge.offsets import UsualFit
 from ikns.calibration.judge.sides import labels_in_file, other_side, sides_exchanged
 from ikns.calibration.judge.static import body_size
 from ikns.calibration.judge.steps import judge_steps
@@ -60,7 +64,7 @@ def judge_exploration(
     *,
     skeleton: Skeleton | None = None,
     chain: ChainLike = "both_arms",
-    usual: float | None = None,
+    usual: UsualFit | None = None,
 ) -> list[Finding]:
     """Judge a recording in which a person moves.
 
@@ -76,9 +80,8 @@ def judge_exploration(
     chain : str
         See :class:`ikns.Chain`; what is wrong with the other arm alone is
         left out.
-    usual : float, optional
-        How far the markers were from this body at calibration, m: see
-        :func:`ikns.calibration.judge.subjects.usual_residual`.
+    usual : UsualFit, optional
+        How the markers lay on this body at calibration.
 
     Returns
     -------
@@ -96,7 +99,7 @@ def _judge(
     worn: MarkerSet,
     generic: Skeleton,
     skeleton: Skeleton | None,
-    usual: float | None,
+    usual: UsualFit | None,
 ) -> list[Finding]:
     where = recording.source
     others = judge_labels(
@@ -135,6 +138,10 @@ def _judge(
         in_file=in_file,
     )
     findings += distant
+    if not distant:
+        firm = _firm(worn, pairs)
+        findings += judge_axes(where, worn, good, firm)
+        findings += judge_lags(where, worn.labels, recording.time, measured, firm)
     if not exchanges and len(pairs):
         every = pair_distances(measured, pairs)
         every[spoiled] = np.nan
@@ -177,6 +184,12 @@ def _pairs(worn: MarkerSet) -> Indices:
         (i, j) for i, j in combinations(range(len(links)), 2) if links[i] == links[j]
     ]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _firm(worn: MarkerSet, pairs: Indices) -> Indices:
+    """Pairs (K, 2) of markers that go with their segment: neither weighs less."""
+    weight = np.array([marker.weight for marker in worn.markers])
+    return np.asarray(pairs[(weight[pairs] >= 1).all(axis=1)])
 
 
 def _judge_distances(
@@ -230,6 +243,8 @@ def _judge_distances(
             findings.append(moved_marker(where, labels, pairs[left], shift))
         elif not noisy:
             findings.append(unsteady_pair(where, labels, pairs[left], spread))
+    if apart is not None and not findings:
+        findings += another_shape(where, worn, found, pairs, apart)
     return findings, exchanges
 
 

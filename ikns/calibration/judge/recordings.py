@@ -15,11 +15,11 @@ from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.calibration.judge.finding import Finding, refused, worst_first
 from ikns.calibration.judge.labels import judge_labels, judge_unseen
+from ikns.calibration.judge.offsets import usual_fit
 from ikns.calibration.judge.static import STILL_MARKERS, marker_displacement
 from ikns.calibration.judge.subjects import (
     other_session,
     other_than_calibrated,
-    usual_residual,
 )
 from ikns.calibration.scaling import judge_static
 from ikns.calibration.static_trial import too_short
@@ -153,7 +153,7 @@ def check_recordings(
             continue
         findings += other_than_calibrated(of, recording, worn)
         findings += judge_exploration(
-            recording, worn, body, skeleton=skeleton, usual=usual_residual(of)
+            recording, worn, body, skeleton=skeleton, usual=usual_fit(of)
         )
         own = worn if skeleton is None else skeleton.marker_set
         findings += judge_unseen(recording, own.without_static())

@@ -11,15 +11,14 @@ of 30 mm to within 5.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from ikns.arrays import Array
-from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding
-from ikns.numerics.rigid import quaternion_matrix
 
 #: Least step of a segment's mean distance from the body, m, for markers of weight 1;
 #: what is weighed more gives way less. A slip of 20 mm makes a step of 5 to 18. Clean
@@ -27,6 +26,8 @@ from ikns.numerics.rigid import quaternion_matrix
 _STEP = 0.010
 #: The step must be so many of its own standard deviations.
 _SURE = 5.0
+#: Segments of an arm on which bands slide.
+_PARTS = ("upper_arm", "forearm", "hand")
 #: Least frames looked at, and on each side of the step.
 _FEWEST, _BESIDE = 30, 6
 #: Joints that turn by less than this say nothing about the skin, rad; and those of the
@@ -46,7 +47,7 @@ class Slip(NamedTuple):
 
 
 def find_slips(
-    skeleton: Skeleton, q: Array, placed: Array, markers: Array
+    skeleton: Skeleton, q: Array, offsets: Mapping[str, Array]
 ) -> list[Slip]:
     """Find the segments of the arms whose markers slipped together, the worst first.
 
@@ -55,30 +56,25 @@ def find_slips(
     skeleton : Skeleton
     q : (T, nq) array
         Poses of some frames.
-    placed, markers : (T, M, 3) array
-        Where the poses have the markers, and where they were seen, m.
+    offsets : dict of (T, 3) arrays
+        Of each segment's markers from the body, m, as
+        :func:`ikns.calibration.judge.offsets.offsets_in_links` returns them.
     """
     found: list[Slip] = []
-    for side in SIDES:
-        names = skeleton.joint_names
+    names = skeleton.joint_names
+    for link, apart in offsets.items():
+        side, _, part = link.partition("_")
+        if part not in _PARTS:
+            continue
         own = [
             i
             for i, name in enumerate(names)
             if name.startswith(side) and _LEFT_OUT not in name
         ]
-        angles = q[:, -len(names) :][:, own]
-        for link in (f"{side}_upper_arm", f"{side}_forearm", f"{side}_hand"):
-            worn = [
-                m
-                for m, marker in enumerate(skeleton.marker_set.markers)
-                if marker.link == link and marker.weight > 0
-            ]
-            if worn:
-                apart = _apart(skeleton, link, q, placed[:, worn], markers[:, worn])
-                weight = max(skeleton.marker_set.markers[m].weight for m in worn)
-                limit = _STEP / np.sqrt(max(1.0, weight))
-                if (step := _step(angles, apart, limit)) is not None:
-                    found.append(Slip(link, *step))
+        worn = [m for m in skeleton.marker_set.markers if m.link == link]
+        limit = _STEP / np.sqrt(max(1.0, *(marker.weight for marker in worn)))
+        if (step := _step(q[:, -len(names) :][:, own], apart, limit)) is not None:
+            found.append(Slip(link, *step))
     return sorted(found, key=lambda slip: -slip.step)
 
 
@@ -87,11 +83,10 @@ def judge_slips(
     skeleton: Skeleton,
     time: Array,
     q: Array,
-    placed: Array,
-    markers: Array,
+    offsets: Mapping[str, Array],
 ) -> list[Finding]:
     """Say which segment's markers slipped; arguments as above, times (T,) s."""
-    slips = find_slips(skeleton, q, placed, markers)
+    slips = find_slips(skeleton, q, offsets)
     # The body moves with what slipped, and takes others along: the worst is named.
     return [
         Finding(
@@ -107,18 +102,6 @@ def judge_slips(
         )
         for link, frame, step in slips[:1]
     ]
-
-
-def _apart(
-    skeleton: Skeleton, link: str, q: Array, placed: Array, markers: Array
-) -> Array:
-    """Mean of markers from where a pose has them, in their link, (T, 3) m; NaN."""
-    apart = np.full((len(q), 3), np.nan)
-    shift = markers - placed
-    for t in np.flatnonzero(np.isfinite(shift).all(axis=(1, 2))).tolist():
-        turned = quaternion_matrix(q[t, 3:7]) @ skeleton.link_in_thorax(q[t], link)[1]
-        apart[t] = shift[t].mean(axis=0) @ turned
-    return apart
 
 
 def _step(angles: Array, apart: Array, limit: float) -> tuple[int, float] | None:

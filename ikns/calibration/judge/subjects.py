@@ -90,21 +90,6 @@ def other_than_calibrated(
     ]
 
 
-def usual_residual(report: Mapping[str, Any]) -> float | None:
-    """Return how far the markers were from the body at calibration, m.
-
-    The largest of its recordings' medians; after :func:`ikns.rewear` the new wearing's.
-    None where the report does not say.
-    """
-    worn_again = report.get("rewear")
-    rows = worn_again.get("natural") if isinstance(worn_again, Mapping) else None
-    rows = rows or report.get("explorations")
-    if not isinstance(rows, list):
-        return None
-    known = [row.get("residual_median_m") for row in rows if isinstance(row, Mapping)]
-    return max((float(one) for one in known if isinstance(one, float)), default=None)
-
-
 def subject_names(recording: Recording, worn: MarkerSet) -> list[str]:
     """Return the subjects before the labels of a set's markers, as they are spelled."""
     columns = worn.columns(recording.labels)

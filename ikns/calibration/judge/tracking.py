@@ -10,6 +10,11 @@ from ikns.arrays import Array, Indices
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.distances import quantile
 from ikns.calibration.judge.finding import Finding, say_markers
+from ikns.calibration.judge.offsets import (
+    UsualFit,
+    judge_offsets,
+    offsets_in_links,
+)
 from ikns.calibration.judge.pose_cost import PoseCost
 from ikns.calibration.judge.sides import (
     mirror_image,
@@ -60,12 +65,12 @@ def judge_tracking(
     markers: Array,
     *,
     in_file: Sequence[str],
-    usual: float | None = None,
+    usual: UsualFit | None = None,
 ) -> list[Finding]:
     """Judge how a skeleton follows its markers (T, M, 3), m; NaN where not seen.
 
-    At times (T,), s. The recording's file names them `in_file`; `usual` is the residual
-    at calibration, m.
+    At times (T,), s. The recording's file names them `in_file`; `usual` is how they
+    lay on the body at calibration.
     """
     worn = skeleton.marker_set
     rows = _glances(markers)
@@ -97,10 +102,14 @@ def judge_tracking(
             )
         ]
     findings = _residual(where, worn.labels, residual, off)
-    if not findings and usual is not None:
-        findings = _unlike(where, float(np.nanmedian(motion.residual)), usual)
-    findings += _turning_skin(where, skeleton, some, residual)
-    findings += judge_slips(where, skeleton, time[rows], motion.q, placed, some)
+    if not findings and usual is not None and usual.residual is not None:
+        findings = _unlike(where, float(np.nanmedian(motion.residual)), usual.residual)
+    offsets = offsets_in_links(skeleton, motion.q, placed, some)
+    elsewhere = judge_slips(where, skeleton, time[rows], motion.q, offsets)
+    if not findings and not elsewhere:
+        known = {} if usual is None else usual.offsets
+        elsewhere = judge_offsets(where, skeleton, offsets, known)
+    findings += elsewhere + _turning_skin(where, skeleton, some, residual)
     if share.max() > _SHARE:
         worst = int(share.argmax())
         findings.append(
