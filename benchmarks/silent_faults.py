@@ -1,16 +1,20 @@
 """What does the check of recordings not notice? Real people's, spoiled one by one.
 
-Clean recordings of UE_ADL with clusters of four markers on every segment; each fault
-keeps the distances within segments, so that only the person's body can tell:
+Clean recordings of UE_ADL with clusters of four markers on every segment:
 
 - a cluster slides along its segment, or a band turns about the forearm by as much, in
   the middle of the recording or between static trial and recording;
-- the static trial is another person's, or in a volume calibrated 2 or 5 % too large;
+- the static trial, or the subject folder, is another person's, who wore such plates;
+- the cameras' volume is 2 or 5 % too large, or one axis of it 5 or 8 % too long in both
+  recordings;
+- a marker of a cluster is 0.05 to 0.2 s late;
 - the frame rate is wrong in one file, or in both.
 
 Told is what the judge warns of or refuses with any sentence; without a fault it must
-say nothing. The segments and the wrist's and elbow's centers are the landmarks' of the
-static trial, no part of the toolkit's body.
+say nothing. "Calibrated" compares with a subject folder instead of a static trial: four
+tasks of the right arm, repeat 1; what is checked are repeats 2. The
+segments and the wrist's and elbow's centers are the landmarks' of the static trial, no
+part of the toolkit's body. Labels carry no subject's name.
 """
 
 import argparse
@@ -23,9 +27,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ikns.body.skeleton import Skeleton
+from ikns.calibration.judge.offsets import offsets_report
 from ikns.calibration.judge.recordings import check_recordings
 from ikns.calibration.judge.subjects import other_session
+from ikns.calibration.measured_body import measured_body
 from ikns.calibration.scaling import scale
+from ikns.numerics.median import finite_median
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
 
@@ -89,19 +96,59 @@ def _turns(calm: np.ndarray, seen: np.ndarray) -> np.ndarray:
     return turns
 
 
-def told(recording: Recording, skeleton: Skeleton) -> bool:
+def told(recording: Recording, skeleton: Skeleton, report: dict | None = None) -> bool:
     """Whether the judge says anything of a recording of this person."""
-    found = check_recordings([recording], skeleton=skeleton)
+    found = check_recordings([recording], skeleton=skeleton, report=report)
     return any(finding.severity != "note" for finding in found.findings)
 
 
-def trials_of(folder: Path, name: str, *, quick: bool) -> list[tuple[str, Recording]]:
-    """Read the first repeat of each task and arm, with its side."""
+def trials_of(
+    folder: Path, name: str, repeat: int, *, quick: bool
+) -> list[tuple[str, Recording]]:
+    """Read a repeat of each task and arm, with its side."""
     tasks = "F" if quick else "FADC"
     return [
-        (side, read(folder / name / f"{name}{task}{side}1.csv"))
+        (side, read(folder / name / f"{name}{task}{side}{repeat}.csv"))
         for task, side in product(tasks, "R" if quick else "RL")
     ]
+
+
+def calibrated(
+    static: Recording, trials: list[Recording], chain: str = "right_arm"
+) -> tuple[Skeleton, dict]:
+    """Body and report as of a calibration, which needs hands at rest beside these."""
+    body = measured_body(
+        static,
+        trials,
+        (),
+        generic=None,
+        marker_set="ue_adl",
+        chain=chain,
+        min_static=0.15,
+        progress=None,
+    )
+    rows = [{"residual_median_m": finite_median(m.residual)} for m in body.explorations]
+    offsets = offsets_report(body.skeleton, chain, trials, body.explorations)
+    return body.skeleton, {"explorations": rows, "offsets_m": offsets}
+
+
+def late(recording: Recording, label: str, seconds: float) -> Recording:
+    """Delay one marker."""
+    markers = np.array(recording.markers)
+    column, frames = _column(recording, label), round(seconds * recording.rate)
+    markers[frames:, column] = recording.markers[:-frames, column]
+    return Recording(recording.time, markers, recording.labels, recording.source)
+
+
+def scaled(recording: Recording, *factors: float) -> Recording:
+    """Scale the axes of the room."""
+    markers = recording.markers * factors
+    return Recording(recording.time, markers, recording.labels, recording.source)
+
+
+def scaled_to(static: Recording) -> Skeleton:
+    """Scale the generic adult to a static trial, however short."""
+    return scale(Skeleton.load(), static, marker_set="ue_adl", min_duration=0.15)[0]
 
 
 def at_rate(recording: Recording, factor: float) -> Recording:
@@ -135,17 +182,16 @@ def main() -> None:
     names = sorted(path.name for path in folder.glob("ADL*"))
     names = names[:2] if options.quick else names
     statics = {name: read(folder / name / f"{name}_static.csv") for name in names}
-    bodies = {
-        name: scale(Skeleton.load(), static, marker_set="ue_adl", min_duration=0.15)[0]
-        for name, static in statics.items()
-    }
-    trials = {name: trials_of(folder, name, quick=options.quick) for name in names}
+    bodies = {name: scaled_to(static) for name, static in statics.items()}
+    trials = {name: trials_of(folder, name, 1, quick=options.quick) for name in names}
     every = [(name, side, trial) for name, own in trials.items() for side, trial in own]
     rows: dict[str, list[bool]] = {}
     sizes = (0.02,) if options.quick else (0.02, 0.03)
 
-    def add(row: str, trial: Recording, skeleton: Skeleton) -> None:
-        rows.setdefault(row, []).append(told(trial, skeleton))
+    def add(
+        row: str, trial: Recording, skeleton: Skeleton, report: dict | None = None
+    ) -> None:
+        rows.setdefault(row, []).append(told(trial, skeleton, report))
 
     for name, side, trial in every:
         body, static = bodies[name], statics[name]
@@ -157,19 +203,48 @@ def main() -> None:
             wrong = slipped(static, trial, side, "forearm", turn=0.02, start=start)
             add(f"forearm turns 20 mm {when}", wrong, body)
         for factor in (1.02, 1.05):
-            larger = Recording(
-                trial.time, factor * trial.markers, trial.labels, trial.source
+            add(
+                f"volume {100 * (factor - 1):.0f} % larger",
+                scaled(trial, factor, factor, factor),
+                body,
             )
-            add(f"volume {100 * (factor - 1):.0f} % larger", larger, body)
+        for segment, seconds in product(CLUSTERS, (0.05, 0.1, 0.2)):
+            wrong = late(trial, f"{side}{CLUSTERS[segment]}2", seconds)
+            add(f"a marker of the {segment} {seconds:g} s late", wrong, body)
         worn = body.marker_set
         rows.setdefault("frame rate twice the static trial's", []).append(
             bool(other_session(static, at_rate(trial, 2.0), worn))
         )
         add("frame rate twice the true one in both", at_rate(trial, 2.0), body)
-    for name, own in trials.items():
         for other in names:
             if other != name:
-                add("static trial of another", own[-1][1], bodies[other])
+                add("static trial of another", trial, bodies[other])
+    for name, axis in product(names, range(3)):
+        for percent in (5, 8):
+            factors = [1.0, 1.0, 1.0]
+            factors[axis] += percent / 100
+            body = scaled_to(scaled(statics[name], *factors))
+            for _, trial in trials[name]:
+                row = f"{'xyz'[axis]} axis {percent} % longer in both"
+                add(row, scaled(trial, *factors), body)
+    known = {
+        name: calibrated(statics[name], [one for side, one in own if side == "R"])
+        for name, own in trials.items()
+    }
+    later = {name: trials_of(folder, name, 2, quick=options.quick) for name in names}
+    for name, own in later.items():
+        for side, trial in own:
+            for other in names:
+                row = "subject folder of another" if other != name else "no fault"
+                add(f"{row}, calibrated", trial, *known[other])
+            if side == "L":
+                continue
+            for segment, size in product(CLUSTERS, sizes):
+                wrong = slipped(
+                    statics[name], trial, side, segment, slide=size, start=0.0
+                )
+                row = f"{segment} slides {1000 * size:.0f} mm before, calibrated"
+                add(row, wrong, *known[name])
     speeds = [hand_speed(trial, side) for _, side, trial in every]
     if options.json:
         print(json.dumps({row: [sum(hit), len(hit)] for row, hit in rows.items()}))

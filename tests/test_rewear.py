@@ -10,6 +10,7 @@ import small_person
 from command_line import check_refused, contents
 
 from ikns.body.marker_set import MarkerSet
+from ikns.calibration.judge.recordings import check_recordings
 from ikns.calibration.rewear import WEARING_SD, rewear
 from ikns.calibration.subject import Subject
 from ikns.cli import main
@@ -65,6 +66,17 @@ def test_c_is_what_it_was_before_the_markers_moved():
         error = np.sqrt(np.nanmean((c[1] - c[0]) ** 2))
         # 0.04 was asked for of intent; the paper's c also follows the wrist's markers.
         assert error < most, (method, error)
+
+
+def test_recordings_are_compared_with_the_new_wearing():
+    subject, _, other = people()
+    moving = [other.free.recording]
+    for person, clean in ((again(), True), (subject, False)):
+        found = check_recordings(moving, skeleton=person.skeleton, report=person.report)
+        assert clean == all(one.severity == "note" for one in found.findings)
+    old, new = (person.report["offsets_m"] for person in (subject, again()))
+    assert set(old) == set(new) >= {"right_upper_arm", "right_forearm"}
+    assert old != new
 
 
 def test_body_and_maps_stay():

@@ -23,10 +23,10 @@ from ikns.numerics.rigid import quaternion_matrix
 from ikns.recording.recording import Recording
 
 #: Segments of an arm, and how far the median offset of markers of weight 1 may be from
-#: the static trial's and from those at calibration, m; a hand's that weigh more give way
-#: less. 1.5 times the largest of seven people (UE_ADL, 168 trials; their hands weigh
+#: the static trial's and from those at calibration, m; that of a hand's that weigh more
+#: is less. 1.5 times the largest of seven people (UE_ADL, 168 trials; their hands weigh
 #: 10): 19, 35, 19 and 4 mm, and 8, 13, 4 and 1 mm where one reach was the calibration.
-#: With limits from six of them the seventh is within them (benchmarks/silent_faults.py).
+#: With limits from six people the seventh is within (benchmarks/silent_faults.py).
 _LIMITS = {
     "clavicle": (0.028, 0.0126),
     "upper_arm": (0.052, 0.019),

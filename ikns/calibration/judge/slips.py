@@ -3,10 +3,11 @@
 Their distances stay the same, and the body follows for a part of the way, so that no
 residual is large. But at one posture they lie elsewhere after it than before: the mean
 distance of a segment's markers from the body is a smooth function of posture, with a
-step at that moment. What turns with the joint, as a band about a forearm, and what
-slipped before the recording began cannot be told from the person. Nor can a slip where
-joints take it up: with one marker on a clavicle that is free, the body follows a slip
-of 30 mm to within 5.
+step at that moment. What turns with the joint, as a band about a forearm, cannot be
+told; nor can a slip where joints take it up: with one marker on a clavicle that is
+free, the body follows a slip of 30 mm to within 5. What slipped before the recording
+began is looked for in `offsets`. Fewer than three markers are no band, and their skin
+makes such steps.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from ikns.arrays import Array
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding
+from ikns.calibration.turning_skin import CLUSTER
 
 #: Least step of a segment's mean distance from the body, m, for markers of weight 1;
 #: what is weighed more gives way less. A slip of 20 mm makes a step of 5 to 18. Clean
@@ -71,7 +73,9 @@ def find_slips(
             for i, name in enumerate(names)
             if name.startswith(side) and _LEFT_OUT not in name
         ]
-        worn = [m for m in skeleton.marker_set.markers if m.link == link]
+        worn = [m for m in skeleton.marker_set.markers if m.link == link and m.weight]
+        if len(worn) < CLUSTER:
+            continue
         limit = _STEP / np.sqrt(max(1.0, *(marker.weight for marker in worn)))
         if (step := _step(q[:, -len(names) :][:, own], apart, limit)) is not None:
             found.append(Slip(link, *step))
