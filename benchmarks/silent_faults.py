@@ -27,11 +27,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ikns.body.skeleton import Skeleton
-from ikns.calibration.judge.offsets import offsets_report
+from ikns.calibration.judge.offsets import offsets_in_links, offsets_report
 from ikns.calibration.judge.recordings import check_recordings
 from ikns.calibration.judge.subjects import other_session
 from ikns.calibration.measured_body import measured_body
 from ikns.calibration.scaling import scale
+from ikns.motion.marker_ik import MarkerIK, turned_markers
 from ikns.numerics.median import finite_median
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
@@ -132,12 +133,66 @@ def calibrated(
     return body.skeleton, {"explorations": rows, "offsets_m": offsets}
 
 
+def offsets(body: Skeleton, trial: Recording, usual: dict | None = None) -> dict:
+    """By link of the arms: median offset of its markers from the body, (3,) m.
+
+    Beyond its range at calibration where `usual` gives that.
+    """
+    step = max(1, len(trial.time) // 60)
+    some = trial.markers[::step]
+    seconds = np.arange(len(some), dtype=float)
+    few = Recording(seconds, some, trial.labels, trial.source)
+    q = MarkerIK(body).track(few).q
+    markers = body.marker_set.pick(few.labels, few.markers)
+    placed = np.stack(
+        [turned_markers(body, *one) for one in zip(q, markers, strict=True)]
+    )
+    found = {}
+    for link, apart in offsets_in_links(body, q, placed, markers).items():
+        middle = np.nanmedian(apart, axis=0)
+        if usual is None:
+            found[link] = middle
+        elif link in usual:
+            found[link] = middle - np.clip(middle, *usual[link])
+    return found
+
+
+def left_out(people: list[list[dict]]) -> list[tuple[str, float, float, int, int]]:
+    """Compare each person's offsets with 1.5 times the largest of the others.
+
+    Returns part of the arm, the largest offset, the most of such a limit, and how many
+    trials are beyond it, of how many.
+    """
+    rows = []
+    for part in ("clavicle", "upper_arm", "forearm", "hand"):
+        sizes = [
+            [
+                max(np.linalg.norm(x) for link, x in trial.items() if part in link)
+                for trial in own
+            ]
+            for own in people
+        ]
+        shares = [
+            np.array(own) / (1.5 * max(max(o) for o in sizes if o is not own))
+            for own in sizes
+        ]
+        largest = max(max(own) for own in sizes)
+        share = np.concatenate(shares)
+        rows.append((part, largest, share.max(), int((share > 1).sum()), len(share)))
+    return rows
+
+
 def late(recording: Recording, label: str, seconds: float) -> Recording:
     """Delay one marker."""
     markers = np.array(recording.markers)
     column, frames = _column(recording, label), round(seconds * recording.rate)
     markers[frames:, column] = recording.markers[:-frames, column]
     return Recording(recording.time, markers, recording.labels, recording.source)
+
+
+def _usual(static: Recording, trial: Recording) -> tuple[Skeleton, dict]:
+    body, report = calibrated(static, [trial])
+    return body, report["offsets_m"]
 
 
 def scaled(recording: Recording, *factors: float) -> Recording:
@@ -186,6 +241,7 @@ def main() -> None:
     trials = {name: trials_of(folder, name, 1, quick=options.quick) for name in names}
     every = [(name, side, trial) for name, own in trials.items() for side, trial in own]
     rows: dict[str, list[bool]] = {}
+    some: dict[tuple[str, str, str], bool] = {}
     sizes = (0.02,) if options.quick else (0.02, 0.03)
 
     def add(
@@ -218,7 +274,11 @@ def main() -> None:
         add("frame rate twice the true one in both", at_rate(trial, 2.0), body)
         for other in names:
             if other != name:
-                add("static trial of another", trial, bodies[other])
+                row = "static trial of another"
+                add(row, trial, bodies[other])
+                some[row, name, other] = (
+                    some.get((row, name, other), False) or (rows[row][-1])
+                )
     for name, axis in product(names, range(3)):
         for percent in (5, 8):
             factors = [1.0, 1.0, 1.0]
@@ -237,6 +297,11 @@ def main() -> None:
             for other in names:
                 row = "subject folder of another" if other != name else "no fault"
                 add(f"{row}, calibrated", trial, *known[other])
+                if other != name:
+                    some[row, name, other] = (
+                        some.get((row, name, other), False)
+                        or (rows[f"{row}, calibrated"][-1])
+                    )
             if side == "L":
                 continue
             for segment, size in product(CLUSTERS, sizes):
@@ -245,6 +310,25 @@ def main() -> None:
                 )
                 row = f"{segment} slides {1000 * size:.0f} mm before, calibrated"
                 add(row, wrong, *known[name])
+    for (row, _, _), hit in some.items():
+        rows.setdefault(f"{row}, in one of the trials or more", []).append(hit)
+    held = {
+        "static trial": [
+            [offsets(bodies[name], trial) for _, trial in (*own, *later[name])]
+            for name, own in trials.items()
+        ]
+    }
+    if not options.quick:
+        for task, title in enumerate(("forward", "across", "to drink", "to comb")):
+            held[f"calibration with one reach {title}"] = [
+                [
+                    offsets(body, trial, usual)
+                    for side, trial in (*own, *later[name])
+                    if side == "R" and trial is not own[2 * task][1]
+                ]
+                for name, own in trials.items()
+                for body, usual in [_usual(statics[name], own[2 * task][1])]
+            ]
     speeds = [hand_speed(trial, side) for _, side, trial in every]
     if options.json:
         print(json.dumps({row: [sum(hit), len(hit)] for row, hit in rows.items()}))
@@ -253,6 +337,16 @@ def main() -> None:
     print("| fault | told |\n|---|---|")
     for row, hit in rows.items():
         print(f"| {row} | {sum(hit)} of {len(hit)} |")
+    print(
+        "\n| offsets from | part | largest, mm | beyond 1.5 times the largest of the "
+        "other people | most of that |\n|---|---|---|---|---|"
+    )
+    for title, people in held.items():
+        for part, largest, share, beyond, count in left_out(people):
+            print(
+                f"| {title} | {part} | {1000 * largest:.1f} | {beyond} of {count} "
+                f"| {share:.2f} |"
+            )
     print(
         f"\nSpeed of the hand, 95th percentile of each clean trial: {min(speeds):.2f} "
         f"to {max(speeds):.2f} m/s"

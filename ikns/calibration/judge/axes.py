@@ -41,7 +41,7 @@ class _Sums(NamedTuple):
     normal: Array  # (5, 5)
     right: Array  # (5,)
     squares: float  # m^2
-    count: int
+    frames: int
 
 
 def room_stretch(markers: Array, pairs: Indices, links: Array) -> tuple[Array, float]:
@@ -69,20 +69,20 @@ def room_stretch(markers: Array, pairs: Indices, links: Array) -> tuple[Array, f
     sums = [
         one
         for link in dict.fromkeys(of_pair.tolist())
-        if (one := _sums(some, pairs[of_pair == link])).count
+        if (one := _sums(some, pairs[of_pair == link])).frames
     ]
     if len(sums) < 2:
         return np.zeros((3, 3)), 0.0
     left = 0.0
     for k, one in enumerate(sums):
         other = _solve(sums[:k] + sums[k + 1 :])
-        left += one.squares - 2 * other @ one.right + other @ one.normal @ other
+        left += float(one.squares - 2 * other @ one.right + other @ one.normal @ other)
     # What noise alone would change.
-    total = sum(one.squares + one.count * _NOISE**2 for one in sums)
+    total = sum(one.squares + one.frames * _NOISE**2 for one in sums)
     found = _solve(sums)
     a, b, xy, xz, yz = found.tolist()
     stretch = np.array([[a, xy, xz], [xy, b, yz], [xz, yz, -a - b]])
-    turned = [found @ one.normal @ found / one.count for one in sums]
+    turned = [found @ one.normal @ found / one.frames for one in sums]
     if max(turned) < _TURNED**2 * np.sum(stretch**2):
         return stretch, 0.0
     changes = sum(one.squares for one in sums)
@@ -90,7 +90,7 @@ def room_stretch(markers: Array, pairs: Indices, links: Array) -> tuple[Array, f
 
 
 def _sums(markers: Array, pairs: Indices) -> _Sums:
-    normal, right, squares, count = np.zeros((5, 5)), np.zeros(5), 0.0, 0
+    normal, right, squares, frames = np.zeros((5, 5)), np.zeros(5), 0.0, 0
     for i, j in pairs.tolist():
         w = markers[:, i] - markers[:, j]
         w = w[np.isfinite(w).all(axis=1)]
@@ -107,13 +107,13 @@ def _sums(markers: Array, pairs: Indices) -> _Sums:
         normal += design.T @ design
         right += design.T @ change
         squares += float(change @ change)
-        count += len(w)
-    return _Sums(normal, right, squares, count)
+        frames += len(w)
+    return _Sums(normal, right, squares, frames)
 
 
 def _solve(sums: list[_Sums]) -> Array:
     """Least squares over segments; directions that nothing shows stay 0."""
-    noise = sum(one.count for one in sums) * _NOISE**2
+    noise = sum(one.frames for one in sums) * _NOISE**2
     normal = np.sum([one.normal for one in sums], axis=0) + noise * np.eye(5)
     return np.linalg.solve(normal, np.sum([one.right for one in sums], axis=0))
 

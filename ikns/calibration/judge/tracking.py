@@ -106,10 +106,11 @@ def judge_tracking(
         findings = _unlike(where, float(np.nanmedian(motion.residual)), usual.residual)
     offsets = offsets_in_links(skeleton, motion.q, placed, some)
     elsewhere = judge_slips(where, skeleton, time[rows], motion.q, offsets)
-    if not findings and not elsewhere:
+    turning = _turning_skin(where, skeleton, some, residual)
+    if not findings + elsewhere + turning:
         known = {} if usual is None else usual.offsets
         elsewhere = judge_offsets(where, skeleton, offsets, known)
-    findings += elsewhere + _turning_skin(where, skeleton, some, residual)
+    findings += elsewhere + turning
     if share.max() > _SHARE:
         worst = int(share.argmax())
         findings.append(
