@@ -48,7 +48,9 @@ def late_marker(
         Lag to first order, s, positive where it is late, and the share of the squared
         changes of all distances. None where they do not change.
     """
-    period = (time[-1] - time[0]) / max(1, len(time) - 1)
+    if len(time) < _FEWEST:
+        return None
+    period = (time[-1] - time[0]) / (len(time) - 1)
     step = max(1, round(_STEP / period))
     rows = np.arange(step, len(time) - step)
     rows = rows[:: max(1, -(-len(rows) // _GLANCES))]
@@ -118,7 +120,7 @@ def judge_lags(
 
 def _best_lag(time: Array, markers: Array, pairs: Indices, marker: int) -> float:
     """Lag at which a marker's distances to the others vary least, s; 0 if in vain."""
-    period = (time[-1] - time[0]) / max(1, len(time) - 1)
+    period = (time[-1] - time[0]) / (len(time) - 1)
     others = np.setdiff1d(pairs[(pairs == marker).any(axis=1)], [marker])
     most = min(round(_LONGEST / period), len(time) // 3)
     shifts = np.arange(-most, most + 1)
