@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ikns.arrays import Array, Indices
+from ikns.arrays import Array, Indices, Mask
 from ikns.errors import InvalidInput
 
 #: Half width of the local quadratic, s: a sweep of 30 deg at 1 Hz loses 0.1 deg of a
@@ -79,17 +79,19 @@ def swept_ends(
     t = checked_times(t, len(y))
     if not np.isfinite(y).all():
         raise InvalidInput("expected finite values, found some that are not.")
-    smooth, share = local_quadratic(y, t)
-    noise = _noise(y - smooth, share)
+    windows = _windows(t)
+    smooth = windows.smooth(y)
+    noise = _noise(y - smooth, windows.share)
     steady = np.abs(y - smooth) <= _JUMP * noise
     if noise > 0 and not steady.all() and steady.sum() >= _LEAST:
         y, t = y[steady], t[steady]
-        smooth, share = local_quadratic(y, t)
-        noise = _noise(y - smooth, share)
+        windows = _windows(t)
+        smooth = windows.smooth(y)
+        noise = _noise(y - smooth, windows.share)
     rng = np.random.default_rng(seed)
-    drawn = local_quadratic(smooth + noise * rng.normal(size=(_DRAWS, len(y))), t)[0]
+    drawn = windows.smooth(smooth + noise * rng.normal(size=(_DRAWS, len(y))))
     # A quadratic of the smoothed series is the base: its bias at a turn is no noise.
-    plain = local_quadratic(smooth, t)[0]
+    plain = windows.smooth(smooth)
     low = smooth.min() - (drawn.min(axis=1).mean() - plain.min())
     high = smooth.max() - (drawn.max(axis=1).mean() - plain.max())
     return SweptEnds(float(min(low, high)), float(max(low, high)), noise)
@@ -153,33 +155,55 @@ def local_quadratic(values: Array, time: Array) -> tuple[Array, Array]:
     share : (N,) array
         Weight of a sample in its own fit; its variance in units of that of a sample.
     """
+    windows = _windows(time)
+    return windows.smooth(values), windows.share
+
+
+class _Windows(NamedTuple):
+    """Samples near each of N samples, as far as K / 2 places before and after it."""
+
+    weights: Array  # (K, 3, N): 1, u, u^2; 0 where that sample is not near
+    row: Array  # (N, 3), of the inverse normal equations: the value at the sample
+    enough: Mask  # (N,), whether there is a fit
+
+    @property
+    def share(self) -> Array:
+        return np.where(self.enough, self.row[:, 0], 1.0)
+
+    def smooth(self, values: Array) -> Array:
+        """Evaluate the fit to values (..., N) at each sample."""
+        reach = len(self.weights) // 2
+        padding = [(0, 0)] * (values.ndim - 1) + [(reach, reach)]
+        padded = np.pad(values, padding, mode="edge")
+        sums = np.zeros((3, *values.shape))
+        part = np.empty(values.shape)
+        for k, weight in enumerate(self.weights):
+            near = padded[..., k : k + values.shape[-1]]
+            for total, power in zip(sums, weight, strict=True):
+                total += np.multiply(power, near, out=part)
+        smooth = np.einsum("np,p...n->...n", self.row, sums)
+        return np.where(self.enough, smooth, values)
+
+
+def _windows(time: Array) -> _Windows:
     n = len(time)
     first = np.searchsorted(time, time - _HALF_WIDTH)
     last = np.searchsorted(time, time + _HALF_WIDTH, side="right")
-    moments = np.zeros((5, n))
-    sums = np.zeros((3, *values.shape))
     here = np.arange(n)
     reach = int(max((here - first).max(), (last - 1 - here).max()))
-    for k in range(-reach, reach + 1):
-        at = here + k
-        near = (at >= first) & (at < last)
-        at = np.clip(at, 0, n - 1)
-        # In units of the half width: all moments are then of one order.
-        u = np.where(near, (time[at] - time) / _HALF_WIDTH, 0.0)
-        weight = near.astype(float)
-        y = values[..., at]
-        for p in range(5):
-            moments[p] += weight
-            if p < 3:
-                sums[p] += weight * y
-            weight = weight * u
+    at = here + np.arange(-reach, reach + 1)[:, None]
+    near = (at >= first) & (at < last)
+    # In units of the half width: all moments are then of one order.
+    u = np.where(near, (time[np.clip(at, 0, n - 1)] - time) / _HALF_WIDTH, 0.0)
+    powers = [near.astype(float)]
+    for _ in range(4):
+        powers.append(powers[-1] * u)
+    moments = np.array([power.sum(axis=0) for power in powers])
     normal = moments[np.add.outer(np.arange(3), np.arange(3))].transpose(2, 0, 1)
     enough = (last - first >= _LEAST) & (np.linalg.det(normal) > 1e-9)
     normal[~enough] = np.eye(3)
-    # Row 0 of the inverse: the value of the quadratic at the sample itself.
     row = np.linalg.inv(normal)[:, 0]
-    smooth = np.einsum("np,p...n->...n", row, sums)
-    return np.where(enough, smooth, values), np.where(enough, row[:, 0], 1.0)
+    return _Windows(np.stack(powers[:3], axis=1), row, enough)
 
 
 def _noise(rest: Array, share: Array) -> float:
