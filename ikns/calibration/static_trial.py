@@ -15,7 +15,7 @@ from ikns.body.set_choice import other_set, set_worn, too_few_of_set
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding
 from ikns.errors import MarkerMismatch, NotEnoughData
-from ikns.numerics.rigid import rigid_transform
+from ikns.numerics.rigid import aligned
 from ikns.recording.recording import Recording
 
 #: With this many frames that show every marker only these are averaged; noise is then a
@@ -87,17 +87,12 @@ def _mean_posture(static: Recording, worn: MarkerSet) -> Array:
     if complete.sum() >= _COMPLETE_FRAMES:
         markers, seen = markers[complete], seen[complete]
     reference = markers[int(np.argmax(seen.sum(axis=1)))]
-    aligned = np.full_like(markers, np.nan)
-    for i, frame in enumerate(markers):
-        common = seen[i] & seen_markers(reference)
-        if common.sum() >= 3:
-            rotation, shift = rigid_transform(frame[common], reference[common])
-            aligned[i] = frame @ rotation.T + shift
-    known = seen_markers(aligned)
+    still = aligned(markers, reference)
+    known = seen_markers(still)
     count = known.sum(axis=0)
     mean = np.full((len(worn.markers), 3), np.nan)
     some = count > 0
-    total = np.where(known[..., None], aligned, 0.0).sum(axis=0)
+    total = np.where(known[..., None], still, 0.0).sum(axis=0)
     mean[some] = total[some] / count[some, None]
     return mean
 

@@ -8,15 +8,41 @@ from ikns.arrays import Array
 
 
 def rigid_transform(source: Array, target: Array) -> tuple[Array, Array]:
-    """Rotation (3, 3) and shift that best map points (N, 3) to points (Kabsch 1976).
+    """Rotation (..., 3, 3) and shift (..., 3) that best map points to points.
 
-    ``target ~ source @ rotation.T + shift``, with N >= 3.
+    ``target ~ source @ rotation.T + shift``, points (..., N, 3) with N >= 3 (Kabsch
+    1976).
     """
-    a, b = source.mean(axis=0), target.mean(axis=0)
-    u, _, vt = np.linalg.svd((target - b).T @ (source - a))
-    flip = np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(vt)])
+    a, b = source.mean(axis=-2), target.mean(axis=-2)
+    across = np.swapaxes(target - b[..., None, :], -1, -2) @ (source - a[..., None, :])
+    u, _, vt = np.linalg.svd(across)
+    flip = np.zeros(u.shape)
+    flip[..., 0, 0] = flip[..., 1, 1] = 1.0
+    flip[..., 2, 2] = np.linalg.det(u) * np.linalg.det(vt)
     rotation = u @ flip @ vt
-    return rotation, b - rotation @ a
+    return rotation, b - (rotation @ a[..., None])[..., 0]
+
+
+def aligned(frames: Array, reference: Array) -> Array:
+    """Move each frame of points (T, N, 3) as a rigid body onto a reference (N, 3).
+
+    By the points that both have; NaN where a frame has fewer than three of them, or
+    lacks the point.
+
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> turned = square[None] @ turn_matrix(np.array([0.0, 0, 1]), 0.3) + [0, 0, 2]
+    >>> bool(np.allclose(aligned(turned, square), square))
+    True
+    """
+    moved = np.full(frames.shape, np.nan)
+    both = np.isfinite(frames).all(axis=2) & np.isfinite(reference).all(axis=1)
+    for common in np.unique(both, axis=0):
+        if common.sum() >= 3:
+            rows = np.flatnonzero((both == common).all(axis=1))
+            own = frames[rows]
+            turn, shift = rigid_transform(own[:, common], reference[common])
+            moved[rows] = own @ np.swapaxes(turn, 1, 2) + shift[:, None]
+    return moved
 
 
 def quaternion_matrix(quaternion: Array) -> Array:

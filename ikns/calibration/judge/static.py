@@ -25,7 +25,7 @@ from ikns.calibration.judge.trace_findings import judge_traces
 from ikns.calibration.judge.unit import size_ratio, wrong_unit
 from ikns.calibration.size_fit import SizeFit
 from ikns.errors import NotEnoughData
-from ikns.numerics.rigid import rigid_transform
+from ikns.numerics.rigid import aligned
 from ikns.recording.recording import Recording
 
 #: Largest displacement of a marker of a person who stands still, without the sway of
@@ -49,13 +49,7 @@ def marker_displacement(markers: Array) -> Array:
     middle = np.full(markers.shape[1:], np.nan)
     some = seen.any(axis=0)
     middle[some] = np.nanmean(markers[:, some], axis=0)
-    distances = np.full(seen.shape, np.nan)
-    for i, frame in enumerate(markers):
-        if seen[i].sum() >= 3:
-            own = seen[i]
-            rotation, shift = rigid_transform(frame[own], middle[own])
-            moved = frame[own] @ rotation.T + shift - middle[own]
-            distances[i, own] = np.linalg.norm(moved, axis=1)
+    distances = np.linalg.norm(aligned(markers, middle) - middle, axis=2)
     rms = np.zeros(seen.shape[1])
     measured = np.isfinite(distances).any(axis=0)
     rms[measured] = np.sqrt(np.nanmean(distances[:, measured] ** 2, axis=0))

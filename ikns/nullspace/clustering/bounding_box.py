@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ikns.arrays import Array
+from ikns.arrays import Array, Indices
 from ikns.errors import InvalidInput
 from ikns.numerics.distance import distances
 
@@ -173,9 +173,11 @@ def _smallest_axes(x: Array, coordinate_axes: Array) -> Array:
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(x)
-    x = x[hull.vertices]
     if x.shape[1] == 2:
-        return _turned(x, np.eye(2), 0, 1)
+        outline = x[hull.vertices]
+        sides = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
+        return _flush(sides, np.eye(2))
+    solid = _Solid.of(hull.points, hull.simplices, hull.neighbors, hull.equations)
     corners = hull.points[hull.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     largest = np.argsort(-np.linalg.norm(normals, axis=1))[:_FACES]
@@ -184,43 +186,73 @@ def _smallest_axes(x: Array, coordinate_axes: Array) -> Array:
     flips = [np.diag(signs) for signs in np.vstack([np.ones(3), 1 - 2 * np.eye(3)])]
     starts = [np.eye(3), *on_faces, *(f @ s for f in frames for s in flips)]
     # One round from everywhere, all rounds from the best.
-    found = [_shrunk(x, axes, rounds=1) for axes in starts]
-    found.sort(key=lambda axes: _volume(x, axes))
-    found = [_shrunk(x, axes) for axes in found[:_FINALISTS]]
+    found = [_shrunk(solid, axes, rounds=1) for axes in starts]
+    found.sort(key=solid.volume)
+    found = [_shrunk(solid, axes) for axes in found[:_FINALISTS]]
     if coordinate_axes.shape == (3, 3):
         found.append(coordinate_axes)
-    return _shrunk(x, min(found, key=lambda axes: _volume(x, axes)))
+    return _shrunk(solid, min(found, key=solid.volume))
 
 
-def _shrunk(x: Array, axes: Array, *, rounds: int = 30) -> Array:
+class _Solid(NamedTuple):
+    """A convex hull in three dimensions of V corners, E edges and F triangles."""
+
+    corners: Array  # (V, 3)
+    edges: Indices  # (E, 2), the corners at both ends
+    faces: Indices  # (E, 2), the triangles that meet there
+    normals: Array  # (F, 3)
+
+    @classmethod
+    def of(
+        cls, points: Array, triangles: Indices, neighbors: Indices, planes: Array
+    ) -> _Solid:
+        """Take what Qhull found: the neighbor k of a triangle is opposite corner k."""
+        face = np.repeat(np.arange(len(triangles)), 3)
+        other = neighbors.ravel()
+        once = face < other
+        own, corner = np.unique(triangles, return_inverse=True)
+        ends = corner.reshape(-1, 3)[:, [[1, 2], [0, 2], [0, 1]]].reshape(-1, 2)[once]
+        faces = np.stack([face, other], axis=1)[once]
+        return cls(points[own], ends, faces, planes[:, :3])
+
+    def volume(self, axes: Array) -> float:
+        """Volume of the box around it along these axes."""
+        return float(np.ptp(self.corners @ axes.T, axis=0).prod())
+
+    def outline(self, axes: Array, i: int, j: int) -> Array:
+        """Sides of its projection on two axes, (S, 2, 2): where front meets back."""
+        front = self.normals @ axes[3 - i - j] > 0
+        a, b = self.faces.T
+        return (self.corners @ axes[[i, j]].T)[self.edges[front[a] != front[b]]]
+
+
+def _shrunk(solid: _Solid, axes: Array, *, rounds: int = 30) -> Array:
     """Rotate about one axis after the other until no rotation shrinks the box."""
-    volume = _volume(x, axes)
+    volume = solid.volume(axes)
     for _ in range(rounds):
         before = volume
         for i, j in ((1, 2), (0, 2), (0, 1)):
-            turned = _turned(x, axes, i, j)
-            if _volume(x, turned) < volume:
-                volume, axes = _volume(x, turned), turned
+            turned = axes.copy()
+            turned[[i, j]] = _flush(solid.outline(axes, i, j), axes[[i, j]])
+            if (smaller := solid.volume(turned)) < volume:
+                volume, axes = smaller, turned
         if volume > before * (1 - _GAIN):
             break
     return axes
 
 
-def _volume(x: Array, axes: Array) -> float:
-    return float(np.ptp(x @ axes.T, axis=0).prod())
+def _flush(sides: Array, axes: Array) -> Array:
+    """Turn two axes (2, d) to the smallest rectangle around a convex outline.
 
-
-def _turned(x: Array, axes: Array, i: int, j: int) -> Array:
-    """Axes with `i` and `j` rotated to the smallest rectangle around the points."""
-    from scipy.spatial import ConvexHull
-
-    seen = x @ axes[[i, j]].T
-    outline = seen[ConvexHull(seen).vertices]
-    edges = np.roll(outline, -1, axis=0) - outline
-    along = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    It is flush with one of the `sides` (S, 2, 2), which are given along these axes.
+    """
+    edges = sides[:, 1] - sides[:, 0]
+    length = np.linalg.norm(edges, axis=1)
+    # What is seen from its end has no direction.
+    whole = length > _FLAT * length.max()
+    along = edges[whole] / length[whole, None]
     across = along @ np.array([[0.0, 1.0], [-1.0, 0.0]])
-    area = np.ptp(outline @ along.T, axis=0) * np.ptp(outline @ across.T, axis=0)
+    ends = sides.reshape(-1, 2)
+    area = np.ptp(ends @ along.T, axis=0) * np.ptp(ends @ across.T, axis=0)
     best = area.argmin()
-    turned = axes.copy()
-    turned[[i, j]] = np.stack([along[best], across[best]]) @ axes[[i, j]]
-    return turned
+    return np.asarray(np.stack([along[best], across[best]]) @ axes)
