@@ -175,8 +175,8 @@ class _Problem:
         last_shape, last_q, errors = self._last_errors
         if last_shape is not shape or last_q is not q:  # the spread asks for them too
             _, placed = self.body(shape)
-            model = np.stack([placed.markers_in_world(row) for row in q])
-            errors = np.where(self.shown[..., None], model - self.seen, 0.0)
+            off = placed.markers_in_world(q) - self.seen
+            errors = np.where(self.shown[..., None], off, 0.0)
             self._last_errors = shape, q, errors
         return errors
 
@@ -216,17 +216,14 @@ class _Problem:
         sized, placed = self.body(shape)
         axes = [(joint, component) for joint, component, _ in TILTS]
         M, S, K = len(self.placement), len(SEGMENTS), len(axes)
-        by_pose = np.empty((len(q), M, 3, len(self.free)))
         by_shape = np.zeros((len(q), M, 3, len(self.prior)))
+        by_shape[..., :S], by_place = sized.size_jacobian(q)
+        places = by_shape[..., S:-K].reshape(len(q), M, 3, M, 3)
         own = np.arange(M)
-        for k, row in enumerate(q):
-            by_size, by_place = sized.size_jacobian(row)
-            by_shape[k, ..., :S] = by_size
-            places = by_shape[k, ..., S:-K].reshape(M, 3, M, 3)
-            places[own, :, own] = by_place
-            by_shape[k, ..., S:-K] = places.reshape(M, 3, 3 * M)
-            by_shape[k, ..., -K:] = placed.tilt_jacobian(row, axes)
-            by_pose[k] = placed.marker_jacobian(row)[1][..., self.free]
+        places[:, own, :, own] = np.swapaxes(by_place, 0, 1)
+        by_shape[..., S:-K] = places.reshape(len(q), M, 3, 3 * M)
+        by_shape[..., -K:] = placed.tilt_jacobian(q, axes)
+        by_pose = placed.marker_jacobian(q)[1][..., self.free]
         return (
             by_pose.reshape(len(q), 3 * M, -1),
             by_shape.reshape(len(q), 3 * M, -1),

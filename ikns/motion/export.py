@@ -114,7 +114,7 @@ def fitted_markers(skeleton: Skeleton, motion: Motion) -> Recording:
         NaN while a marker's segment is out of sight, and for clusters with a free turn,
         whose angle is not part of a motion.
     """
-    markers = np.stack([skeleton.markers_in_world(q) for q in motion.q])
+    markers = skeleton.markers_in_world(motion.q)
     seen = dict(zip(motion.segments, motion.seen.T, strict=True))
     for column, marker in enumerate(skeleton.marker_set.markers):
         if marker.free_turn:

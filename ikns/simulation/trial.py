@@ -128,7 +128,7 @@ def record_trial(
     skeleton = arms[0].skeleton
     of_noise, of_skin, of_gaps = rng.spawn(3)
     time = np.arange(len(q)) / rate
-    markers = np.stack([skeleton.markers_in_world(row) for row in q])
+    markers = skeleton.markers_in_world(q)
     markers += noise * of_noise.normal(size=markers.shape)
     if skin is not None:
         markers += skin.displacement(q, rate=rate, rng=of_skin)

@@ -265,7 +265,7 @@ def _far_apart(points: Array, n: int) -> NDArray[np.int64]:
 
 def _spread(skeleton: Skeleton, q: Array, markers: Array) -> float:
     """Error of a marker around the scaled body, m per axis."""
-    model = np.stack([skeleton.markers_in_world(row) for row in q])
+    model = skeleton.markers_in_world(q)
     weight = [marker.weight for marker in skeleton.marker_set.markers]
     squares = weight * np.sum((model - markers) ** 2, axis=2)
     known = np.isfinite(squares)

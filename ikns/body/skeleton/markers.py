@@ -35,10 +35,12 @@ class Markers:
                 for f, m in zip(frames, marker_set.markers, strict=True)
             ]
         ).reshape(-1, 3)
+        joints, self._row = np.unique(self.joint, return_inverse=True)
+        self._joints: list[int] = joints.tolist()
         self._carried = []
-        for joint in np.unique(self.joint):
+        for joint in joints:
             rows = np.flatnonzero(self.joint == joint)
-            self._carried.append((int(joint), rows, self.in_joint[rows]))
+            self._carried.append((rows, self.in_joint[rows]))
 
     @cached_property
     def _beyond(self) -> list[Mask]:
@@ -57,79 +59,103 @@ class Markers:
         return moves
 
     def place(self, q: Array) -> Array:
-        """Positions in the world, (M, 3) m."""
-        pin.forwardKinematics(self._model, self._data, q)
-        return self._positions()
+        """Positions in the world, (..., M, 3) m, at configurations (..., nq)."""
+        return self._positions(*self._poses(q, self._joints))
 
     def jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Positions (M, 3) m and their derivative by the tangent, (M, 3, nv).
+        """Positions (..., M, 3) m, and their derivative by the tangent, (..., M, 3, nv).
 
         Column j is ``linear_j + angular_j x position`` for the joints between the root
         and the marker, else zero.
         """
-        twists = np.array(pin.computeJointJacobians(self._model, self._data, q))
-        positions = self._positions()
-        linear, (wx, wy, wz) = twists[:3], twists[3:]
-        x, y, z = positions.T[:, :, None]
-        jacobian = np.empty((len(positions), 3, self._model.nv))
-        jacobian[:, 0] = linear[0] + wy * z - wz * y
-        jacobian[:, 1] = linear[1] + wz * x - wx * z
-        jacobian[:, 2] = linear[2] + wx * y - wy * x
+        nv = self._model.nv
+        twists = np.empty((*q.shape[:-1], 2, 3, 1, nv))
+        positions = self._positions(*self._poses(q, self._joints, twists=twists))
+        x, y, z = np.moveaxis(positions[..., None], -2, 0)
+        linear = np.moveaxis(twists[..., 0, :, :, :], -3, 0)
+        wx, wy, wz = np.moveaxis(twists[..., 1, :, :, :], -3, 0)
+        jacobian = np.empty((*positions.shape, nv))
+        jacobian[..., 0, :] = linear[0] + wy * z - wz * y
+        jacobian[..., 1, :] = linear[1] + wz * x - wx * z
+        jacobian[..., 2, :] = linear[2] + wx * y - wy * x
         jacobian *= self._moves[:, None, :]
         return positions, jacobian
 
     def by_size(self, q: Array, along: Array) -> tuple[Array, Array]:
-        """Differentiate by the log sizes, (M, 3, S), and the marker places, (M, 3, 3).
+        """Differentiate by the log sizes, (..., M, 3, S), and the marker places.
 
-        `along` (M, 3) is the part of each marker's position that scales with its
-        segment, in the joint's frame, m.
+        The latter is (..., M, 3, 3). `along` (M, 3) is the part of each marker's
+        position that scales with its segment, in the joint's frame, m.
         """
-        model, data = self._model, self._data
-        pin.forwardKinematics(model, data, q)
-        by_size = np.zeros((len(self.joint), 3, len(SEGMENTS)))
-        for s, segment in enumerate(SEGMENTS):
-            carrier = self._carrier[segment]
-            rotation = data.oMi[carrier].rotation
+        model = self._model
+        carriers = [self._carrier[segment] for segment in SEGMENTS]
+        rotation = self._poses(q, carriers + self._joints)[0]
+        by_size = np.zeros((*q.shape[:-1], len(self.joint), 3, len(SEGMENTS)))
+        for s, carrier in enumerate(carriers):
+            turned, by = rotation[..., s, :, :], by_size[..., s]
             for joint in model.children[carrier]:
-                by_size[self._beyond[joint], :, s] = (
-                    rotation @ model.jointPlacements[joint].translation
-                )
+                way = turned @ model.jointPlacements[joint].translation
+                by[..., self._beyond[joint], :] = way[..., None, :]
             own = self.joint == carrier
-            by_size[own, :, s] = along[own] @ rotation.T
-        by_place = np.empty((len(self.joint), 3, 3))
-        for joint, rows, _ in self._carried:
-            by_place[rows] = data.oMi[joint].rotation
-        return by_size, by_place
+            by[..., own, :] = along[own] @ np.swapaxes(turned, -1, -2)
+        return by_size, rotation[..., len(SEGMENTS) + self._row, :, :]
 
     def by_tilt(self, q: Array, tilts: Sequence[tuple[str, int]]) -> Array:
-        """Differentiate by tilts of joints, (M, 3, K) m/rad.
+        """Differentiate by tilts of joints, (..., M, 3, K) m/rad.
 
         A tilt is a joint and the axis of its frame, 0 to 2, about which it turns before
         it moves.
         """
-        model, data = self._model, self._data
-        pin.forwardKinematics(model, data, q)
-        positions = self._positions()
+        model = self._model
         joints = [model.getJointId(name) for name, _ in tilts]
-        frames = [
-            data.oMi[model.parents[joint]] * model.jointPlacements[joint]
-            for joint in joints
-        ]
+        rotation, translation = self._poses(
+            q, [model.parents[joint] for joint in joints]
+        )
+        before = [model.jointPlacements[joint] for joint in joints]
         axes = np.array(
             [
-                frame.rotation[:, component]
-                for frame, (_, component) in zip(frames, tilts, strict=True)
+                pose.rotation[:, component]
+                for pose, (_, component) in zip(before, tilts, strict=True)
             ]
         )
-        arms = positions[:, None] - np.array([frame.translation for frame in frames])
+        centers = np.array([pose.translation for pose in before])
+        axes = (rotation @ axes[..., None])[..., 0]
+        centers = translation + (rotation @ centers[..., None])[..., 0]
+        arms = self.place(q)[..., None, :] - centers[..., None, :, :]
         moved = np.stack([self._beyond[joint] for joint in joints], axis=1)
-        return np.swapaxes(np.cross(axes, arms) * moved[..., None], 1, 2)
+        turned = np.cross(axes[..., None, :, :], arms) * moved[..., None]
+        return np.swapaxes(turned, -1, -2)
 
-    def _positions(self) -> Array:
-        positions = np.empty_like(self.in_joint)
-        for joint, rows, in_joint in self._carried:
-            pose = self._data.oMi[joint]
-            positions[rows] = in_joint @ pose.rotation.T + pose.translation
+    def _poses(
+        self, q: Array, joints: Sequence[int], *, twists: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Rotations (..., J, 3, 3) and translations (..., J, 3) m of joints.
+
+        Also writes the columns of all joints' Jacobians into `twists`.
+        """
+        model, data = self._model, self._data
+        rows = q.reshape(-1, model.nq)
+        turned = np.empty((len(rows), len(joints), 3, 3))  # by columns, as Pinocchio's
+        translation = np.empty((len(rows), len(joints), 3))
+        columns = None if twists is None else twists.reshape(len(rows), 6, model.nv)
+        for k, row in enumerate(rows):
+            if columns is None:
+                pin.forwardKinematics(model, data, row)
+            else:
+                columns[k] = pin.computeJointJacobians(model, data, row)
+            for j, joint in enumerate(joints):
+                pose = data.oMi[joint]
+                turned[k, j], translation[k, j] = pose.rotation.T, pose.translation
+        shape = (*q.shape[:-1], len(joints))
+        rotation = np.swapaxes(turned.reshape(*shape, 3, 3), -1, -2)
+        return rotation, translation.reshape(*shape, 3)
+
+    def _positions(self, rotation: Array, translation: Array) -> Array:
+        positions = np.empty((*rotation.shape[:-3], len(self.joint), 3))
+        turned = np.swapaxes(rotation, -1, -2)
+        for j, (rows, in_joint) in enumerate(self._carried):
+            places = in_joint @ turned[..., j, :, :]
+            positions[..., rows, :] = places + translation[..., j, None, :]
         return positions
 
 

@@ -236,24 +236,28 @@ class Skeleton:
         return LinkFrames(self._model)
 
     def markers_in_world(self, q: Array) -> Array:
-        """Marker positions at `q`, (M, 3) m."""
+        """Marker positions at configurations (..., 25), (..., M, 3) m."""
         return self._markers.place(q)
 
     def marker_jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Marker positions in the world, (M, 3) m, and d position / d v, (M, 3, nv)."""
+        """Marker positions in the world, and d position / d v.
+
+        (..., M, 3) m and (..., M, 3, nv) at configurations (..., 25).
+        """
         return self._markers.jacobian(q)
 
     def size_jacobian(self, q: Array) -> tuple[Array, Array]:
         """Differentiate the marker positions by the body's sizes.
 
         Returns d position / d log(factor) of each segment of
-        :data:`ikns.body.model_file.SEGMENTS`, (M, 3, S) m, and d position / d (marker
-        position in its link), which is the link's orientation, (M, 3, 3).
+        :data:`ikns.body.model_file.SEGMENTS`, (..., M, 3, S) m, and d position / d
+        (marker position in its link), which is the link's orientation, (..., M, 3, 3),
+        at configurations (..., 25).
         """
         return self._markers.by_size(q, self._along)
 
     def tilt_jacobian(self, q: Array, tilts: Sequence[tuple[str, int]]) -> Array:
-        """Differentiate the marker positions by tilts of joints, (M, 3, K) m/rad.
+        """Differentiate the marker positions by tilts of joints, (..., M, 3, K) m/rad.
 
         A tilt is a joint and an axis of its frame, 0 to 2, see
         :mod:`ikns.body.joint_axes`.
