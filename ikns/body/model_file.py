@@ -7,8 +7,9 @@ center of mass and shape. Joint axes and limits never change.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,14 @@ SEGMENTS: dict[str, str | None] = {
             ("hand", "knuckle_fixed"),
         )
     },
+}
+
+#: Lengths of a link, by element.
+_LENGTHS = {
+    "origin": ("xyz",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "box": ("size",),
 }
 
 
@@ -142,6 +151,10 @@ def resize_urdf(
         urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
     )
     links = {link.get("name"): link for link in robot.iter("link")}
+    ends: dict[str | None, list[ET.Element | None]] = {}
+    for joint in robot.iter("joint"):
+        if (parent := joint.find("parent")) is not None:
+            ends.setdefault(parent.get("link"), []).append(joint.find("origin"))
     given = {} if inertials is None else inertials
     for name in [*factors, *given]:
         if name not in links:
@@ -150,10 +163,8 @@ def resize_urdf(
         if not (np.isfinite(factor) and factor > 0):
             raise InvalidInput(f"size factor of {name} must be positive, not {factor}.")
         _resize_link(links[name], factor)
-        for joint in robot.iter("joint"):
-            parent = joint.find("parent")
-            if parent is not None and parent.get("link") == name:
-                _scale(joint.find("origin"), "xyz", factor)
+        for origin in ends.get(name, []):
+            _scale(origin, "xyz", factor)
     for name, inertial in given.items():
         _set_inertial(links[name], inertial)
     ET.indent(robot)
@@ -161,15 +172,9 @@ def resize_urdf(
 
 
 def _resize_link(link: ET.Element, factor: float) -> None:
-    for origin in link.iter("origin"):
-        _scale(origin, "xyz", factor)
-    for shape in link.iter("cylinder"):
-        _scale(shape, "radius", factor)
-        _scale(shape, "length", factor)
-    for shape in link.iter("sphere"):
-        _scale(shape, "radius", factor)
-    for shape in link.iter("box"):
-        _scale(shape, "size", factor)
+    for element in link.iter():
+        for attribute in _LENGTHS.get(str(element.tag), ()):
+            _scale(element, attribute, factor)
     _scale(link.find("inertial/mass"), "value", factor**3)
     for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
         _scale(link.find("inertial/inertia"), name, factor**5)
@@ -180,32 +185,31 @@ def _set_inertial(link: ET.Element, inertial: Inertial) -> None:
     if old is not None:
         link.remove(old)
     element = ET.Element("inertial")
-    ET.SubElement(element, "origin", xyz=_text(np.array(inertial.center)))
+    ET.SubElement(element, "origin", xyz=_text(inertial.center))
     ET.SubElement(element, "mass", value=f"{inertial.mass:.9g}")
     xx, yy, zz = (f"{value:.9g}" for value in inertial.inertia)
     ET.SubElement(element, "inertia", ixx=xx, ixy="0", ixz="0", iyy=yy, iyz="0", izz=zz)
     link.insert(0, element)
 
 
-def _joint_origins(urdf: str) -> dict[str | None, Array]:
-    """Place of each joint in its parent link, (3,) m, by joint name."""
-    return {
-        joint.get("name"): _vector(joint.find("origin"), "xyz")
-        for joint in ET.fromstring(urdf).iter("joint")
-    }
-
-
-def _vector(element: ET.Element | None, attribute: str) -> Array:
-    if element is None:
-        return np.zeros(3)
-    return np.array([float(x) for x in element.get(attribute, "0 0 0").split()])
+@lru_cache(maxsize=4)
+def _joint_origins(urdf: str) -> Mapping[str | None, Array]:
+    """Place of each joint in its parent link, (3,) m, by joint name; read-only."""
+    origins = {}
+    for joint in ET.fromstring(urdf).iter("joint"):
+        origin = joint.find("origin")
+        text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+        place = np.array([float(x) for x in text.split()])
+        place.flags.writeable = False
+        origins[joint.get("name")] = place
+    return origins
 
 
 def _scale(element: ET.Element | None, attribute: str, factor: float) -> None:
-    if element is not None and element.get(attribute) is not None:
-        element.set(attribute, _text(factor * _vector(element, attribute)))
+    if element is not None and (text := element.get(attribute)) is not None:
+        element.set(attribute, _text(factor * float(x) for x in text.split()))
 
 
-def _text(values: Array) -> str:
+def _text(values: Iterable[float]) -> str:
     # Adding zero turns -0 into 0.
     return " ".join(f"{value + 0.0:.9g}" for value in values)

@@ -166,7 +166,7 @@ class _Problem:
         tilts: dict[str, Array] = {}
         for (joint, component, _), angle in zip(TILTS, shape.tilts, strict=True):
             tilts.setdefault(joint, np.zeros(3))[component] = angle
-        sized = self.reference.resized(size_factors(shape.sizes)).tilted(tilts)
+        sized = self.reference.resized(size_factors(shape.sizes), tilts=tilts)
         places = sized.marker_positions + shape.offsets
         return sized, sized.with_markers(self.worn.at(places))
 

@@ -125,12 +125,16 @@ class Skeleton:
         factors: Mapping[str, float],
         *,
         inertials: Mapping[str, Inertial] | None = None,
+        tilts: Mapping[str, Array] | None = None,
     ) -> Skeleton:
         """Return a skeleton with segments resized; markers keep their place along them.
 
-        Arguments are those of :func:`ikns.body.model_file.resize_urdf`.
+        Arguments are those of :func:`ikns.body.model_file.resize_urdf`, and those of
+        :meth:`tilted`.
         """
         urdf = resize_urdf(self.urdf, factors, inertials=inertials)
+        if tilts is not None:
+            urdf = tilt_urdf(urdf, tilts)
         positions = grown_positions(self.urdf, self.marker_set, factors)
         return Skeleton(urdf, self.marker_set.at(positions))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ikns.arrays import Array, Indices
-from ikns.nullspace.clustering.nearest import nearest_center
 from ikns.numerics.distance import distances
 
 #: Two halves of one held place are at most 3.5 deviations apart along their line (a
@@ -47,15 +46,16 @@ def lloyd(
     n_iter = 0
     while n_iter < max_iter:
         n_iter += 1
-        previous, (labels, _) = labels, nearest_center(x, centers, radius=np.inf)
+        distance = distances(x, centers)
+        previous, labels = labels, distance.argmin(axis=1)
+        counts = np.bincount(labels, minlength=len(centers))
         if (labels == previous).all():
-            empty = np.setdiff1d(np.arange(len(centers)), labels)
-            farthest = distances(x, centers).min(axis=1)
-            if not (move_empty and empty.size and farthest.max() > 0):
+            farthest = distance.min(axis=1) if move_empty else np.zeros(1)
+            if counts.all() or not farthest.max() > 0:
                 break
-            centers[empty[0]] = x[farthest.argmax()]
+            centers[counts.argmin()] = x[farthest.argmax()]
             continue
-        for k in np.unique(labels):
+        for k in np.flatnonzero(counts):
             centers[k] = x[labels == k].mean(axis=0)
     return centers, labels, n_iter
 
