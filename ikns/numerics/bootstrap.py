@@ -122,14 +122,21 @@ def block_rows(
     >>> block_rows(4, 4, 1, np.random.default_rng(3)).tolist()
     [[3, 0, 1, 2]]
     """
+    starts = _block_starts(n, length, resamples, rng)
+    rows = (starts[:, :, None] + np.arange(length)) % n
+    return rows.reshape(resamples, -1)[:, :n]
+
+
+def _block_starts(
+    n: int, length: int, resamples: int, rng: np.random.Generator
+) -> Indices:
+    """First rows of blocks that together are at least `n` long, (resamples, k)."""
     if not (1 <= length <= n and resamples >= 1):
         raise InvalidInput(
             f"expected blocks of 1 to {n} rows and at least one resample, found "
             f"{length} and {resamples}."
         )
-    starts = rng.integers(n, size=(resamples, -(-n // length)))
-    rows = (starts[:, :, None] + np.arange(length)) % n
-    return rows.reshape(resamples, -1)[:, :n]
+    return rng.integers(n, size=(resamples, -(-n // length)))
 
 
 def block_counts(
@@ -139,10 +146,16 @@ def block_counts(
 
     Sums over the drawn rows are products with this matrix.
     """
-    rows = block_rows(n, length, resamples, rng)
-    rows = rows + n * np.arange(resamples)[:, None]
-    counts = np.bincount(rows.ravel(), minlength=n * resamples)
-    return counts.reshape(resamples, n).astype(np.float64)
+    starts = _block_starts(n, length, resamples, rng)
+    ends = starts + length
+    ends[:, -1] -= starts.shape[1] * length - n
+    # A block adds one from its start on and takes it off at its end; of one that goes
+    # on at the beginning, the one is there before its start as well.
+    rows = np.stack([starts, ends % n]) + n * np.arange(resamples)[:, None]
+    sign = np.repeat([1.0, -1.0], starts.size)
+    counts = np.bincount(rows.ravel(), sign, n * resamples).reshape(resamples, n)
+    counts[:, 0] += np.sum(ends >= n, axis=1)
+    return np.cumsum(counts, axis=1, out=counts)
 
 
 def student_interval(

@@ -72,14 +72,18 @@ def _hard_jumps(time: Array, markers: Array) -> tuple[Mask, Mask]:
     gap = time[:, None] - time[before]
     known = seen & (before >= 0) & (gap <= max(_GAP, 1.5 * step))
     columns = np.arange(m)[None]
-    here = markers[before, columns]
-    speed = (here - markers[before - 1, columns]) / step
-    speed[(before < 1) | ~np.isfinite(speed).all(axis=2)] = 0.0
-    ahead = here + gap[..., None] * speed
+    limit = np.maximum(_ASTRAY, _HARDEST * gap**2)
     with np.errstate(invalid="ignore"):
-        jump = np.minimum(_norm(markers - here), _norm(markers - ahead))
-        hard = jump > np.maximum(_ASTRAY, _HARDEST * gap**2)
-    return np.asarray(hard & known), np.asarray(known)
+        hard = (_norm(markers - markers[before, columns]) > limit) & known
+    # Speed tells of those alone that are far from where they were.
+    at, column = np.nonzero(hard)
+    last = before[at, column]
+    here = markers[last, column]
+    speed = (here - markers[last - 1, column]) / step
+    speed[(last < 1) | ~np.isfinite(speed).all(axis=1)] = 0.0
+    ahead = here + gap[at, column, None] * speed
+    hard[at, column] = _norm(markers[at, column] - ahead) > limit[at, column]
+    return np.asarray(hard), np.asarray(known)
 
 
 def _wrong_names(owners: Indices) -> dict[tuple[int, ...], Mask]:

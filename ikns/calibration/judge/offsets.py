@@ -84,9 +84,7 @@ def offsets_report(
         markers = skeleton.marker_set.pick(recording.labels, recording.markers)
         step = max(1, len(markers) // _GLANCES)
         q, some = motion.q[::step], markers[::step]
-        placed = np.stack(
-            [turned_markers(skeleton, *one) for one in zip(q, some, strict=True)]
-        )
+        placed = turned_markers(skeleton, q, some)
         for link, apart in offsets_in_links(skeleton, q, placed, some).items():
             seen = apart[np.isfinite(apart).all(axis=1)]
             if len(seen) >= _FEWEST and link.startswith(chain_sides(chain)):

@@ -76,9 +76,10 @@ def marker_noise(markers: Array) -> Array:
     [0.002]
     """
     noise = np.zeros(markers.shape[1])
-    bend = np.abs(markers[2:] - 2 * markers[1:-1] + markers[:-2])
-    for column in range(markers.shape[1]):
-        own = bend[:, column][np.isfinite(bend[:, column]).all(axis=1)]
+    bends = np.abs(markers[2:] - 2 * markers[1:-1] + markers[:-2])
+    known = np.isfinite(bends).all(axis=2)
+    for column, bend in enumerate(np.moveaxis(bends, 1, 0)):
+        own = bend[known[:, column]]
         if len(own):
             # The median of |x| of a normal distribution is 0.6745 of its deviation, and
             # a second difference has sqrt(6) of the noise.

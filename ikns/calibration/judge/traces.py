@@ -132,11 +132,17 @@ def _is_line(places: Array) -> bool:
 
 def repeated(markers: Array) -> Mask:
     """Which frames are the one before to the last digit, all seen markers, (T,)."""
-    same = (markers[1:] == markers[:-1]) | np.isnan(markers[1:] + markers[:-1])
-    seen = (np.isfinite(markers[1:]).all(axis=2).sum(axis=1)) >= _NEAREST
-    gaps = np.isnan(markers[1:]) == np.isnan(markers[:-1])
-    again = same.all(axis=(1, 2)) & gaps.all(axis=(1, 2)) & seen
-    return np.concatenate([np.zeros(min(1, len(markers)), dtype=bool), again])
+    again: Mask = np.zeros(len(markers), dtype=bool)
+    # Few frames repeat even one coordinate of all, so only these are looked at in full.
+    rows = np.flatnonzero(_same(markers[1:, :, 0], markers[:-1, :, 0]).all(axis=1)) + 1
+    same = _same(markers[rows], markers[rows - 1]).all(axis=(1, 2))
+    seen = np.isfinite(markers[rows]).all(axis=2).sum(axis=1) >= _NEAREST
+    again[rows] = same & seen
+    return again
+
+
+def _same(a: Array, b: Array) -> Mask:
+    return np.asarray((a == b) | (np.isnan(a) & np.isnan(b)))
 
 
 def _others_move(markers: Array, column: int, first: int, last: int) -> bool:

@@ -190,12 +190,7 @@ def _follow(skeleton: Skeleton, markers: Array) -> tuple[Motion, Array, float, A
     worn = skeleton.marker_set
     seconds = np.arange(len(markers), dtype=np.float64)
     motion = MarkerIK(skeleton).track(Recording(seconds, markers, worn.labels))
-    placed = np.stack(
-        [
-            turned_markers(skeleton, q, seen)
-            for q, seen in zip(motion.q, markers, strict=True)
-        ]
-    )
+    placed = turned_markers(skeleton, motion.q, markers)
     weight = np.array([marker.weight for marker in worn.markers])
     apart = np.linalg.norm(placed - markers, axis=2)
     weighed = np.where(np.isfinite(apart), weight, 0.0).sum(axis=1)

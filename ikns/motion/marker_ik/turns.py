@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikns.arrays import Array, Indices
+from ikns.arrays import Array, Indices, Mask
 from ikns.body.skeleton import Skeleton
 from ikns.numerics.rigid import quaternion_matrix, turn_matrix
 
@@ -23,7 +23,7 @@ def turning_clusters(skeleton: Skeleton) -> tuple[Indices, Indices]:
 
 
 def turned_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
-    """Where a pose has the markers, (M, 3) m in the world.
+    """Where poses have the markers, (..., M, 3) m in the world.
 
     As :meth:`Skeleton.markers_in_world`, with every cluster of a free turn turned to
     where its markers were seen, as marker inverse kinematics has it.
@@ -31,8 +31,8 @@ def turned_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
     Parameters
     ----------
     skeleton : Skeleton
-    q : (25,) array
-    seen : (M, 3) array
+    q : (..., 25) array
+    seen : (..., M, 3) array
         m in the world, in the order of the skeleton's marker set; NaN = not seen.
 
     Examples
@@ -44,20 +44,30 @@ def turned_markers(skeleton: Skeleton, q: Array, seen: Array) -> Array:
     True
     """
     placed = skeleton.markers_in_world(q)
-    worn, (joints, cluster) = skeleton.marker_set.markers, turning_clusters(skeleton)
-    thorax = quaternion_matrix(q[3:7])
-    for k in range(len(joints)):
-        own = cluster == k
-        link = worn[int(np.flatnonzero(own)[0])].link
-        origin, turned = skeleton.link_in_thorax(q, link)
-        # Joints of the tree turn about their z.
-        axis = thorax @ turned @ skeleton.tree_link(link)[1][2]
-        origin = thorax @ origin + q[:3]
-        trust = np.array([0.0 if m.static_only else m.weight for m in worn])
-        used = own & np.isfinite(seen).all(axis=1) & (trust > 0)
-        p, s = placed[used] - origin, seen[used] - origin
-        across = trust[used] @ (np.cross(p, s) @ axis)
-        along = trust[used] @ (np.sum(p * s, axis=1) - (p @ axis) * (s @ axis))
-        turn = turn_matrix(axis, np.arctan2(across, along))
-        placed[own] = (placed[own] - origin) @ turn.T + origin
+    joints, cluster = turning_clusters(skeleton)
+    if len(joints):
+        for at in np.ndindex(q.shape[:-1]):
+            for k in range(len(joints)):
+                _turn(placed[at], skeleton, q[at], seen[at], cluster == k)
     return placed
+
+
+def _turn(placed: Array, skeleton: Skeleton, q: Array, seen: Array, own: Mask) -> None:
+    """Turn the `own` ones of markers placed (M, 3) at one pose to where they were seen.
+
+    In place.
+    """
+    worn = skeleton.marker_set.markers
+    link = worn[int(np.flatnonzero(own)[0])].link
+    origin, turned = skeleton.link_in_thorax(q, link)
+    thorax = quaternion_matrix(q[3:7])
+    # Joints of the tree turn about their z.
+    axis = thorax @ turned @ skeleton.tree_link(link)[1][2]
+    origin = thorax @ origin + q[:3]
+    trust = np.array([0.0 if m.static_only else m.weight for m in worn])
+    used = own & np.isfinite(seen).all(axis=1) & (trust > 0)
+    p, s = placed[used] - origin, seen[used] - origin
+    across = trust[used] @ (np.cross(p, s) @ axis)
+    along = trust[used] @ (np.sum(p * s, axis=1) - (p @ axis) * (s @ axis))
+    turn = turn_matrix(axis, np.arctan2(across, along))
+    placed[own] = (placed[own] - origin) @ turn.T + origin
