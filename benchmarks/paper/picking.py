@@ -6,8 +6,8 @@ import math
 
 from scipy import stats
 
+from ikns.output.wording import number
 from ikns.statistics.library import statsmodels
-from ikns.statistics.wording import number
 from paper.finding import Finding
 from paper.printed import PAPER
 

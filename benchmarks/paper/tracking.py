@@ -7,9 +7,9 @@ import math
 import numpy as np
 from scipy import stats
 
+from ikns.output.wording import p_text
 from ikns.statistics.library import statsmodels
 from ikns.statistics.paper import subject_spread_limit
-from ikns.statistics.wording import p_text
 from paper.finding import Finding
 from paper.printed import PAPER
 from paper.spread import (

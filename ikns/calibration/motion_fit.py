@@ -223,7 +223,7 @@ class _Problem:
         places[:, own, :, own] = np.swapaxes(by_place, 0, 1)
         by_shape[..., S:-K] = places.reshape(len(q), M, 3, 3 * M)
         by_shape[..., -K:] = placed.tilt_jacobian(q, axes)
-        by_pose = placed.marker_jacobian(q)[1][..., self.free]
+        by_pose = np.take(placed.marker_jacobian(q)[1], self.free, axis=-1)
         return (
             by_pose.reshape(len(q), 3 * M, -1),
             by_shape.reshape(len(q), 3 * M, -1),

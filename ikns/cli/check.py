@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def _counted(findings: Sequence[Finding]) -> list[str]:
     """Say that findings are no errors; nothing where some are, or none was found."""
     from ikns.calibration.judge.finding import refused
-    from ikns.statistics.wording import counted
+    from ikns.output.wording import counted
 
     if not findings or refused(findings):
         return []

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ikns.errors import NotEnoughData
+from ikns.output.wording import counted
 from ikns.statistics.effects import Effect, effect_sizes
 from ikns.statistics.equivalence import Equivalence, equivalence
 from ikns.statistics.learning import LearningCurves, learning_curves
@@ -29,7 +30,6 @@ from ikns.statistics.success import SuccessTest, success_pairs, success_test
 from ikns.statistics.table import Table, column, labels, two_conditions
 from ikns.statistics.times import TimeTest, restricted_pairs, time_test
 from ikns.statistics.within_subject_anova import VarianceTable, within_subject_anova
-from ikns.statistics.wording import counted
 
 #: statsmodels' table takes minutes for a thousand subjects, as their number cubed.
 _MOST_ANOVA = 200

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import gammaln, nctdtrinc
 
+from ikns.output.wording import interval_text, number
 from ikns.statistics.pairs import Pairs
-from ikns.statistics.wording import interval_text, number
 
 Array = NDArray[np.float64]
 

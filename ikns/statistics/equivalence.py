@@ -14,9 +14,9 @@ from typing import Literal
 from scipy import stats
 
 from ikns.errors import InvalidInput
+from ikns.output.wording import interval_text, number, p_text
 from ikns.statistics.library import statsmodels
 from ikns.statistics.pairs import Pairs
-from ikns.statistics.wording import interval_text, number, p_text
 
 Verdict = Literal["equivalent", "equivalent though different", "different", "undecided"]
 

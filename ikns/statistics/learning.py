@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from ikns.errors import InvalidInput, NotEnoughData
+from ikns.output.wording import number
 from ikns.statistics.table import Table, column, finite_values, labels
-from ikns.statistics.wording import number
 
 Array = NDArray[np.float64]
 

@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from ikns.output.wording import interval_text, number, p_text
 from ikns.statistics.library import statsmodels
 from ikns.statistics.model_design import comparable_trials, fixed_effects
 from ikns.statistics.table import Table
-from ikns.statistics.wording import interval_text, number, p_text
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from ikns.output.wording import counted, interval_text, number, p_text
 from ikns.statistics.pairs import Pairs
-from ikns.statistics.wording import counted, interval_text, number, p_text
 
 _POOLED = "as the paper did it, counting {n} pairs of {m} subjects as independent"
 _OWN = "over {m} subjects, one pair each"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ikns.errors import InvalidInput
+from ikns.output.wording import number
 from ikns.statistics.equivalence import checked_margin
 from ikns.statistics.power import Design, Power, Spread, simulated_power
-from ikns.statistics.wording import number
 
 #: At most how many numbers of participants the curve has, and in which steps.
 _PLACES = 14

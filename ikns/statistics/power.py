@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from ikns.errors import InvalidInput
+from ikns.output.wording import number
 from ikns.statistics.equivalence import checked_margin
-from ikns.statistics.wording import number
 
 Array = NDArray[np.float64]
 Analysis = Literal["subject means", "pooled"]

@@ -10,10 +10,10 @@ import numpy as np
 from scipy import stats
 
 from ikns.errors import InvalidInput
+from ikns.output.wording import p_text
 from ikns.statistics.library import statsmodels
 from ikns.statistics.pairs import Pairs, pair_trials
 from ikns.statistics.table import Table, column, labels
-from ikns.statistics.wording import p_text
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,12 @@ import numpy as np
 from scipy import stats
 
 from ikns.errors import InvalidInput, NotEnoughData
+from ikns.output.wording import interval_text, number, p_text
 from ikns.statistics.library import statsmodels
 from ikns.statistics.paired_tests import PairedT, subject_means_t
 from ikns.statistics.pairs import Pairs, pair_trials
 from ikns.statistics.success import success_pairs
 from ikns.statistics.table import Table, column, finite_values, numbers
-from ikns.statistics.wording import interval_text, number, p_text
 
 
 @dataclass(frozen=True)

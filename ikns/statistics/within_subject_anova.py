@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ikns.errors import NotEnoughData
+from ikns.output.wording import number, p_text
 from ikns.statistics.library import statsmodels
 from ikns.statistics.pairs import Pairs
-from ikns.statistics.wording import number, p_text
 
 
 @dataclass(frozen=True)

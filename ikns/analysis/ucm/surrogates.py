@@ -112,20 +112,19 @@ def surrogate_test(
     basis = split.basis.reshape(-1, *split.basis.shape[-2:])
     drawn = np.empty((n_surrogates, flat.shape[1]))
     complete = bool(known.all())
-    shuffled = np.empty_like(flat)
     rows = np.arange(n_trials)
     for s in range(n_surrogates):
-        for j in range(n):
-            if by == "trials":
-                order = rng.permutation(n_trials)
-            else:
-                order = np.roll(rows, rng.integers(n_trials))
-            column = flat[order, :, j]
-            if not complete:
-                # Known trials first, in this order, so that they meet known ones.
-                first = np.argsort(~known[order], axis=0, kind="stable")
-                column = np.take_along_axis(column, first, axis=0)
-            shuffled[:, :, j] = column
+        # A column for each joint.
+        if by == "trials":
+            order = np.stack([rng.permutation(n_trials) for _ in range(n)], axis=1)
+        else:
+            order = (rows[:, None] - rng.integers(n_trials, size=n)) % n_trials
+        shuffled = np.take_along_axis(flat, order[:, None], axis=0)
+        if not complete:
+            # Known trials first, in this order, so that they meet known ones.
+            unknown = np.swapaxes(~known[order], 1, 2)
+            first = np.argsort(unknown, axis=0, kind="stable")
+            shuffled = np.take_along_axis(shuffled, first, axis=0)
         drawn[s] = half_log_ratio(*sums_of_squares(shuffled, basis))
     observed = split.delta_vz
     surrogates = drawn.reshape(n_surrogates, *np.shape(observed))

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from ikns.body.chains import ChainLike
 from ikns.errors import InvalidInput, NotEnoughData, naming
@@ -137,6 +136,8 @@ def normalize_time(
         elif kind == "linear" or finite.sum() < 2:
             found[:, j] = np.interp(wanted, share[finite], column[finite])
         else:
+            from scipy.interpolate import CubicSpline  # takes a while to load
+
             found[:, j] = CubicSpline(share[finite], column[finite])(wanted)
         gap = (~finite[left] & (part < 1 - _ON)) | (~finite[left + 1] & (part > _ON))
         found[gap, j] = np.nan

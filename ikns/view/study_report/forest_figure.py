@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from ikns.experiments.study.summary import Group
+from ikns.output.wording import number
 from ikns.statistics import Equivalence, PairedT
-from ikns.statistics.wording import number
 from ikns.view.study_report.comparisons import (
     NO_INTERVAL,
     ReportFigure,

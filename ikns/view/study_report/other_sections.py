@@ -13,7 +13,7 @@ from ikns.experiments.study.summary import (
 )
 from ikns.experiments.study.summary.answers import people
 from ikns.experiments.study.summary.methods import methods, setting_text
-from ikns.statistics.wording import counted
+from ikns.output.wording import counted
 from ikns.view.cells import Cell
 from ikns.view.parts import Section, Table
 

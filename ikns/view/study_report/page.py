@@ -12,7 +12,7 @@ from ikns.experiments.study.summary.answers import (
     picking_answer,
     tracking_answer,
 )
-from ikns.statistics.wording import counted
+from ikns.output.wording import counted
 from ikns.view.cells import Cell, inline
 from ikns.view.parts import (
     NextStep,

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from ikns.experiments.study.summary import TrackingComparison, TrackingSummary
 from ikns.experiments.study.summary.answers import people, worded
 from ikns.experiments.study.summary.tracking import UNITS
+from ikns.output.wording import p_text
 from ikns.statistics.paper import RMSE, TRAJECTORIES
-from ikns.statistics.wording import p_text
 from ikns.view.cells import Cell
 from ikns.view.parts import Picture, Section, Table
 from ikns.view.study_report.comparisons import (

@@ -12,8 +12,8 @@ from ikns.experiments.study.summary.tracking import (
     TrackingComparison,
     TrackingSummary,
 )
+from ikns.output.wording import counted, interval_text, number, p_text
 from ikns.statistics import Equivalence, PairedT, SuccessTest
-from ikns.statistics.wording import counted, interval_text, number, p_text
 
 #: Names of conditions in sentences; others keep their own.
 _WORDS = {

@@ -9,7 +9,7 @@ from ikns.experiments.study.summary.answers import people, worded
 from ikns.experiments.study.summary.picking import PickingSummary
 from ikns.experiments.study.summary.study import Group
 from ikns.experiments.study.summary.tracking import TrackingSummary
-from ikns.statistics.wording import number
+from ikns.output.wording import number
 
 #: Keys of a design that the paragraphs mention.
 _MENTIONED = {
