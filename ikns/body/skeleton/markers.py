@@ -63,7 +63,7 @@ class Markers:
         return self._positions(*self._poses(q, self._joints))
 
     def jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Positions (..., M, 3) m, and their derivative by the tangent, (..., M, 3, nv).
+        """Positions (..., M, 3) m, and derivatives by the tangent, (..., M, 3, nv).
 
         Column j is ``linear_j + angular_j x position`` for the joints between the root
         and the marker, else zero.
