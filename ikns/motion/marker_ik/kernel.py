@@ -83,9 +83,16 @@ def limbs_in_turn(tree: Tree) -> tuple[Tree, Indices]:
         depth[j] = depth[parent] + 1 if parent >= 0 else 0
     order = np.argsort(depth, kind="stable")
     at = np.argsort(order)
-    moved = Tree(*(np.ascontiguousarray(part[order]) for part in tree))
-    parent = np.where(moved.parent >= 0, at[moved.parent], -1)
-    return moved._replace(parent=parent), at
+    parent = tree.parent[order]
+    moved = Tree(
+        kind=tree.kind[order],
+        parent=np.where(parent >= 0, at[parent], -1),
+        first_q=tree.first_q[order],
+        first_v=tree.first_v[order],
+        rotation=tree.rotation[order],
+        translation=tree.translation[order],
+    )
+    return moved, at
 
 
 class KernelSolver:

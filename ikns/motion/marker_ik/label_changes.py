@@ -158,7 +158,7 @@ def label_changes(time: Array, markers: Array) -> tuple[bool, Indices]:
     """
     owners = np.empty(markers.shape[:2], dtype=np.int64)
     # The kernel is compiled again for arrays that are read-only.
-    own = (np.require(part, requirements="CW") for part in (time, markers))
+    own = (np.require(part, requirements=["C", "W"]) for part in (time, markers))
     changed = label_owners(*own, _LONGEST, owners)
     return bool(changed), owners
 
