@@ -95,7 +95,7 @@ def descend(
     cost = distance = np.inf
     damping, iterations = 0.0, -1
     definite = true_hessian = True
-    converged = back = False
+    converged = False
     copy(s.q, s.trial)
     while True:
         # Written out, as passing `problem` and `s` on would take 5 % longer.
@@ -117,25 +117,29 @@ def descend(
             s.turned,
         )
         trial_cost += penalties_at(problem, s, s.trial, pull)
-        if not back:
-            iterations += 1
-            # A cost of NaN is no better either.
-            if not trial_cost <= cost:
-                # Once more where it came from, for its errors.
-                back = True
-                copy(s.q, s.trial)
-                continue
+        iterations += 1
+        last = converged or iterations >= problem.max_iterations
+        # A cost of NaN is no better either.
+        rejected = not trial_cost <= cost
+        if rejected and (last or iterations == 0):
+            errors_at(problem, s, s.q)
+            break
+        if rejected:
+            _copy_rows(s.best_x, s.x)
+            _copy_rows(s.best_error, s.error)
+            if true_hessian:
+                true_hessian = False
+            else:
+                damping = max(10 * damping, _FIRST)
+        else:
             cost, distance = trial_cost, trial_distance
             copy(s.trial, s.q)
+            if last:
+                break
             damping = damping / 10 if damping > 1e-6 else 0.0
             definite = true_hessian = True
-        elif true_hessian:
-            true_hessian = False
-        else:
-            damping = max(10 * damping, _FIRST)
-        if converged or iterations >= problem.max_iterations:
-            return np.sqrt(distance / n_seen), iterations, converged
-        if not back:
+            _copy_rows(s.x, s.best_x)
+            _copy_rows(s.error, s.best_error)
             joint_axes(tree, s.rotation, s.translation, s.axes)
             slope(tree, carrier, s.axes, s.weight, s.x, s.error, s.wrench, s.gradient)
             add_penalties(
@@ -147,7 +151,7 @@ def descend(
                 s.gradient,
                 s.extra,
             )
-        back = solvable = False
+        solvable = False
         while not solvable:
             solvable = _factored(problem, s, damping, 1.0 if true_hessian else 0.0)
             if not solvable and true_hessian:
@@ -155,6 +159,7 @@ def descend(
             elif not solvable:
                 damping = max(10 * damping, _FIRST)
                 if damping > _HOPELESS:
+                    errors_at(problem, s, s.q)
                     return np.sqrt(distance / n_seen), iterations, False
         for d in range(len(s.step)):
             s.step[d] = -s.gradient[d]
@@ -165,6 +170,14 @@ def descend(
         converged = largest < (enough if true_hessian else tolerance)
         if definite and not true_hessian:
             converged = converged and damping > 1e-3
+    return np.sqrt(distance / n_seen), iterations, converged
+
+
+@borrowing
+def _copy_rows(source: Array, into: Array) -> None:
+    for m in range(len(into)):
+        for k in range(3):
+            into[m, k] = source[m, k]
 
 
 @borrowing

@@ -64,6 +64,8 @@ class Scratch(NamedTuple):
     x: Array
     error: Array
     turned: Array
+    best_x: Array  # x and error where the cost is lowest so far
+    best_error: Array
     moments: Array
     inertia: Array
     wrench: Array
@@ -189,7 +191,7 @@ def scratch_size(problem: MarkerProblem) -> int:
     groups = 1 + problem.n_branches
     of_joint = 9 + 3 + 12 + MOMENTS + INERTIA
     return (3 + 32 + J * of_joint + n * (6 + ROW + 8)) + (
-        13 * M + nq * (6 + S) + groups * (3 + S)
+        19 * M + nq * (6 + S) + groups * (3 + S)
     )
 
 
@@ -204,7 +206,7 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
     groups = 1 + problem.n_branches
     rotation_at = 3
     three_at = rotation_at + 9 * J
-    six_at = three_at + 3 * (J + 4 * M)
+    six_at = three_at + 3 * (J + 6 * M)
     moments_at = six_at + 6 * (n + 2 * J)
     inertia_at = moments_at + MOMENTS * J
     rows_at = inertia_at + INERTIA * J
@@ -214,7 +216,7 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
     weight_at = four_at + 32
     rate_at = weight_at + M
     group_at = rate_at + 8 * n
-    three = work[three_at:six_at].reshape(J + 4 * M, 3)
+    three = work[three_at:six_at].reshape(J + 6 * M, 3)
     six = work[six_at:moments_at].reshape(n + 2 * J, 6)
     of_q = work[q_at:residuals_at].reshape(6 + S, nq)
     four = work[four_at:weight_at].reshape(8, 4)
@@ -227,7 +229,9 @@ def cut(problem: MarkerProblem, work: Array) -> Scratch:
         three[J : J + M],
         three[J + M : J + 2 * M],
         three[J + 2 * M : J + 3 * M],
-        three[J + 3 * M :],
+        three[J + 3 * M : J + 4 * M],
+        three[J + 4 * M : J + 5 * M],
+        three[J + 5 * M :],
         work[moments_at:inertia_at].reshape(J, MOMENTS),
         work[inertia_at:rows_at].reshape(J, INERTIA),
         six[n : n + J],
