@@ -21,6 +21,7 @@ from ikns._kernels.body.articulated import (
     solve,
     write_inertia,
 )
+from ikns._kernels.body.marker_problem import cut
 from ikns._kernels.body.rigid import rigid_pose
 from ikns._kernels.body.sine_cosine import sines_cosines
 from ikns._kernels.body.step import displacement, integrate
@@ -29,7 +30,9 @@ from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.model import joint_tree
 from ikns.calibration.scaling import scale
 from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
+from ikns.motion.marker_ik.kernel import KernelSolver, limbs_in_turn
 from ikns.motion.marker_ik.pose import SolvedFrames
+from ikns.motion.marker_ik.turns import turned_markers
 from ikns.numerics.rigid import rigid_transform
 from ikns.recording.files import read
 
@@ -395,6 +398,42 @@ def test_a_recording_is_its_frames_one_by_one(skeleton):
     batch = SolvedFrames.of(rows)
     np.testing.assert_array_equal(batch.q, [pose.q for pose in poses])
     np.testing.assert_array_equal(batch.residual, [pose.residual for pose in poses])
+
+
+def test_joints_of_limbs_in_turn_are_where_they_were(skeleton):
+    tree, at = limbs_in_turn(skeleton.tree)
+    q = skeleton.integrate(
+        skeleton.neutral(), np.random.default_rng(0).normal(size=skeleton.nv)
+    )
+    J = len(at)
+    assert (tree.parent < np.arange(J)).all()
+    placed = []
+    for each in (skeleton.tree, tree):
+        rotation, translation = np.empty((J, 3, 3)), np.empty((J, 3))
+        place_joints(each, q, np.empty((2, len(q))), rotation, translation)
+        placed.append((rotation, translation))
+    np.testing.assert_array_equal(placed[1][0][at], placed[0][0])
+    np.testing.assert_array_equal(placed[1][1][at], placed[0][1])
+
+
+def test_errors_left_behind_are_those_of_the_solution(skeleton):
+    # Also where the last step that was tried is taken back: gates read these errors.
+    rng, start = np.random.default_rng(2), skeleton.neutral()
+    q = start.copy()
+    q[7:] += rng.uniform(-1.5, 1.5, 18)
+    seen = skeleton.markers_in_world(q) + rng.normal(0, 0.05, (22, 3))
+    seen[[3, 11]] = np.nan
+    costs = []
+    for n in range(1, 16):
+        solver = KernelSolver(skeleton, max_iterations=n)
+        pose = solver.solve_one(seen, start)
+        s = cut.py_func(solver.problem, solver.work)
+        used = s.weight > 0
+        expected = turned_markers(skeleton, pose.q, seen) - seen
+        # Rounding of positions of a few m.
+        np.testing.assert_allclose(s.error[used], expected[used], rtol=0, atol=1e-13)
+        costs.append(pose.residual)
+    assert (np.diff(costs) == 0).any()
 
 
 def test_threads_do_not_share_memory(skeleton):
