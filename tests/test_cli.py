@@ -51,15 +51,15 @@ def test_nothing_heavy_is_loaded_before_it_is_needed(line: str) -> None:
     assert HEAVY.isdisjoint(done.stderr.split())
 
 
-def test_what_runs_live_needs_no_statistics() -> None:
+def test_what_runs_live_and_what_checks_needs_no_statistics() -> None:
     code = (
-        "import sys, ikns.calibration.subject, ikns.experiments.conduct, "
-        "ikns.live.runtime; print(*sys.modules)"
+        "import sys, ikns.analysis.ucm, ikns.calibration.subject, ikns.cli.check, "
+        "ikns.experiments.conduct, ikns.live.runtime; print(*sys.modules)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
-    slow = {"sklearn", "pandas", "scipy.stats", "scipy.signal"}
+    slow = {"sklearn", "pandas", "scipy.stats", "scipy.signal", "scipy.optimize"}
     assert slow.isdisjoint(done.stdout.split())
 
 

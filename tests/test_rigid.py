@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ikns.numerics.cross_product import cross
 from ikns.numerics.distance import distances
-from ikns.numerics.rigid import pose_steps, quaternion_matrix, turn_matrix
+from ikns.numerics.rigid import aligned, pose_steps, quaternion_matrix, turn_matrix
 
 SEEDS = st.integers(0, 2**32 - 1)
 #: A handful of products of numbers of at most 1 are off by less than ten roundings.
@@ -27,6 +27,26 @@ def test_a_quaternion_is_scipys_rotation(seed: int) -> None:
         rtol=0,
         atol=ROUNDING,
     )
+
+
+@given(SEEDS, st.integers(3, 8), st.floats(0, 0.9))
+def test_moved_points_return_by_those_that_are_seen(seed: int, n: int, gaps: float):
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(n, 3))
+    turns = Rotation.from_quat(rng.normal(size=(9, 4))).as_matrix()
+    frames = points @ np.swapaxes(turns, 1, 2) + rng.normal(size=(9, 1, 3))
+    frames[rng.random((9, n)) < gaps] = np.nan
+    back = aligned(frames, points)
+    seen = np.isfinite(frames).all(axis=2)
+    for frame, own in zip(back, seen, strict=True):
+        if own.sum() < 3:
+            assert np.isnan(frame).all()
+            continue
+        # Three points in almost one line turn easily: by rounding over their width.
+        width = np.linalg.svd(points[own] - points[own].mean(axis=0))[1][1]
+        tolerance = 10 * ROUNDING * max(1.0, np.abs(points).max() / width) ** 2
+        np.testing.assert_allclose(frame[own], points[own], rtol=0, atol=tolerance)
+        assert np.isnan(frame[~own]).all()
 
 
 @given(SEEDS, st.floats(-np.pi, np.pi))

@@ -3,6 +3,7 @@ import pinocchio as pin
 import pytest
 
 from ikns.body.chains import SIDES, chain_joints, chain_sides, shipped_chains
+from ikns.body.joint_axes import TILTS
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
@@ -189,6 +190,21 @@ def test_a_batch_is_its_configurations(skeleton):
             np.testing.assert_array_equal(together, angles)
             np.testing.assert_array_equal(together[1, 2], one)
         assert ask(q[:, :0])[0].shape[:2] == (2, 0)
+
+
+def test_markers_of_a_batch_are_those_of_its_configurations(skeleton):
+    q = np.stack([[any_pose(skeleton, 3 * i + j) for j in range(3)] for i in range(2)])
+    tilts = [(joint, component) for joint, component, _ in TILTS]
+    for ask in (
+        lambda p: (skeleton.markers_in_world(p),),
+        skeleton.marker_jacobian,
+        skeleton.size_jacobian,
+        lambda p: (skeleton.tilt_jacobian(p, tilts),),
+    ):
+        for together, one in zip(ask(q), ask(q[1, 2]), strict=True):
+            np.testing.assert_array_equal(together[1, 2], one)
+        for none, one in zip(ask(q[:, :0]), ask(q[1, 2]), strict=True):
+            assert none.shape == (2, 0, *one.shape)
 
 
 def test_an_unknown_angle_spoils_its_own_arm_and_configuration_alone(skeleton):

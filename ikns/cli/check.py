@@ -20,6 +20,7 @@ from ikns.cli.options import (
 from ikns.cli.output import show, table
 from ikns.cli.reading import Read, check_inputs, reads_markers, refuse_repeated
 from ikns.errors import InvalidInput, MarkerMismatch
+from ikns.output.wording import counted
 
 if TYPE_CHECKING:
     from ikns.calibration.judge.finding import Finding
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 def _counted(findings: Sequence[Finding]) -> list[str]:
     """Say that findings are no errors; nothing where some are, or none was found."""
     from ikns.calibration.judge.finding import refused
-    from ikns.output.wording import counted
 
     if not findings or refused(findings):
         return []

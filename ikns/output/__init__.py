@@ -1,1 +1,1 @@
-"""What is written: files and folders that overwrite nothing, and strict JSON."""
+"""What is written: files and folders that overwrite nothing, JSON, and sentences."""
