@@ -12,7 +12,8 @@ import numba
 import numpy as np
 import pytest
 
-from ikns._kernels import compiled as module
+from ikns._kernels import cache_folder as module
+from ikns._kernels import compiled
 from ikns._kernels.body.frame_sequence import solve_frames
 from ikns._kernels.body.label_changes import label_owners
 from ikns.body.skeleton import Skeleton
@@ -26,7 +27,7 @@ KERNELS = Path(module.__file__).parent
 def forget() -> None:
     """Forget what was read of the sources, as a new process has."""
     module._source.cache_clear()
-    module._cache_folder.cache_clear()
+    module.cache_folder.cache_clear()
 
 
 @pytest.fixture
@@ -44,7 +45,7 @@ def copy(tmp_path, monkeypatch):
 
 def folder_of(name: str) -> Path:
     forget()
-    folder = module._cache_folder(name)
+    folder = module.cache_folder(name)
     assert folder is not None
     return folder
 
@@ -74,7 +75,7 @@ def test_without_any_place_code_is_compiled_and_not_kept(copy, monkeypatch):
     (copy / "home").write_text("in the way")
     monkeypatch.setenv("XDG_CACHE_HOME", str(copy / "home"))
     forget()
-    assert module._cache_folder("body.step") is None
+    assert module.cache_folder("body.step") is None
     assert not module.on_disk("body.step")
     assert not module.can_keep("body.step")
     assert compiled_before()  # nothing is gained by compiling ahead
@@ -182,7 +183,7 @@ def test_kernels_that_only_kernels_call_have_no_wrapper():
 
 def test_a_constant_is_no_reason_to_compile_again():
     half = numba.njit(lambda x, half: x / 2 if half else x)
-    module._take_constants_as_values(half)
+    compiled._take_constants_as_values(half)
 
     @numba.njit
     def both(x: float) -> tuple[float, float]:

@@ -15,8 +15,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ikns._kernels import compiled as module
-from ikns._kernels import machine_code
+from ikns._kernels import cache_folder as module
+from ikns._kernels import linking, machine_code
 
 KERNELS = Path(module.__file__).parent
 SMALL = """
@@ -61,20 +61,21 @@ def files(place: Path) -> list[Path]:
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder of kernels with a small one that was compiled."""
-    for name in ("compiled.py", "machine_code.py"):
-        shutil.copy(KERNELS / name, tmp_path)
+    """A folder of kernels with a small one that was compiled, and calls another."""
+    monkeypatch.setattr(linking, "_SMALL", 0)  # even that one is called by name
+    for name in ("compiled", "cache_folder", "linking", "machine_code"):
+        shutil.copy(KERNELS / f"{name}.py", tmp_path)
     (tmp_path / "small.py").write_text(SMALL)
     monkeypatch.setattr(module, "_HERE", tmp_path)
     monkeypatch.setattr(module.config, "CACHE_DIR", "")
-    module._cache_folder.cache_clear()
+    module.cache_folder.cache_clear()
     assert load(tmp_path).small(VALUES) == expected()
     assert len(files(tmp_path)) == 2
     machine_code._SAID.clear()
     yield tmp_path
     del sys.modules["ikns._kernels.small"]
     machine_code._SAID.clear()
-    module._cache_folder.cache_clear()
+    module.cache_folder.cache_clear()
 
 
 def expected() -> float:
@@ -113,6 +114,34 @@ def test_kept_code_is_loaded_and_only_the_user_can_change_it(
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
     assert {stat.S_IMODE(p.stat().st_mode) for p in files(place)} == {0o600}
     assert {p.suffix for p in folder.iterdir()} == {".nbc"}  # no unfinished files
+
+
+def test_a_kernel_does_not_hold_the_code_of_what_it_calls_by_name(
+    place: Path,
+) -> None:
+    for path in files(place):
+        path.unlink()
+    made = load(place)
+    made.small(VALUES)
+    (result,) = made.small.overloads.values()
+    found = {f.name: f for f in result.library._final_module.functions}
+    (name,) = (r.fndesc.mangled_name for r in made._square.overloads.values())
+    assert found[name].is_declaration
+    assert not found[result.fndesc.mangled_name].is_declaration
+
+
+def test_what_a_kernel_calls_by_name_is_loaded_with_it_or_compiled_again(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again = load(place)
+    again.small(VALUES)
+    assert loaded(again._square)
+    find(place, "_square").unlink()
+    again = load(place)
+    assert again.small(VALUES) == expected()
+    assert loaded(again.small)
+    assert not loaded(again._square)
+    assert capsys.readouterr().err == ""
 
 
 def find(place: Path, name: str) -> Path:
@@ -227,7 +256,7 @@ def test_code_that_others_could_have_written_is_not_run(
     monkeypatch.setenv("XDG_CACHE_HOME", str(place / "home"))
     (folder,) = {path.parent for path in files(place)}
     folder.chmod(mode)
-    module._cache_folder.cache_clear()
+    module.cache_folder.cache_clear()
     again = load(place)
     assert again.small(VALUES) == expected()
     assert not loaded(again.small)
@@ -251,7 +280,7 @@ TOGETHER = """
 import importlib.util, sys
 from pathlib import Path
 import numpy as np
-from ikns._kernels import compiled as module
+from ikns._kernels import cache_folder as module
 place = Path(sys.argv[1])
 module._HERE = place
 spec = importlib.util.spec_from_file_location("ikns._kernels.small", place / "small.py")

@@ -1,33 +1,23 @@
 """Compilation of kernels: numba, cached on disk, without the GIL.
 
-Numba keys its cache by the file of a function and ignores the files of what it calls.
-So the cache is in a folder named after a hash of the sources of a kernel and of all
-kernels that it imports, and machine code of another version is never loaded.
-`machine_code` has the files in it.
+`cache_folder` says where machine code is kept, `machine_code` has the files, `linking`
+the calls between kernels.
 """
 
 from __future__ import annotations
 
-import functools
-import hashlib
-import os
-import re
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, cast
 
-import llvmlite
 import numba
 from numba.core.types import unliteral
 
-from ikns._kernels.machine_code import SUFFIX, KernelCache, is_private, say_once
+from ikns._kernels.cache_folder import cache_folder, version
+from ikns._kernels.linking import call_by_name, compiler
+from ikns._kernels.machine_code import KernelCache
 
-config: Any = numba.config
-#: Version of the files.
-_FORMAT = 1
-_HERE = Path(__file__).parent
-_IMPORT = re.compile(r"^from ikns\._kernels\.([\w.]+) import", re.MULTILINE)
+_PACKAGE = "ikns._kernels."
+_COMPILER = compiler(lambda module: version(module.removeprefix(_PACKAGE)))
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -65,15 +55,17 @@ def inner_borrowing(function: Callable[..., Any]) -> Callable[..., Any]:
 def _compiled(
     function: Callable[..., Any], *, wrapped: bool, counting: bool = True
 ) -> Callable[..., Any]:
-    folder = _cache_folder(function.__module__.removeprefix("ikns._kernels."))
+    folder = cache_folder(function.__module__.removeprefix(_PACKAGE))
     options: dict[str, Any] = {
         "nogil": True,
         "error_model": "numpy",
         "no_cpython_wrapper": not wrapped,
         "no_cfunc_wrapper": True,
         "_nrt": counting,
+        "pipeline_class": _COMPILER,
     }
     kernel: Any = numba.njit(**options)(function)
+    call_by_name(kernel)
     _take_constants_as_values(kernel)
     if folder is not None:
         # As `cache=True` does, with numba's own cache.
@@ -95,55 +87,3 @@ def _take_constants_as_values(kernel: Any) -> None:
         return template(values, named)
 
     kernel.get_call_template = of_values
-
-
-def on_disk(module: str) -> bool:
-    """Whether machine code of a kernel file, such as "body.step", is cached on disk."""
-    folder = _cache_folder(module)
-    return folder is not None and any(folder.glob(f"*{SUFFIX}"))
-
-
-def can_keep(module: str) -> bool:
-    """Whether there is a folder for machine code of a kernel file."""
-    return _cache_folder(module) is not None
-
-
-@functools.cache
-def _source(path: Path) -> tuple[str, set[str]]:
-    """Return a kernel file's text and which kernel files it imports."""
-    text = path.read_text(encoding="utf-8")
-    return text, set(_IMPORT.findall(text))
-
-
-@functools.cache
-def _cache_folder(module: str) -> Path | None:
-    """Cache folder for these sources; None where no folder is writable."""
-    texts: dict[str, str] = {}
-    pending = [module]
-    while pending:
-        name = pending.pop()
-        path = _HERE.joinpath(*name.split(".")).with_suffix(".py")
-        texts[name], imported = _source(path)
-        pending += imported - set(texts)
-    sources = "".join(texts[name] for name in sorted(texts))
-    sources += f"{numba.__version__} {llvmlite.__version__} {sys.version} {_FORMAT}"
-    name = f"{module}-{hashlib.sha256(sources.encode()).hexdigest()[:16]}"
-    home = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
-    asked = config.CACHE_DIR
-    places = [asked] if asked else [_HERE / "__pycache__", Path(home) / "ikns"]
-    for place in places:
-        folder = Path(place) / name
-        try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            private = is_private(folder)
-        except OSError:
-            continue
-        if not private:
-            say_once(
-                "not private",
-                f"{folder}: expected a folder that no one else can write to, found "
-                "another; machine code is not stored there.",
-            )
-        elif os.access(folder, os.W_OK):
-            return folder
-    return None

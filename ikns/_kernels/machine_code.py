@@ -23,6 +23,8 @@ from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
+from ikns._kernels.linking import called_by, load_called
+
 SUFFIX = ".nbc"
 #: Length of a SHA-256, bytes.
 _DIGEST = 32
@@ -68,7 +70,9 @@ class KernelCache:
         digest, code = content[:_DIGEST], content[_DIGEST:]
         if digest == _digest(path, code):
             with suppress(Exception):  # of another version of llvmlite, say
-                return CompileResult._rebuild(target_context, *pickle.loads(code))
+                called, parts = pickle.loads(code)
+                if load_called(called, target_context.codegen()):
+                    return CompileResult._rebuild(target_context, *parts)
         with suppress(OSError):
             path.unlink()
         say_once(
@@ -85,7 +89,7 @@ class KernelCache:
         if result.library.has_dynamic_globals:  # addresses of this process
             return
         path = self._path(signature, result.codegen)
-        code = dumps(result._reduce())
+        code = dumps((called_by(result), result._reduce()))
         try:
             with tempfile.NamedTemporaryFile(
                 dir=self._folder, prefix=f".{path.stem}.", delete=False

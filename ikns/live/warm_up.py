@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ikns._kernels.compiled import can_keep, on_disk
+from ikns._kernels.cache_folder import can_keep, on_disk
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik import MarkerIK
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
