@@ -21,7 +21,6 @@ from ikns._kernels.body.articulated import (
     solve,
     write_inertia,
 )
-from ikns._kernels.body.marker_problem import cut
 from ikns._kernels.body.rigid import rigid_pose
 from ikns._kernels.body.sine_cosine import sines_cosines
 from ikns._kernels.body.step import displacement, integrate
@@ -30,6 +29,7 @@ from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.model import joint_tree
 from ikns.calibration.scaling import scale
 from ikns.motion.marker_ik import LIMIT, PRIOR, MarkerIK
+from ikns.motion.marker_ik.gate import GateLimits
 from ikns.motion.marker_ik.kernel import KernelSolver, limbs_in_turn
 from ikns.motion.marker_ik.pose import SolvedFrames
 from ikns.motion.marker_ik.turns import turned_markers
@@ -416,24 +416,33 @@ def test_joints_of_limbs_in_turn_are_where_they_were(skeleton):
     np.testing.assert_array_equal(placed[1][1][at], placed[0][1])
 
 
-def test_errors_left_behind_are_those_of_the_solution(skeleton):
-    # Also where the last step that was tried is taken back: gates read these errors.
+def test_the_gate_gets_the_errors_of_the_solution(skeleton):
+    # Also where the last step that was tried is taken back.
     rng, start = np.random.default_rng(2), skeleton.neutral()
     q = start.copy()
-    q[7:] += rng.uniform(-1.5, 1.5, 18)
-    seen = skeleton.markers_in_world(q) + rng.normal(0, 0.05, (22, 3))
+    q[7:] += rng.uniform(-1, 1, 18)
+    seen = skeleton.markers_in_world(q) + rng.normal(0, 0.02, (22, 3))
     seen[[3, 11]] = np.nan
-    costs = []
+
+    def solved(n, limit):
+        solver = KernelSolver(
+            skeleton, max_iterations=n, limits=GateLimits(1e9, limit, 1e9)
+        )
+        rows = solver.new_rows(1)
+        solver.solve(seen[None], (0, 1, 1), start, rows)
+        return SolvedFrames.of(rows)
+
+    residuals = []
     for n in range(1, 16):
-        solver = KernelSolver(skeleton, max_iterations=n)
-        pose = solver.solve_one(seen, start)
-        s = cut.py_func(solver.problem, solver.work)
-        used = s.weight > 0
-        expected = turned_markers(skeleton, pose.q, seen) - seen
-        # Rounding of positions of a few m.
-        np.testing.assert_allclose(s.error[used], expected[used], rtol=0, atol=1e-13)
-        costs.append(pose.residual)
-    assert (np.diff(costs) == 0).any()
+        free = solved(n, 1e9)
+        away = turned_markers(skeleton, free.q[0], seen) - seen
+        worst = np.nanmax(np.linalg.norm(away, axis=1))
+        assert solved(n, worst * (1 + 1e-9)).fits.all()
+        tight = solved(n, worst * (1 - 1e-9))
+        # What does not fit is tried from scratch, too.
+        assert not tight.fits.all() or (tight.q != free.q).any()
+        residuals.append(free.residual[0])
+    assert (np.diff(residuals) == 0).any()
 
 
 def test_threads_do_not_share_memory(skeleton):

@@ -95,7 +95,7 @@ def descend(
     cost = distance = np.inf
     damping, iterations = 0.0, -1
     definite = true_hessian = True
-    converged = False
+    converged = rejected = False
     copy(s.q, s.trial)
     while True:
         # Written out, as passing `problem` and `s` on would take 5 % longer.
@@ -122,7 +122,6 @@ def descend(
         # A cost of NaN is no better either.
         rejected = not trial_cost <= cost
         if rejected and (last or iterations == 0):
-            errors_at(problem, s, s.q)
             break
         if rejected:
             _copy_rows(s.best_x, s.x)
@@ -152,15 +151,15 @@ def descend(
                 s.extra,
             )
         solvable = False
-        while not solvable:
+        while not solvable and damping < _HOPELESS:
             solvable = _factored(problem, s, damping, 1.0 if true_hessian else 0.0)
             if not solvable and true_hessian:
                 definite = true_hessian = False
             elif not solvable:
                 damping = max(10 * damping, _FIRST)
-                if damping > _HOPELESS:
-                    errors_at(problem, s, s.q)
-                    return np.sqrt(distance / n_seen), iterations, False
+        if not solvable:
+            converged = False
+            break
         for d in range(len(s.step)):
             s.step[d] = -s.gradient[d]
         solve(tree, s.rows, s.twist, s.step)
@@ -170,6 +169,8 @@ def descend(
         converged = largest < (enough if true_hessian else tolerance)
         if definite and not true_hessian:
             converged = converged and damping > 1e-3
+    if rejected:
+        errors_at(problem, s, s.q)
     return np.sqrt(distance / n_seen), iterations, converged
 
 
