@@ -417,7 +417,6 @@ def test_joints_of_limbs_in_turn_are_where_they_were(skeleton):
 
 
 def test_the_gate_gets_the_errors_of_the_solution(skeleton):
-    # Also where the last step that was tried is taken back.
     rng, start = np.random.default_rng(2), skeleton.neutral()
     q = start.copy()
     q[7:] += rng.uniform(-1, 1, 18)
@@ -432,8 +431,7 @@ def test_the_gate_gets_the_errors_of_the_solution(skeleton):
         solver.solve(seen[None], (0, 1, 1), start, rows)
         return SolvedFrames.of(rows)
 
-    residuals = []
-    for n in range(1, 16):
+    for n in range(1, 6):
         free = solved(n, 1e9)
         away = turned_markers(skeleton, free.q[0], seen) - seen
         worst = np.nanmax(np.linalg.norm(away, axis=1))
@@ -441,8 +439,6 @@ def test_the_gate_gets_the_errors_of_the_solution(skeleton):
         # What does not fit is tried from scratch, too.
         assert loose.fits.all() and (loose.q == free.q).all()
         assert not tight.fits.all() or (tight.q != free.q).any()
-        residuals.append(free.residual[0])
-    assert (np.diff(residuals) == 0).any()
 
 
 def test_threads_do_not_share_memory(skeleton):
