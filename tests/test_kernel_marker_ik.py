@@ -437,7 +437,8 @@ def test_the_gate_gets_the_errors_of_the_solution(skeleton):
         worst = np.nanmax(np.linalg.norm(away, axis=1))
         loose, tight = solved(n, worst * (1 + 1e-9)), solved(n, worst * (1 - 1e-9))
         # What does not fit is tried from scratch, too.
-        assert loose.fits.all() and (loose.q == free.q).all()
+        assert loose.fits.all()
+        assert (loose.q == free.q).all()
         assert not tight.fits.all() or (tight.q != free.q).any()
 
 
