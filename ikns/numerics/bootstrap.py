@@ -153,7 +153,8 @@ def block_counts(
     # on at the beginning, the one is there before its start as well.
     rows = np.stack([starts, ends % n]) + n * np.arange(resamples)[:, None]
     sign = np.repeat([1.0, -1.0], starts.size)
-    counts = np.bincount(rows.ravel(), sign, n * resamples).reshape(resamples, n)
+    steps: Array = np.asarray(np.bincount(rows.ravel(), sign, n * resamples), float)
+    counts = steps.reshape(resamples, n)
     counts[:, 0] += np.sum(ends >= n, axis=1)
     return np.cumsum(counts, axis=1, out=counts)
 

@@ -77,7 +77,7 @@ def marker_noise(markers: Array) -> Array:
     """
     noise = np.zeros(markers.shape[1])
     bends = np.abs(markers[2:] - 2 * markers[1:-1] + markers[:-2])
-    known = np.isfinite(bends).all(axis=2)
+    known = np.asarray(np.isfinite(bends).all(axis=2))
     for column, bend in enumerate(np.moveaxis(bends, 1, 0)):
         own = bend[known[:, column]]
         if len(own):
