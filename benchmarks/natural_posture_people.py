@@ -2,9 +2,8 @@ r"""Natural posture of the people of UE_ADL: mean and covariance, as a small TOM
 
 For each arm the hinge swivel of all moving frames (reaches forward and across,
 drinking, combing) is fitted with a quadratic in the wrist center and the hand's
-direction, by a ridge of 0.01 on all but the constant, and by what usual turns of the
-hand would do to it. Mean and covariance of these coefficients over the arms are the
-population; no recording is copied.
+direction, by a ridge of 0.01 on all but the constant. Mean and covariance of these
+coefficients over the arms are the population; no recording is copied.
 
     python benchmarks/natural_posture_people.py \
         --out ikns/nullspace/natural_posture_people.toml
@@ -17,8 +16,7 @@ import numpy as np
 import tomli_w
 from null_space.people import GATE, Arm, real_arms
 
-from ikns.body.chains import whole_arms
-from ikns.nullspace.hinge_swivel import hand_direction, mirrored
+from ikns.nullspace.hinge_swivel import hand_direction
 from ikns.nullspace.posture_terms import (
     leverage_of,
     natural_terms,
@@ -31,13 +29,6 @@ Array = np.ndarray
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 #: Ridge of each arm's own fit, and the penalty that goes into the leverage.
 RIDGE, PENALTY = 1e-2, 0.03
-#: Usual turns of the hand: of the forearm, as for a glass that is emptied, and of the
-#: wrist either way; a link, its axis, and rad.
-TURNS = (
-    ("forearm", 1, np.radians(29.0)),
-    ("forearm", 0, np.radians(20.0)),
-    ("hand", 2, np.radians(20.0)),
-)
 SOURCE = (
     "UE_ADLdatabase (MiaH-kin/UE_ADLdatabase d196e59, San Francisco State University), "
     "both arms of {people} people who reached forward and across, drank and combed"
@@ -45,8 +36,8 @@ SOURCE = (
 LICENSE = "MIT; only means over people, no recording"
 
 
-def moving(arm: Arm) -> tuple[Array, Array, Array]:
-    """Places (N, 6), swivels (N,) rad and all joint angles (N, 18) of moving frames."""
+def moving(arm: Arm) -> tuple[Array, Array]:
+    """Places (N, 6) and swivels (N,) rad of moving frames."""
     rows = [trial.known & (trial.speed >= GATE) for trial in arm.trials]
     wrist, swivel, angles = (
         np.concatenate([part[row] for part, row in zip(whole, rows, strict=True)])
@@ -57,42 +48,26 @@ def moving(arm: Arm) -> tuple[Array, Array, Array]:
         )
     )
     direction = hand_direction(arm.skeleton, angles, arm.chain)
-    return np.hstack([wrist, direction]), swivel, angles
+    return np.hstack([wrist, direction]), swivel
 
 
-def turned(arm: Arm, angles: Array) -> Array:
-    """Mean outer product (3, 3) of what usual turns do to the hand's direction."""
-    (side,) = whole_arms(arm.chain)
-    direction = mirrored(hand_direction(arm.skeleton, angles, arm.chain), side)
-    total = np.zeros((3, 3))
-    for link, axis, angle in TURNS:
-        rotation = arm.skeleton.link_in_thorax(angles, f"{side}_{link}")[1]
-        way = angle * mirrored(np.cross(rotation[..., axis], direction), side)
-        total += way.T @ way / len(way)
-    return total
-
-
-def own_fit(x: Array, swivel: Array, usual: Array) -> Array:
+def own_fit(x: Array, swivel: Array) -> Array:
     """Coefficients of one arm, rad: (13,) of places (N, 6), (10,) of wrists (N, 3)."""
-    return ridge(natural_terms(x), swivel, RIDGE, usual)
+    return ridge(natural_terms(x), swivel, RIDGE)
 
 
 def population(arms: list[Arm]) -> dict[str, object]:
     """Mean and covariance over arms, and where they moved."""
     found = [moving(arm) for arm in arms]
-    usual = np.mean(
-        [turned(arm, q) for arm, (_, _, q) in zip(arms, found, strict=True)], axis=0
-    )
-    rows = np.array([own_fit(x, s, usual) for x, s, _ in found])
-    alone = [own_fit(wrist_of(x), s, usual) for x, s, _ in found]
+    rows = np.array([own_fit(x, s) for x, s in found])
+    alone = [own_fit(wrist_of(x), s) for x, s in found]
     # Each arm counts alike, however long it was recorded.
-    wrists = [wrist_of(x)[:: max(1, len(x) // 1000)] for x, _, _ in found]
+    wrists = [wrist_of(x)[:: max(1, len(x) // 1000)] for x, _ in found]
     matrix, level = leverage_of(quadratic_terms(np.concatenate(wrists)), PENALTY)
     return {
         "mean_rad": rows.mean(axis=0),
         "covariance_rad2": np.cov(rows.T),
         "wrist_alone_rad": np.mean(alone, axis=0),
-        "turned": usual,
         "leverage": matrix,
         "taught_leverage": level,
         "arms": len(arms),

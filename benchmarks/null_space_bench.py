@@ -28,7 +28,7 @@ import platform
 from pathlib import Path
 
 import numpy as np
-from natural_posture_people import moving, own_fit, turned
+from natural_posture_people import moving, own_fit
 from null_space.entered import entered
 from null_space.entrants import PACKAGE, SHIPPED, entrant
 from null_space.methods import METHODS
@@ -63,17 +63,15 @@ UNLEARNED = ("swivel about down", "hinge swivel", "people alone")
 def left_out(arms: list[Arm], *, hand: bool = True) -> dict[str, np.ndarray]:
     """Mean coefficients of all other people, by person; without `hand` of the wrist."""
     found = [moving(arm) for arm in arms]
-    usual = [turned(arm, q) for arm, (_, _, q) in zip(arms, found, strict=True)]
     means = {}
     for person in {arm.person for arm in arms}:
-        others = [k for k, arm in enumerate(arms) if arm.person != person]
-        price = np.mean([usual[k] for k in others], axis=0) if others else None
+        others = [
+            moved
+            for arm, moved in zip(arms, found, strict=True)
+            if arm.person != person
+        ]
         means[person] = np.mean(
-            [
-                own_fit(x if hand else wrist_of(x), s, price)
-                for x, s, _ in (found[k] for k in others)
-            ],
-            axis=0,
+            [own_fit(x if hand else wrist_of(x), s) for x, s in others], axis=0
         )
     return means
 

@@ -204,11 +204,15 @@ def test_a_turned_hand_moves_the_paper_s_c_most():
     assert change["paper"] > 0.1
     assert change["proximal"] == 0.0
     # As much as the natural posture follows the hand's direction, which turns by no
-    # more than the hand.
+    # more than the hand: the whole motion is turned, so the hand was led turned.
     readout = subject.readout("intent")
     follows = np.linalg.norm(readout.map.natural_.coefficients_[10:])
     a, b = readout.map.ends_
     assert 0 < change["intent"] <= follows * np.radians(20.0) / (b - a)
+    x, y = readout.samples(subject.skeleton, motion)
+    x, y = (np.repeat(rows[[300]], 50, axis=0) for rows in (x, y))
+    x[25:, 3:] *= -1  # as far as a hand can turn, where it is
+    assert np.ptp(readout.map.control_signal(y, readout.led(x))) == 0
 
 
 def test_a_map_of_before_reads_the_wrist_alone():

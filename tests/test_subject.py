@@ -211,15 +211,19 @@ def test_what_an_earlier_version_would_misread_it_refuses(
 ) -> None:
     table = json.loads((folder / "intent.json").read_text())
     assert len(table["natural_posture"]["coefficients_rad"]) == 13
-    assert table["format"] == 3
-    # Maps of before, of the wrist alone: with places remembered, and without.
+    assert table["format"] == 4
+    # Maps of before, which have no leash; of the wrist alone: with places remembered,
+    # and without.
     natural = table["natural_posture"]
-    for name in ("coefficients_rad", "people_rad"):
-        natural[name] = natural[name][:10]
-    for version, heights in ((2, natural["heights_rad"]), (1, [])):
+    assert Readout.from_table(table).map.leash == table.pop("leash_m") > 0
+    for version, heights in ((3, natural["heights_rad"]),
+                             (2, natural["heights_rad"]), (1, [])):  # fmt: skip
+        for name in ("coefficients_rad", "people_rad"):
+            natural[name] = natural[name][: 13 if version == 3 else 10]
         natural["heights_rad"] = heights
         natural["places_m"] = natural["places_m"][: len(heights)]
         before = Readout.from_table(table)
+        assert before.map.leash == 0
         write_readout(tmp_path / "intent.json", before)
         assert json.loads((tmp_path / "intent.json").read_text())["format"] == version
         again = read_readout(tmp_path / "intent.json", "intent", "right_arm")
@@ -231,7 +235,7 @@ def test_what_an_earlier_version_would_misread_it_refuses(
 @pytest.mark.parametrize(
     "name", ["map.json", "calibration.json", "proximal.json", "intent.json"]
 )
-@pytest.mark.parametrize("version", [0, 4, "1", None])
+@pytest.mark.parametrize("version", [0, 5, "1", None])
 def test_an_unknown_version_is_refused(
     folder: Path, tmp_path: Path, name: str, version: object
 ) -> None:

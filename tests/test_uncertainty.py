@@ -39,7 +39,7 @@ def test_the_gradient_of_intent_is_its_finite_difference(seed, side, guard):
     one = readout(side, guard=guard)
     angles = 0.8 * rng.uniform(body.lower, body.upper)
     gradient = np.empty(len(angles))
-    intent_gradient(*intent_numbers(body, one), angles, gradient)
+    intent_gradient(*intent_numbers(body, one), angles, 1.0, gradient)
     step, differences = 1e-6, np.empty(len(angles))
     for j in range(len(angles)):
         ends = np.stack([angles, angles])
@@ -168,6 +168,29 @@ def test_a_short_gap_of_the_hand_or_shoulder_is_bridged(person, method):
         known = np.isfinite(c)
         assert np.mean(~known) <= 0.01
         assert np.median(np.abs(c - whole)[known & (age > 0)]) < 0.02
+
+
+def test_what_a_hidden_marker_shifts_is_taken_off(person):
+    subject, markers = person
+    table = subject.readout("intent").table()
+    before = Readout.from_table(table | {"leash_m": 0.0})
+    older = dataclasses.replace(subject, readouts={"intent": before})
+    (column,) = columns_of(subject, "RSHO")
+    off = markers.copy()
+    # Farther up than the static trial had it: without it, the girdle comes down.
+    off[:, column, 2] += 0.015
+    seen, age = hidden(off, [column], 0.3)
+    rms, deviations = [], []
+    for one in (older, subject):
+        whole, _ = signals(one, off, "intent")
+        c, deviation = signals(one, seen, "intent")
+        error = np.abs(c - whole)[age > 0]
+        rms.append(np.sqrt(np.mean(error**2)))
+        deviations.append(np.median(deviation[age > 0]))
+        assert np.mean(error <= 2 * deviation[age > 0]) > 0.9
+    # What is left is noise, and what changes of the shift as the arm moves on.
+    assert rms[1] < 0.5 * rms[0]
+    assert deviations[1] < deviations[0]
 
 
 def test_a_hand_that_stays_hidden_leaves_the_papers_c_uncertain(person):

@@ -46,7 +46,7 @@ def entered(name: str) -> Method:
         c = made.control_signal(y, X)
         rising = np.mean((swivel - swivel.mean()) * (c - c.mean())) >= 0
 
-        def signal(angles: Array) -> Array:
+        def signal(angles: Array, led: Array) -> Array:
             place, coordinate = read(arm, angles)
             found = np.asarray(made.control_signal(coordinate, place))
             return found if rising else 1 - found

@@ -19,7 +19,7 @@ RIDGE = 1e-3
 
 def rests_of(arm: Arm) -> list[tuple[ArmTrial, Array, Array, Array]]:
     """Trial, wrists (2, 3), and swivels (2,) beyond a quadratic, of each reach."""
-    places, swivel, _ = moving_of(arm)
+    places, swivel = moving_of(arm)
     fit = ridge(quadratic_terms(wrist_of(places)), swivel, RIDGE)
     found = []
     for trial in arm.trials:

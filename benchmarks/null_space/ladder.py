@@ -7,6 +7,7 @@ import numpy as np
 
 from ikns.calibration.readouts import moving_samples
 from ikns.motion.motion import Motion
+from ikns.nullspace.led_direction import led_direction
 from ikns.nullspace.map import still_mask
 from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.nullspace.posture_terms import quadratic_terms
@@ -166,7 +167,9 @@ def natural_of(person: Person, how: str) -> Callable[[Seen], Array]:
         return at.wrist if part == "wrist alone" else np.hstack([at.wrist, at.axis])
 
     learned = NaturalPosture(**near).fit(places(moved), moved.swivel)
-    return lambda at: learned.swivel(places(at))
+    if part == "wrist alone":
+        return lambda at: learned.swivel(at.wrist)
+    return lambda at: learned.swivel(led_direction(places(at)))
 
 
 def scored(

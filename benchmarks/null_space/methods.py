@@ -27,8 +27,9 @@ from null_space.people import GATE, Arm, ArmTrial
 from null_space.turned import held_hand
 
 Array = np.ndarray
-#: From postures (N, 18), rad, to c (N,).
-Signal = Callable[[Array], Array]
+#: From postures (N, 18), rad, and the hand's direction as it was led there (N, 3), to c
+#: (N,).
+Signal = Callable[[Array, Array], Array]
 #: From an arm, its own trials and other people's coefficients to c.
 Method = Callable[[Arm, list[ArmTrial], Array], Signal]
 
@@ -95,7 +96,7 @@ def paper(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
     learned = _map(
         x, q, which, reference=elbow_reference(arm.skeleton, middle, arm.chain)
     )
-    return lambda angles: learned.control_signal(
+    return lambda angles, _: learned.control_signal(
         _chain(arm, angles), _hand(arm, angles)
     )
 
@@ -117,25 +118,24 @@ def proximal(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
         interpolation="smooth",
         reference=elbow_height_gradient(reference),
     )
-    return lambda angles: learned.control_signal(read(angles), _hand(arm, angles))
+    return lambda angles, _: learned.control_signal(read(angles), _hand(arm, angles))
 
 
 def swivel_about_down(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
     """Swivel of joint centers, zero with the elbow below the line."""
     side = ("right", "left").index(arm.side)
-    return lambda angles: arm.skeleton.swivel(angles)[:, side] / RANGE
+    return lambda angles, _: arm.skeleton.swivel(angles)[:, side] / RANGE
 
 
 def hinge(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
     """Hinge swivel alone, nothing learned."""
-    return lambda angles: arm_swivel(arm.skeleton, angles, arm.chain)[1] / RANGE
+    return lambda angles, _: arm_swivel(arm.skeleton, angles, arm.chain)[1] / RANGE
 
 
 def _beyond(arm: Arm, natural: NaturalPosture) -> Signal:
-    def signal(angles: Array) -> Array:
+    def signal(angles: Array, led: Array) -> Array:
         wrist, swivel = arm_swivel(arm.skeleton, angles, arm.chain)
-        direction = hand_direction(arm.skeleton, angles, arm.chain)
-        return (swivel - natural.swivel(np.hstack([wrist, direction]))) / RANGE
+        return (swivel - natural.swivel(np.hstack([wrist, led]))) / RANGE
 
     return signal
 
@@ -170,9 +170,9 @@ def intent_without_places(arm: Arm, trials: list[ArmTrial], people: Array) -> Si
     return intent(arm, trials, people, local_penalty=None)
 
 
-def intent_unguarded(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
-    """Leave the natural posture as it is outside what was taught."""
-    return intent(arm, trials, people, guard=False)
+def intent_guarded(arm: Arm, trials: list[ArmTrial], people: Array) -> Signal:
+    """Let the own part of the natural posture fade outside what was taught."""
+    return intent(arm, trials, people, guard=True)
 
 
 METHODS: dict[str, Method] = {
@@ -183,5 +183,5 @@ METHODS: dict[str, Method] = {
     "people alone": people_alone,
     "intent": intent,
     "intent, no places": intent_without_places,
-    "intent, no guard": intent_unguarded,
+    "intent, guarded": intent_guarded,
 }

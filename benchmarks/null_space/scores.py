@@ -2,9 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
+from ikns.nullspace.hinge_swivel import hand_direction
+from ikns.nullspace.led_direction import led_direction
 from null_space.methods import Method, Signal
 from null_space.people import Arm, ArmTrial
 from null_space.turned import held_hand, turned_hand
@@ -16,6 +19,13 @@ WISHES = {20: np.radians(20.0), 10: np.radians(10.0)}
 DRIFT, TILT = 4e-3, np.radians(1.2)
 #: A hand that turns as for a glass that is emptied, to either side, rad.
 TURN = np.radians(29.0)
+
+
+class Ends(NamedTuple):
+    """Postures at R ends of reaches."""
+
+    angles: Array  # (R, 18) rad
+    led: Array  # (R, 3) the hand's direction as it was led there
 
 
 @dataclass
@@ -41,28 +51,32 @@ def splits(arm: Arm, kind: str) -> Iterator[tuple[list[ArmTrial], list[ArmTrial]
         yield judged, [t for t in arm.trials if getattr(t, key) != value]
 
 
-def reach_ends(trials: list[ArmTrial]) -> tuple[Array, Array]:
-    """Postures (R, 18) where reaches start and end, as far as the arm was seen."""
-    first, last = [], []
+def reach_ends(arm: Arm, trials: list[ArmTrial]) -> tuple[Ends, Ends]:
+    """Where reaches start and end, as far as the arm was seen."""
+    ends: tuple[list[Array], list[Array]] = [], []
     for trial in trials:
+        direction = hand_direction(arm.skeleton, trial.angles, arm.chain)
+        led = led_direction(np.hstack([trial.wrist, direction]))[:, 3:]
+        whole = np.hstack([trial.angles, led])
         for a, b in trial.reaches():
             seen = a + np.flatnonzero(trial.known[a : b + 1])
             if seen.size >= 10:
-                first.append(trial.angles[seen[0]])
-                last.append(trial.angles[seen[-1]])
-    return np.reshape(first, (-1, 18)), np.reshape(last, (-1, 18))
+                for which, row in zip(ends, seen[[0, -1]], strict=True):
+                    which.append(whole[row])
+    first, last = (np.reshape(rows, (-1, 21)) for rows in ends)
+    return Ends(first[:, :18], first[:, 18:]), Ends(last[:, :18], last[:, 18:])
 
 
 def judge(
     scores: Scores, signal: Signal, arm: Arm, trials: list[ArmTrial], seed: int
 ) -> None:
     """Add what c does on an arm's trials."""
-    first, last = reach_ends(trials)
-    if not len(first):
+    first, (last, led) = reach_ends(arm, trials)
+    if not len(last):
         return
     rng = np.random.default_rng(seed)
-    before = signal(last)
-    scores.reaches += np.abs(before - signal(first)).tolist()
+    before = signal(last, led)
+    scores.reaches += np.abs(before - signal(*first)).tolist()
     for wish, angle in WISHES.items():
         n = (len(last), 3)
         moved = held_hand(
@@ -73,9 +87,9 @@ def judge(
             drift=rng.normal(scale=DRIFT, size=n),
             tilt=rng.normal(scale=TILT, size=n),
         )
-        scores.wishes[wish] += np.abs(signal(moved) - before).tolist()
+        scores.wishes[wish] += np.abs(signal(moved, led) - before).tolist()
     ends = [
-        signal(turned_hand(arm.skeleton, arm.side, last, pronation=sign * TURN))
+        signal(turned_hand(arm.skeleton, arm.side, last, pronation=sign * TURN), led)
         for sign in (-1, 1)
     ]
     scores.turns += np.abs(ends[1] - ends[0]).tolist()

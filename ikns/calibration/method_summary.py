@@ -163,6 +163,7 @@ def _changes(
     if not len(reaches):
         return np.empty(0)
     x, y = readout.samples(subject.skeleton, motion)
+    x = readout.led(x)
     at = []
     for frames in np.transpose(reaches):
         if readout.method == "intent" and folds is not None and folds.postures:
@@ -191,6 +192,7 @@ def _turned(subject: Subject, readout: Readout) -> float | None:
         for side in end_sides(subject.chain)
     ]
     ends = []
+    before = None
     for turn in (-TURN, TURN):
         angles = np.array(known)
         angles[:, columns] += turn
@@ -200,6 +202,11 @@ def _turned(subject: Subject, readout: Readout) -> float | None:
             subject.chain,
             readout.method,
             reference=readout.reference,
+        )
+        # The hand turns where it is, place by place.
+        before = x if before is None else before
+        x = np.array(
+            [readout.led(np.stack(pair))[1] for pair in zip(before, x, strict=True)]
         )
         c = np.asarray(readout.map.control_signal(y, x))
         ends.append(c.reshape(len(known), -1))

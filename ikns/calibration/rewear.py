@@ -199,6 +199,7 @@ def _zeroed(
         learned.upper_ + shift,
         counts=learned.counts_,
         penalty=learned.penalty,
+        leash=learned.leash,
     )
     return {"intent": replace(readout, map=moved)}, {
         "shift_rad": shift,

@@ -21,6 +21,9 @@ FORMAT = 1
 WITH_PLACES = 2
 #: Version of one whose natural posture knows the hand's direction too.
 WITH_HAND = 3
+#: Version of one that follows this direction along the path of the wrist alone, and
+#: takes off what hidden markers shift.
+WITH_LEASH = 4
 
 #: Columns of the still samples: hand position, m in the thorax frame, and number of the
 #: PCA point, from 1; 0 for none.
@@ -69,7 +72,7 @@ def chain_of_map(table: dict[str, Any]) -> ChainLike:
 
 def read_readout(path: Path, method: str, chain: ChainLike) -> Readout:
     """Read the map of a method beside the paper's."""
-    newer = (WITH_PLACES, WITH_HAND) if method == "intent" else ()
+    newer = (WITH_PLACES, WITH_HAND, WITH_LEASH) if method == "intent" else ()
     table = read_json(path, (FORMAT, *newer))
     try:
         if (table["method"], table["chain"]) != (method, str(chain)):
@@ -109,4 +112,6 @@ def write_readout(path: Path, readout: Readout) -> None:
     version = WITH_PLACES if natural.get("heights_rad") else FORMAT
     if len(natural.get("coefficients_rad", ())) > 10:
         version = WITH_HAND
+    if table.get("leash_m"):
+        version = WITH_LEASH
     write_json(path, {"format": version} | table)

@@ -106,7 +106,7 @@ def method_curves(
             reference=readout.reference,
         )
         curves.reach[method] = _one(moving)[first : last + 1]
-        curves.turned[method] = _one(readout.map.control_signal(y, x))
+        curves.turned[method] = _one(readout.map.control_signal(y, readout.led(x)))
         curves.held[method] = _one(held)[here]
     return curves
 

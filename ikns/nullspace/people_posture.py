@@ -18,10 +18,9 @@ _KEYS = {
     "mean": "mean_rad",
     "covariance": "covariance_rad2",
     "wrist_alone": "wrist_alone_rad",
-    "turned": "turned",
     "leverage": "leverage",
 }
-_SHAPES = [(13,), (13, 13), (10,), (3, 3), (10, 10)]
+_SHAPES = [(13,), (13, 13), (10,), (10, 10)]
 
 
 class People(NamedTuple):
@@ -35,10 +34,6 @@ class People(NamedTuple):
         Between arms of different people, rad^2.
     wrist_alone : (10,) array
         Coefficients without the hand's direction, rad.
-    turned : (3, 3) array
-        D: mean outer product of what a turn of the forearm by 29 deg (as for a glass
-        that is emptied) does to the hand's direction, and turns of the wrist by 20 deg
-        about both of its axes, the elbow still.
     leverage : (10, 10) array
         Matrix of the leverage of the wrist's terms over all their movements.
     taught_leverage : float
@@ -51,7 +46,6 @@ class People(NamedTuple):
     mean: Array
     covariance: Array
     wrist_alone: Array
-    turned: Array
     leverage: Array
     taught_leverage: float
     arms: int

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ikns.arrays import Array
-from ikns.nullspace.people_posture import natural_posture_people
 
 #: Middle of the work space, m, and the unit of length, m: the quadratic terms are then
 #: of order 1 wherever a hand goes (ISB thorax, right arm).
@@ -49,19 +48,11 @@ def wrist_of(X: Array) -> Array:
     return X[..., :WRIST] if X.shape[-1] == HAND else X
 
 
-def ridge(
-    phi: Array, swivel: Array, penalty: float, turned: Array | None = None
-) -> Array:
-    """Return coefficients (K,) of terms (N, K), drawn to zero.
-
-    By the norm of :class:`ikns.NaturalPosture`, in which turns of the hand have a
-    price; `turned` (3, 3) is its D, by default the population's.
-    """
-    price = _penalties(phi.shape[1], penalty)
-    if len(price) == TERMS[HAND]:
-        price[-3:, -3:] += natural_posture_people().turned if turned is None else turned
+def ridge(phi: Array, swivel: Array, penalty: float) -> Array:
+    """Return coefficients (K,) of terms (N, K), drawn to zero but for the constant."""
     n = len(phi)
-    return np.asarray(np.linalg.solve(phi.T @ phi / n + price, phi.T @ swivel / n))
+    normal = phi.T @ phi / n + _penalties(phi.shape[1], penalty)
+    return np.asarray(np.linalg.solve(normal, phi.T @ swivel / n))
 
 
 def leverage_of(phi: Array, penalty: float) -> tuple[Array, float]:

@@ -21,7 +21,7 @@ from ikns._kernels.body.frame_constants import (
 )
 from ikns._kernels.body.frame_sequence import cut_memory, follow_frame
 from ikns._kernels.body.intent_gradient import intent_gradient
-from ikns._kernels.body.intent_signal import intent_signal
+from ikns._kernels.body.intent_signal import LEASH, intent_signal
 from ikns._kernels.body.marker_errors import take_markers
 from ikns._kernels.body.marker_gate import THORAX
 from ikns._kernels.body.marker_problem import MarkerProblem, Scratch, cut, unpack
@@ -65,8 +65,9 @@ def control_frame(
     `whole`, `real` and `memory`, which has the pose to start from, are as in
     :func:`ikns._kernels.body.frame_sequence.solve_frames`, the constants packed
     :class:`ikns._kernels.body.frame_constants.FrameConstants`;
-    `seen_before` (M, 5) is the memory of markers of
-    :mod:`ikns._kernels.body.uncertainty`, `dt` the time since the frame before, s;
+    `seen_before` (M + 2, 5) is the memory of markers of
+    :mod:`ikns._kernels.body.uncertainty` and, in two rows more, that of the hand of
+    :mod:`ikns._kernels.body.intent_signal`; `dt` the time since the frame before, s;
     `work`, `cavity_work`, `rotation` (1, E, 3, 3), for E of at least 2, and `weights`
     (P,) are scratch. Written are the pose `q` (nq,), the right and left hand's (or the
     chain's ends') `position` (1, E, 3) and the task's `place` (3,) in the thorax frame
@@ -109,8 +110,9 @@ def control_frame(
         believed = believed and s.passed[side] > 0
     seen = _in_sight(markers, control_map.link, control_map.need)
     status = _read_pose(
-        problem, s, constants, q, dt, believed, seen_before, np.isfinite(residual),
-        cavity_work, rotation, position, weights, place, c, deviations,
+        problem, s, constants, q, markers, dt, believed, seen_before,
+        np.isfinite(residual), cavity_work, rotation, position, weights, place, c,
+        deviations,
     )  # fmt: skip
     return residual, worst, intermarker, iterations, converged, seen, status
 
@@ -147,8 +149,9 @@ def recorded_signals(
         n_seen, _ = take_markers(problem.marker_weight, markers[i], s.weight, s.target)
         errors_at(problem, s, q[i])
         _read_pose(
-            problem, s, constants, q[i], dt[i], believed[i], seen_before, n_seen > 0,
-            cavity_work, rotation, position, weights, place, c[i], deviations[i],
+            problem, s, constants, q[i], markers[i], dt[i], believed[i], seen_before,
+            n_seen > 0, cavity_work, rotation, position, weights, place, c[i],
+            deviations[i],
         )  # fmt: skip
 
 
@@ -158,6 +161,7 @@ def _read_pose(
     s: Scratch,
     constants: FrameConstants,
     q: Array,
+    markers: Array,
     dt: float,
     believed: bool,
     seen_before: Array,
@@ -170,8 +174,12 @@ def _read_pose(
     c: Array,
     deviations: Array,
 ) -> int:
-    """Read the signals off a pose whose errors are in `s`, if markers `posed` it."""
+    """Read the signals off a pose whose errors are in `s`, if markers `posed` it.
+
+    Of intent what hidden markers shift is taken off; the paper's is as the pose says.
+    """
     paths, _, control_map, intent, segments = constants
+    memory, hand = seen_before[: len(markers)], seen_before[len(markers) :]
     place_frames(paths, q[7:].reshape(1, len(q) - 7), rotation, position)
     ends = control_map.ends
     for k in range(3):
@@ -181,14 +189,21 @@ def _read_pose(
         place[k] /= len(ends)
     for k in range(len(c)):
         c[k] = deviations[k] = np.nan
-    hidden = note_markers(problem, s, dt, believed, segments, seen_before)
+    hidden = note_markers(problem, s, dt, believed, segments, memory)
     if not posed:
         return NOT_FINITE
-    solvable = factor_information(problem, s, q, segments, seen_before)
+    solvable = factor_information(problem, s, q, segments, memory)
     status = _weights(control_map, place, cavity_work, weights)
     for k in range(len(c)):
-        if k == 0 and len(intent.numbers):
-            c[k], taught = _intent(intent, q[7:], rotation, position, s.gradient[6:])
+        by_map = k > 0 or len(intent.numbers) == 0
+        shifted = not by_map and intent.numbers[LEASH] > 0
+        if not by_map:
+            link, need = control_map.link, control_map.need
+            # The last of the links is the hand.
+            known = believed and _shown(markers, link, need, len(need) - 1)
+            c[k], taught = _intent(
+                intent, q[7:], rotation, position, hand, known, s.gradient[6:]
+            )
             status = INSIDE_HULL if taught else OUTSIDE_HULL
             for a in range(6):
                 s.gradient[a] = 0.0
@@ -196,14 +211,17 @@ def _read_pose(
             c[k] = _signal(weights, control_map, k, q[7:], s.gradient)
         if not (solvable and np.isfinite(c[k])):
             continue
-        deviations[k] = deviation(problem, s, s.gradient, segments, seen_before, hidden)
-        by_map = k > 0 or len(intent.numbers) == 0
+        deviations[k], shift = deviation(
+            problem, s, s.gradient, segments, memory, hidden, shifted
+        )
+        if shifted:
+            c[k] -= shift
         if hidden and by_map and deviations[k] > DOUBTFUL:
             _add_slopes(
                 paths, control_map, k, q[7:], place, cavity_work, c[k], s.gradient
             )
-            deviations[k] = deviation(
-                problem, s, s.gradient, segments, seen_before, hidden
+            deviations[k], _ = deviation(
+                problem, s, s.gradient, segments, memory, hidden, False
             )
     return status
 
@@ -214,11 +232,12 @@ def _intent(
     angles: Array,
     rotation: Array,
     position: Array,
+    hand: Array,
+    known: bool,
     gradient: Array,
 ) -> tuple[float, bool]:
     """Return the signal of intent, and whether taught; write its gradient (J,)."""
-    intent_gradient(intent.paths, intent.numbers, intent.leverage, angles, gradient)
-    return intent_signal(
+    c, taught, share = intent_signal(
         intent.paths,
         intent.numbers,
         intent.leverage,
@@ -226,20 +245,32 @@ def _intent(
         rotation,
         position,
         np.empty(10),
+        hand,
+        known,
     )
+    intent_gradient(
+        intent.paths, intent.numbers, intent.leverage, angles, share, gradient
+    )
+    return c, taught
 
 
 @compiled
 def _in_sight(markers: Array, link: Indices, need: Indices) -> bool:
     for i in range(len(need)):
-        seen = 0
-        for m in range(len(link)):
-            total = markers[m, 0] + markers[m, 1] + markers[m, 2]
-            if link[m] == i and np.isfinite(total):
-                seen += 1
-        if seen < need[i]:
+        if not _shown(markers, link, need, i):
             return False
     return True
+
+
+@compiled
+def _shown(markers: Array, link: Indices, need: Indices, i: int) -> bool:
+    """Whether enough markers of link i are seen."""
+    seen = 0
+    for m in range(len(link)):
+        total = markers[m, 0] + markers[m, 1] + markers[m, 2]
+        if link[m] == i and np.isfinite(total):
+            seen += 1
+    return seen >= need[i]
 
 
 @compiled

@@ -41,12 +41,18 @@ from ikns.arrays import Array
 
 @compiled
 def intent_gradient(
-    paths: Paths, numbers: Array, leverage: Array, angles: Array, gradient: Array
+    paths: Paths,
+    numbers: Array,
+    leverage: Array,
+    angles: Array,
+    share: float,
+    gradient: Array,
 ) -> None:
     """Write the gradient of c over all joint angles, (J,) per rad.
 
     Arguments are those of :func:`ikns._kernels.body.intent_signal.intent_signal`, with
-    `angles` (J,). NaN where the swivel is undefined.
+    `angles` (J,), and `share`, how much of the hand's direction is in c. NaN where the
+    swivel is undefined.
     """
     axes = np.empty((len(paths.joint), 6))
     upper_arm, turned = np.empty((3, 3)), np.empty((3, 3))
@@ -60,7 +66,7 @@ def intent_gradient(
     for i in range(3):
         direction[i] = 0.0
         for j in range(3):
-            direction[i] += turned[i, j] * numbers[HAND + j]
+            direction[i] += share * turned[i, j] * numbers[HAND + j]
     _cross(direction, numbers[DIRECTION : DIRECTION + 3], by_turn)
     width = numbers[UPPER] - numbers[LOWER]
     for i in range(len(gradient)):

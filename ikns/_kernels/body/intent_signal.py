@@ -5,7 +5,9 @@
 with the hinge swivel s (:mod:`ikns.nullspace.hinge_swivel`) and the natural posture
 s_nat for the wrist center w and the hand's direction l
 (:mod:`ikns.nullspace.natural_posture`), whose constants are handed in. What is
-remembered of particular places is added up one by one.
+remembered of particular places is added up one by one. l is the direction that the
+wrist has led here (:mod:`ikns.nullspace.led_direction`): the memory of the hand has
+where its anchor is, and the direction.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import math
 import numpy as np
 
 from ikns._kernels.body.paths import Paths, place_frames
-from ikns._kernels.compiled import compiled
+from ikns._kernels.compiled import compiled, inner
 from ikns.arrays import Array
 
 # One array of numbers takes less time to hand over than a dozen. Its layout; all of the
@@ -32,7 +34,16 @@ FORWARD, DOWN = 30, 33  # where the swivel's reference starts, and it there, 3 e
 REACH = 36  # of a bump around a place, m
 HAND = 37  # direction from wrist to knuckle in the hand's frame, 3
 DIRECTION = 40  # its 3 coefficients in the thorax frame of this arm, not mirrored, rad
-SIZE = 43  # places and heights follow, m and rad, 4 for each
+LEASH = 43  # of the hand's direction, m; 0 in maps of before, which read as they did
+SIZE = 44  # places and heights follow, m and rad, 4 for each
+
+# Rows of the memory of the hand.
+_ANCHOR, _LED = 0, 1
+
+
+def new_hand_memory(width: int) -> Array:
+    """Return the memory of a hand that was not seen yet, (2, width)."""
+    return np.full((2, width), np.nan)
 
 
 @compiled
@@ -44,8 +55,10 @@ def intent_signal(
     rotation: Array,
     position: Array,
     terms: Array,
-) -> tuple[float, bool]:
-    """Return c, not clipped, and whether natural movement was taught at the wrist.
+    hand: Array,
+    known: bool,
+) -> tuple[float, bool, float]:
+    """Return c, not clipped, whether taught, and how much it takes of the hand.
 
     Parameters
     ----------
@@ -58,12 +71,20 @@ def intent_signal(
         Joint angles, rad.
     rotation, position, terms : (1, 2, 3, 3), (1, 2, 3) and (10,) arrays
         Scratch.
+    hand : (2, 3 or more) array
+        Memory of the hand, see :func:`new_hand_memory`.
+    known : bool
+        Whether the hand is seen and believed, so that the memory may be written.
 
     Returns
     -------
     c : float
         NaN where the swivel is undefined.
     taught : bool
+        Whether natural movement was taught at the wrist.
+    share : float
+        How much of the hand's direction in this frame is in c; 1 where `known`, as
+        then all that was led here was seen.
     """
     place_frames(paths, angles, rotation, position)
     s = _swivel(numbers, rotation[0, 0], position[0, 0], position[0, 1])
@@ -84,15 +105,46 @@ def intent_signal(
     if numbers[GUARD] > 0 and beyond > 1.0:
         own = numbers[OFFSET] + (own - numbers[OFFSET]) / beyond
     z = numbers[MIRROR] * position[0, 1, 2]
-    near, pointing = _near(numbers, position[0, 1, 0], position[0, 1, 1], z), 0.0
-    for i in range(3):
-        for j in range(3):
-            turned = rotation[0, 1, i, j] * numbers[HAND + j]
-            pointing += numbers[DIRECTION + i] * turned
+    near = _near(numbers, position[0, 1, 0], position[0, 1, 1], z)
+    pointing, share = _pointing(numbers, rotation[0, 1], position[0, 1], hand, known)
     rest = s - people - own - near - pointing
     rest -= 2 * math.pi * math.floor((rest + math.pi) / (2 * math.pi))
     width = numbers[UPPER] - numbers[LOWER]
-    return (rest - numbers[LOWER]) / width, beyond <= 1.0
+    return (rest - numbers[LOWER]) / width, beyond <= 1.0, share
+
+
+@inner
+def _pointing(
+    numbers: Array, turned: Array, wrist: Array, hand: Array, known: bool
+) -> tuple[float, float]:
+    """Return what the led direction adds to the natural swivel, rad, and its share."""
+    total = far = 0.0
+    if not numbers[LEASH] > 0:
+        for i in range(3):
+            for j in range(3):
+                total += numbers[DIRECTION + i] * (turned[i, j] * numbers[HAND + j])
+        return total, 1.0
+    for i in range(3):
+        far += (wrist[i] - hand[_ANCHOR, i]) ** 2
+    far, share, leash = math.sqrt(far), 1.0, numbers[LEASH]
+    # NaN before the hand was seen for the first time.
+    led = far >= 0
+    if led:
+        share = 1.0 - math.exp(1.0 - far / leash) if far > leash else 0.0
+    for i in range(3):
+        way = 0.0
+        for j in range(3):
+            way += turned[i, j] * numbers[HAND + j]
+        if led:
+            way = hand[_LED, i] + share * (way - hand[_LED, i])
+        total += numbers[DIRECTION + i] * way
+        if known:
+            hand[_LED, i] = way
+            if not led:
+                hand[_ANCHOR, i] = wrist[i]
+            elif far > leash:
+                hand[_ANCHOR, i] += (wrist[i] - hand[_ANCHOR, i]) * (1.0 - leash / far)
+    return total, 1.0 if known else share
 
 
 @compiled

@@ -52,5 +52,7 @@ def proximal_frame(
         s.gradient[a] = 0.0
     c[0], inside = proximal_signal(numbers, q[7:], place, s.gradient[6:])
     if solvable and np.isfinite(c[0]):
-        deviations[0] = deviation(problem, s, s.gradient, segments, seen_before, hidden)
+        deviations[0], _ = deviation(
+            problem, s, s.gradient, segments, seen_before, hidden, False
+        )
     return inside

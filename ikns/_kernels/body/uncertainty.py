@@ -15,7 +15,9 @@ variance is the sum of
   pull^2 / n v;
 - what hidden markers leave: markers never fit a body exactly. While all are seen their
   residuals r balance; without the hidden ones the pose goes where the others want it,
-  which moves the signal by sum_seen weight (J v) . r, with r from when all were seen;
+  which shifts the signal by -sum_seen weight (J v) . r, with r, of the body less the
+  marker, from when all were seen. It counts as an error, unless the shift is taken
+  off the signal: then what changes of it does, as of the residuals;
 - what changes of these residuals as the arm moves on.
 
 First-order propagation of errors through the minimum of a cost; see e.g. Bjorck 1996,
@@ -166,11 +168,13 @@ def deviation(
     segments: Segments,
     memory: Array,
     hidden: bool,
-) -> float:
+    shifted: bool,
+) -> tuple[float, float]:
     """Return the standard deviation of a signal with this `gradient` (n,) over joints.
 
-    After :func:`factor_information`; `hidden` as :func:`note_markers` returns. Degrees
-    of freedom that are held do not count.
+    And how far hidden markers shift it: an error too unless `shifted`, which says that
+    it is taken off. After :func:`factor_information`; `hidden` as :func:`note_markers`
+    returns. Degrees of freedom that are held do not count.
     """
     v = s.step
     for d in range(len(v)):
@@ -180,26 +184,35 @@ def deviation(
     for d in range(len(v)):
         noise += v[d] * (gradient[d] - s.weak_pull[d] * v[d])
         turned += (s.weak_pull[d] * v[d] * s.unseen_turn[d]) ** 2
-    variance = NOISE**2 * max(noise, 0.0) + turned
+    variance, shift = NOISE**2 * max(noise, 0.0) + turned, 0.0
     if hidden:
-        variance += _misfit(problem, s, segments, memory)
-    return math.sqrt(variance)
+        shift, changed, unseen, lag = _misfit(problem, s, segments, memory)
+        if shifted:
+            age = min(unseen + lag, LONGEST) / CHANGED
+            variance += age**2 * (changed + shift**2)
+        else:
+            variance += shift**2 + (min(unseen, LONGEST) / CHANGED) ** 2 * changed
+    return math.sqrt(variance), shift
 
 
 @borrowing
 def _misfit(
     problem: MarkerProblem, s: Scratch, segments: Segments, memory: Array
-) -> float:
-    """Variance by markers that do not fit: what hidden ones leave, and what changes.
+) -> tuple[float, float, float, float]:
+    """Shift by markers that do not fit without the hidden, and variance of changes.
 
-    `s.twist` are those of the joints at the rates v.
+    The latter for residuals that change entirely. Then for how long a marker has been
+    hidden, s, and how far remembered residuals lag behind, s. `s.twist` are those of
+    the joints at the rates v.
     """
-    left = changed = longest = 0.0
+    left = changed = longest = lag = 0.0
     for m in range(len(memory)):
         if problem.marker_weight[m] == 0 or segments.of_marker[m] < 0:
             continue
         if s.weight[m] == 0:
-            longest = max(longest, memory[m, _UNSEEN])
+            if memory[m, _UNSEEN] > longest:
+                longest = memory[m, _UNSEEN]
+                lag = longest / memory[m, _FRAMES] / FOLLOW
             continue
         j, carrier = problem.marker_joint[m], problem.marker_carrier[m]
         t0, t1, t2 = s.twist[carrier, 0], s.twist[carrier, 1], s.twist[carrier, 2]
@@ -212,7 +225,7 @@ def _misfit(
         r2 = _turned(s, j, 2, memory[m])
         left += u0 * r0 + u1 * r1 + u2 * r2
         changed += (u0**2 + u1**2 + u2**2) * (r0**2 + r1**2 + r2**2) / 3
-    return left**2 + (min(longest, LONGEST) / CHANGED) ** 2 * changed
+    return -left, changed, longest, lag if lag < LONGEST else LONGEST
 
 
 @borrowing

@@ -13,7 +13,8 @@ from ikns._kernels.body.frame_constants import (
     IntentNumbers,
     pack_constants,
 )
-from ikns._kernels.body.uncertainty import Segments, new_marker_memory
+from ikns._kernels.body.intent_signal import new_hand_memory
+from ikns._kernels.body.uncertainty import WIDTH, Segments, new_marker_memory
 from ikns._kernels.voronoi.diagram import INSIDE_HULL, OUTSIDE_HULL, new_work
 from ikns.arrays import Array, Mask
 from ikns.body.chains import ChainLike, as_chain, chain_joints
@@ -134,7 +135,7 @@ class FrameSolver:
             self._segments,
         )
         self._constants = pack_constants(constants)
-        self._seen_before = new_marker_memory(len(of_marker))
+        self._seen_before = _new_memory(len(of_marker))
         indices = control_map.indices
         self._cavity = new_work(indices) if len(indices) else np.empty(0)
         ends = max(2, len(paths.ends))  # or as much as intent takes
@@ -256,7 +257,7 @@ class FrameSolver:
         poses, steps = np.array(q, dtype=np.float64), np.diff(time, prepend=time[0])
         c, uncertainty = np.empty((2, len(q), self.null_space_map.directions_.shape[1]))
         trusted = np.ascontiguousarray(believed)
-        memory = new_marker_memory(seen.shape[1])
+        memory = _new_memory(seen.shape[1])
         # Proximal is read off what the call for a frame leaves in its work memory.
         size = max(1, len(poses)) if self._proximal is None else 1
         for i in range(0, len(poses), size):
@@ -294,7 +295,7 @@ class FrameSolver:
                 *self._ik.packed,
                 self._segments,
                 numbers,
-                memory,
+                memory[: len(self._markers)],
                 q,
                 self._ik.work,
                 place,
@@ -302,3 +303,8 @@ class FrameSolver:
                 uncertainty,
             )
         )
+
+
+def _new_memory(n_markers: int) -> Array:
+    """Return what is known before the first frame: of markers, and of the hand."""
+    return np.vstack([new_marker_memory(n_markers), new_hand_memory(WIDTH)])

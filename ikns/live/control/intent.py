@@ -59,6 +59,7 @@ def intent_numbers(skeleton: Skeleton, readout: Readout) -> IntentNumbers:
         (kernel.REACH, [REACH]),
         (kernel.HAND, way / np.linalg.norm(way)),
         (kernel.DIRECTION, direction * [1.0, 1.0, mirror]),
+        (kernel.LEASH, [learned.leash]),
         (kernel.SIZE, remembered.ravel()),
     ):
         numbers[start : start + len(values)] = values

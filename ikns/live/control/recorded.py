@@ -145,8 +145,10 @@ def recorded_signal(
         uncertainty, uncertain = np.full((n, learned.directions_.shape[1]), np.nan), 0
         raw = readout.control_signal(subject.skeleton, motion)
     else:
-        uncertainty = _uncertainty(subject, readout, motion, recording)
+        c, uncertainty = _read(subject, readout, motion, recording)
         raw, within = readout.of_postures(subject.skeleton, motion.q)
+        if isinstance(readout.map, IntentMap) and readout.map.leash:
+            raw = c[:, 0]  # less what hidden markers shift
         if raw.ndim == 1:
             uncertainty = uncertainty[:, :1]
         certain = uncertainty.reshape(raw.shape) <= max_uncertainty
@@ -223,12 +225,12 @@ def _knows(readout: Readout) -> bool:
     )
 
 
-def _uncertainty(
+def _read(
     subject: Subject, readout: Readout, motion: Motion, recording: Recording
-) -> NDArray[np.float64]:
-    """Return the standard deviation of the signals of a recording, (T, d)."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the signals of a recording and their standard deviation, (T, d) each."""
     skeleton, chain = subject.skeleton, subject.chain
     solver = FrameSolver(skeleton, subject.null_space_map, chain, readout=readout)
     markers = skeleton.marker_set.pick(recording.labels, recording.markers)
     believed = motion.believed(chain)
-    return solver.read(motion.q, markers, motion.time, believed)[1]
+    return solver.read(motion.q, markers, motion.time, believed)

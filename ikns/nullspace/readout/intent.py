@@ -4,8 +4,9 @@
 
 s is the hinge swivel (:mod:`ikns.nullspace.hinge_swivel`), s_nat the natural posture
 with the wrist center at w and the hand in the direction l
-(:mod:`ikns.nullspace.natural_posture`), and a and b come from the lower and upper ends
-of s - s_nat at the held places: their middle is a robust mean over the places, their
+(:mod:`ikns.nullspace.natural_posture`), which counts as the wrist has led it there
+(:mod:`ikns.nullspace.led_direction`). a and b come from the lower and upper ends of
+s - s_nat at the held places: their middle is a robust mean over the places, their
 distance the mean width. Two numbers for the whole range: fields through ends that
 scatter would put this scatter back into c. A place at which the natural posture is far
 off, or that was half explored, has no say. Where times are known, the ends are those of
@@ -24,9 +25,10 @@ from numpy.typing import ArrayLike
 from ikns.arrays import Array, Mask
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.estimator_base import EstimatorBase
+from ikns.nullspace.led_direction import LEASH, led_direction
 from ikns.nullspace.map.checks import MapWarning, checked_rows, format_point
 from ikns.nullspace.natural_posture import NaturalPosture
-from ikns.nullspace.posture_terms import wrist_of
+from ikns.nullspace.posture_terms import HAND, wrist_of
 from ikns.nullspace.readout.ends import checked_times, robust_mean, swept_ends_of
 
 #: A place whose ends are off the mean by more than this share of the range is named.
@@ -58,6 +60,9 @@ class IntentMap(EstimatorBase):
         Most iterations of the clustering.
     min_samples : int, optional
         Places with fewer samples are left out; default a tenth of an equal share.
+    leash : float
+        Of the hand's direction, m; 0 in maps of before, which follow a hand that turns
+        where it is, and count what hidden markers shift as an error.
 
     Attributes
     ----------
@@ -100,6 +105,7 @@ class IntentMap(EstimatorBase):
         radius: float | None = None,
         max_iter: int = 300,
         min_samples: int | None = None,
+        leash: float = LEASH,
     ) -> None:
         self.n_points = n_points
         self.penalty = penalty
@@ -107,6 +113,7 @@ class IntentMap(EstimatorBase):
         self.radius = radius
         self.max_iter = max_iter
         self.min_samples = min_samples
+        self.leash = leash
 
     def fit(
         self,
@@ -193,7 +200,8 @@ class IntentMap(EstimatorBase):
         Raises
         ------
         InvalidInput
-            When shapes disagree, values are not finite, or an upper end is below.
+            When shapes disagree, values are not finite, an upper end is below, or the
+            leash is negative.
         """
         places = np.array(centers, dtype=np.float64)
         m, M = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
@@ -224,7 +232,8 @@ class IntentMap(EstimatorBase):
         q : (..., 1) array
             Hinge swivel, rad.
         x : (..., 6) or (..., 3) array
-            As for :meth:`fit`; what was fitted to the wrist alone takes both.
+            As for :meth:`fit`; what was fitted to the wrist alone takes both. Each row
+            is taken as if the hand had been led there; of a motion, see :meth:`led`.
 
         Returns
         -------
@@ -235,6 +244,14 @@ class IntentMap(EstimatorBase):
         s = checked_rows(q, 1, "swivels")[..., 0]
         a, b = self.ends_
         return np.asarray((wrapped(s - self.natural_.swivel(x)) - a) / (b - a))
+
+    def led(self, x: ArrayLike) -> Array:
+        """Rows (T, 6) of a motion, in order of time, with directions as they count."""
+        self._check_fitted()
+        rows = np.array(x, dtype=np.float64)
+        if self.natural_.n_features_in_ != HAND:
+            return rows
+        return led_direction(rows, self.leash)
 
     def inside(self, x: ArrayLike) -> Mask:
         """Whether natural movement was taught at the wrists of rows (..., 6), (...)."""
@@ -282,6 +299,8 @@ class IntentMap(EstimatorBase):
 
     def _finish(self) -> None:
         """Set the mean ends, and name places that were half explored."""
+        if not 0 <= self.leash < np.inf:
+            raise InvalidInput(f"expected a leash of 0 m or more, found {self.leash}.")
         widths = self.upper_ - self.lower_
         width = float(widths[widths >= _HALF * np.median(widths)].mean())
         middle = robust_mean((self.lower_ + self.upper_) / 2)

@@ -51,17 +51,32 @@ class Readout:
         )
 
     def control_signal(self, skeleton: Skeleton, motion: Motion) -> Array:
-        """Control signal of a motion, not clipped, (T,) or (T, d)."""
+        """Control signal of a motion, not clipped, (T,) or (T, d).
+
+        As the poses say: what hidden markers shift takes the recording, see
+        :func:`ikns.live.control.recorded.control_table`.
+        """
         x, y = self.samples(skeleton, motion)
-        return np.asarray(self.map.control_signal(y, x))
+        return np.asarray(self.map.control_signal(y, self.led(x)))
+
+    def led(self, x: Array) -> Array:
+        """Places of a motion, in order of time, as they count: :meth:`IntentMap.led`.
+
+        Of other methods they are what they are.
+        """
+        return self.map.led(x) if isinstance(self.map, IntentMap) else x
 
     def of_postures(self, skeleton: Skeleton, q: Array) -> tuple[Array, Mask]:
-        """Signal (T,) or (T, d) and :meth:`inside` of postures (T, nq), seen or not."""
+        """Signal (T,) or (T, d) and :meth:`inside` of postures (T, nq), seen or not.
+
+        In order of time.
+        """
         angles = q[:, -len(skeleton.joint_names) :]
         x, y = posture_samples(
             skeleton, angles, self.chain, self.method, reference=self.reference
         )
-        return np.asarray(self.map.control_signal(y, x)), self.map.inside(x)
+        c = np.asarray(self.map.control_signal(y, self.led(x)))
+        return c, self.map.inside(x)
 
     def inside(self, skeleton: Skeleton, motion: Motion) -> Mask:
         """Whether the map was taught where the arm is, (T,)."""
@@ -135,6 +150,7 @@ def _intent_table(learned: IntentMap) -> dict[str, Any]:
             "heights_rad": natural.heights_.tolist(),
             "coverage": natural.coverage_,
         },
+        "leash_m": learned.leash,
         "centers_m": learned.centers_.tolist(),
         "lower_rad": learned.lower_.tolist(),
         "upper_rad": learned.upper_.tolist(),
@@ -157,6 +173,8 @@ def _intent_map(table: dict[str, Any]) -> IntentMap:
         penalty=held["penalty"],
         guard=held["guard"],
     )
+    # Those of before followed a hand at once.
+    leash = float(table.get("leash_m", 0.0))
     return IntentMap.from_arrays(
         natural,
         table["centers_m"],
@@ -164,4 +182,5 @@ def _intent_map(table: dict[str, Any]) -> IntentMap:
         table["upper_rad"],
         counts=table["samples"],
         penalty=held["penalty"],
+        leash=leash,
     )
