@@ -110,9 +110,8 @@ def control_frame(
         believed = believed and s.passed[side] > 0
     seen = _in_sight(markers, control_map.link, control_map.need)
     status = _read_pose(
-        problem, s, constants, q, markers, dt, believed, seen_before,
-        np.isfinite(residual), cavity_work, rotation, position, weights, place, c,
-        deviations,
+        problem, s, constants, q, dt, believed, seen_before, np.isfinite(residual),
+        cavity_work, rotation, position, weights, place, c, deviations,
     )  # fmt: skip
     return residual, worst, intermarker, iterations, converged, seen, status
 
@@ -149,9 +148,8 @@ def recorded_signals(
         n_seen, _ = take_markers(problem.marker_weight, markers[i], s.weight, s.target)
         errors_at(problem, s, q[i])
         _read_pose(
-            problem, s, constants, q[i], markers[i], dt[i], believed[i], seen_before,
-            n_seen > 0, cavity_work, rotation, position, weights, place, c[i],
-            deviations[i],
+            problem, s, constants, q[i], dt[i], believed[i], seen_before, n_seen > 0,
+            cavity_work, rotation, position, weights, place, c[i], deviations[i],
         )  # fmt: skip
 
 
@@ -161,7 +159,6 @@ def _read_pose(
     s: Scratch,
     constants: FrameConstants,
     q: Array,
-    markers: Array,
     dt: float,
     believed: bool,
     seen_before: Array,
@@ -179,7 +176,8 @@ def _read_pose(
     Of intent what hidden markers shift is taken off; the paper's is as the pose says.
     """
     paths, _, control_map, intent, segments = constants
-    memory, hand = seen_before[: len(markers)], seen_before[len(markers) :]
+    n_markers = len(segments.of_marker)
+    memory, hand = seen_before[:n_markers], seen_before[n_markers:]
     place_frames(paths, q[7:].reshape(1, len(q) - 7), rotation, position)
     ends = control_map.ends
     for k in range(3):
@@ -198,9 +196,7 @@ def _read_pose(
         by_map = k > 0 or len(intent.numbers) == 0
         shifted = not by_map and intent.numbers[LEASH] > 0
         if not by_map:
-            link, need = control_map.link, control_map.need
-            # The last of the links is the hand.
-            known = believed and _shown(markers, link, need, len(need) - 1)
+            known = believed and _shows_hand(s.weight, control_map)
             c[k], taught = _intent(
                 intent, q[7:], rotation, position, hand, known, s.gradient[6:]
             )
@@ -257,20 +253,24 @@ def _intent(
 @compiled
 def _in_sight(markers: Array, link: Indices, need: Indices) -> bool:
     for i in range(len(need)):
-        if not _shown(markers, link, need, i):
+        seen = 0
+        for m in range(len(link)):
+            total = markers[m, 0] + markers[m, 1] + markers[m, 2]
+            if link[m] == i and np.isfinite(total):
+                seen += 1
+        if seen < need[i]:
             return False
     return True
 
 
 @compiled
-def _shown(markers: Array, link: Indices, need: Indices, i: int) -> bool:
-    """Whether enough markers of link i are seen."""
-    seen = 0
+def _shows_hand(weight: Array, control_map: ControlMap) -> bool:
+    """Whether enough markers of the hand, the last of the links, have a weight (M,)."""
+    link, last, seen = control_map.link, len(control_map.need) - 1, 0
     for m in range(len(link)):
-        total = markers[m, 0] + markers[m, 1] + markers[m, 2]
-        if link[m] == i and np.isfinite(total):
+        if link[m] == last and weight[m] > 0:
             seen += 1
-    return seen >= need[i]
+    return seen >= control_map.need[last]
 
 
 @compiled
