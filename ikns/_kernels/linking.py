@@ -1,9 +1,10 @@
 """Calls of kernels by name, as between the object files of a C program.
 
 Numba copies into a function all that it calls, and what that calls in turn, and
-optimizes and translates it all once more: that was more than half of all compiling. Here a kernel has only the names of those that it calls,
-and each is compiled once. LLVM's loader finds them in what was loaded before. Only
-small ones are copied, where a call would take longer than what they do.
+optimizes and translates it all once more: that was more than half of all compiling.
+Here a kernel has only the names of those that it calls, and each is compiled once.
+LLVM's loader finds them in what was loaded before. Only small ones are copied, where a
+call would take longer than what they do.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import importlib
 from collections.abc import Callable
 from typing import Any
 
-from numba.core.compiler import Compiler, CompileResult
+from numba.core.compiler import Compiler
 
 #: LLVM's instructions up to which a kernel is copied. With 100 a frame took 6 % longer.
 _SMALL = 250
@@ -68,14 +69,14 @@ def call_by_name(kernel: Any) -> None:
     kernel.get_call_template = of_values
 
 
-def _is_small(result: CompileResult) -> bool:
+def _is_small(result: Any) -> bool:
     library = result.library
     module = library._shared_module or library._final_module
     function = module.get_function(result.fndesc.mangled_name)
     return sum(1 for block in function.blocks for _ in block.instructions) <= _SMALL
 
 
-def called_by(result: CompileResult) -> Called:
+def called_by(result: Any) -> Called:
     """Return which kernels a compiled one calls by name."""
     return {
         function.name: _KNOWN[function.name]
