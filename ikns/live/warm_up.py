@@ -30,7 +30,7 @@ def compiled_before() -> bool:
 def warm_up(progress: Callable[[str, int, int], None] | None = None) -> float:
     """Run every kernel once, so that none is compiled while a robot is waiting.
 
-    The first call on a machine, and after an update, compiles for about a minute, half
+    The first call on a machine, and after an update, compiles for half a minute, a part
     of it in a second process; later calls load the compiled kernels.
 
     Parameters
@@ -50,7 +50,7 @@ def warm_up(progress: Callable[[str, int, int], None] | None = None) -> float:
     True
     """
     start = time.perf_counter()
-    steps = (*_BODY_STEPS, *_MAP_STEPS, _frame)
+    steps = (*_BODY_STEPS, *_MAP_STEPS)
     process = None
     if not compiled_before():
         script = "from ikns.live.warm_up import run_map_kernels; run_map_kernels()"
@@ -117,5 +117,6 @@ def _frame() -> None:
     FrameSolver(body, _map(), "right_arm", readout=readout).solve(markers)
 
 
-_BODY_STEPS: Sequence[Callable[[], None]] = (_markers, _hands)
+#: When they come to the last, the second process has the weights that it needs.
+_BODY_STEPS: Sequence[Callable[[], None]] = (_markers, _hands, _frame)
 _MAP_STEPS: Sequence[Callable[[], None]] = (_neighbors, _null_spaces)
