@@ -23,7 +23,7 @@ _RECORDINGS = (
     "truth.json",
     "truth.urdf",
 )
-#: Measured on two cores: 8 to 10 s, and 30 to 40 s for compiling.
+#: Measured on two cores: 8 to 10 s, and 25 to 30 s for compiling.
 _ANNOUNCED = (
     "Simulates a calibration, learns from its files and draws a report: about 10 s, "
     "the very first time half a minute more.\n"

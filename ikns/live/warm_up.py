@@ -12,6 +12,7 @@ import numpy as np
 from ikns._kernels.cache_folder import can_keep, on_disk
 from ikns.body.skeleton import Skeleton
 from ikns.motion.marker_ik import MarkerIK
+from ikns.motion.marker_ik.label_changes import label_changes
 from ikns.nullspace.interpolation import NaturalNeighborInterpolator
 from ikns.nullspace.map import NullSpaceMap
 from ikns.numerics.subspace import principal_angles
@@ -67,8 +68,12 @@ def warm_up(progress: Callable[[str, int, int], None] | None = None) -> float:
 
 
 def run_map_kernels() -> None:
-    """Run the kernels of interpolation and null spaces."""
-    for step in _MAP_STEPS:
+    """Run the kernels of interpolation and null spaces.
+
+    And those of labels that change places, which recordings need and a live loop does
+    not: the process has time left.
+    """
+    for step in (*_MAP_STEPS, _labels):
         step()
 
 
@@ -96,6 +101,10 @@ def _neighbors() -> None:
     interpolator(many)
     interpolator.inside(many)
     _map().control_signal(np.zeros(7), one)
+
+
+def _labels() -> None:
+    label_changes(np.arange(3.0), np.zeros((3, 2, 3)))
 
 
 def _map() -> NullSpaceMap:

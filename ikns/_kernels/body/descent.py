@@ -94,8 +94,7 @@ def descend(
     enough = max(tolerance, _NEWTON * np.sqrt(tolerance))
     cost = distance = np.inf
     damping, iterations = 0.0, -1
-    definite = true_hessian = True
-    converged = rejected = False
+    definite, true_hessian, converged, rejected = True, True, False, False
     copy(s.q, s.trial)
     while True:
         # Written out, as passing `problem` and `s` on would take 5 % longer.
@@ -166,9 +165,8 @@ def descend(
         largest = _largest(s.step)
         integrate(tree, s.q, s.step, s.trial)
         # Without the true Hessian a small step proves less, unless there is no other.
-        converged = largest < (enough if true_hessian else tolerance)
-        if definite and not true_hessian:
-            converged = converged and damping > 1e-3
+        small = largest < (enough if true_hessian else tolerance)
+        converged = small and (true_hessian or not definite or damping > 1e-3)
     if rejected:
         errors_at(problem, s, s.q)
     return np.sqrt(distance / n_seen), iterations, converged
