@@ -4,6 +4,8 @@ Faults are planted in bodies that tumble by SciPy's rotations, and in real recor
 markers alone; no body of the toolkit takes part.
 """
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -24,6 +26,7 @@ from ikns.calibration.judge.offsets import (
 )
 from ikns.calibration.judge.recordings import check_recordings
 from ikns.calibration.measured_body import measured_body
+from ikns.errors import InvalidInput
 from ikns.recording.files import read
 from ikns.recording.recording import Recording
 
@@ -175,6 +178,28 @@ def test_a_cluster_of_another_shape_is_named_with_its_segment():
     assert set(told.markers) == {"RUAR1", "RUAR2", "RUAR3", "RUAR4"}
 
 
+JSON = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.text(max_size=3),
+    lambda part: st.lists(part, max_size=3) | st.dictionaries(st.text(), part),
+    max_leaves=6,
+)
+
+
+@given(found=JSON)
+def test_what_a_damaged_folder_says_of_offsets_is_whole_or_refused(found):
+    offsets = {}
+    with suppress(InvalidInput):
+        offsets = usual_fit({"offsets_m": found}).offsets
+        assert len(offsets) == len(found)
+    assert all(np.isfinite(ends).all() for ends in offsets.values())
+
+
+@pytest.mark.parametrize("ends", ["x", [[1.0]], [[None, 0, 0], [1, 1, 1]], None])
+def test_offsets_of_another_shape_are_refused(ends):
+    with pytest.raises(InvalidInput, match=r"offsets_m in calibration\.json: expected"):
+        usual_fit({"offsets_m": {"right_hand": ends}})
+
+
 @settings(max_examples=15, deadline=None)
 @given(seed=SEEDS)
 def test_markers_that_shift_together_have_that_offset(seed):
@@ -210,13 +235,10 @@ def test_markers_that_shift_together_have_that_offset(seed):
 
 def test_what_reports_do_not_say_is_left_out():
     assert usual_fit({}) == (None, {})
-    assert usual_fit({"explorations": 3, "offsets_m": [1], "rewear": None}) == (
-        None,
-        {},
-    )
+    assert usual_fit({"explorations": 3, "rewear": None}) == (None, {})
     rows = [{"residual_median_m": 0.01}, {"residual_median_m": None}, "x"]
     ends = [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]
-    found = usual_fit({"explorations": rows, "offsets_m": {"a": ends, "b": [[1.0]]}})
+    found = usual_fit({"explorations": rows, "offsets_m": {"a": ends}})
     assert found.residual == 0.01
     assert list(found.offsets) == ["a"]
 

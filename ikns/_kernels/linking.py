@@ -12,6 +12,7 @@ from __future__ import annotations
 import gc
 import importlib
 from collections.abc import Callable
+from itertools import islice
 from typing import Any
 
 from numba.core.compiler import Compiler
@@ -74,7 +75,8 @@ def _is_small(result: Any) -> bool:
     library = result.library
     module = library._shared_module or library._final_module
     function = module.get_function(result.fndesc.mangled_name)
-    return sum(1 for block in function.blocks for _ in block.instructions) <= _SMALL
+    instructions = (each for block in function.blocks for each in block.instructions)
+    return next(islice(instructions, _SMALL, None), None) is None
 
 
 def called_by(result: Any) -> Called:

@@ -17,6 +17,7 @@ from ikns.arrays import Array
 from ikns.body.chains import SIDES, ChainLike, chain_sides
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.finding import Finding
+from ikns.errors import InvalidInput
 from ikns.motion.marker_ik import turned_markers
 from ikns.motion.motion import Motion
 from ikns.numerics.rigid import quaternion_matrix
@@ -52,20 +53,36 @@ def usual_fit(report: Mapping[str, Any]) -> UsualFit:
 
     After :func:`ikns.rewear` the new wearing counts. What the report of an older
     calibration does not say is left out.
+
+    Raises
+    ------
+    InvalidInput
+        When offsets are not what :func:`offsets_report` writes.
     """
     worn_again = report.get("rewear")
     rows = worn_again.get("natural") if isinstance(worn_again, Mapping) else None
     rows = rows or report.get("explorations")
     rows = rows if isinstance(rows, list) else []
     known = [row.get("residual_median_m") for row in rows if isinstance(row, Mapping)]
-    found = report.get("offsets_m")
-    offsets = {
-        str(link): np.asarray(ends, dtype=np.float64)
-        for link, ends in (found.items() if isinstance(found, Mapping) else ())
-    }
     return UsualFit(
         max((float(one) for one in known if isinstance(one, float)), default=None),
-        {link: ends for link, ends in offsets.items() if ends.shape == (2, 3)},
+        _offsets(report.get("offsets_m", {})),
+    )
+
+
+def _offsets(found: object) -> dict[str, Array]:
+    try:
+        offsets = {
+            str(link): np.array(ends, dtype=np.float64)
+            for link, ends in dict(found).items()  # type: ignore[call-overload]
+        }
+    except (TypeError, ValueError):
+        offsets = {"": np.empty(0)}
+    if all(e.shape == (2, 3) and np.isfinite(e).all() for e in offsets.values()):
+        return offsets
+    raise InvalidInput(
+        "offsets_m in calibration.json: expected for each segment its lowest and "
+        f"highest offset, three numbers each, found {str(found)[:60]}; calibrate again."
     )
 
 
