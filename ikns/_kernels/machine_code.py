@@ -40,8 +40,8 @@ class KernelCache:
     function : callable
         The kernel, not compiled.
     folder : Path
-        For these very sources, see :func:`ikns._kernels.compiled.compiled`; exists, and
-        nobody else can write to it: what is loaded is run.
+        For these very sources, see :func:`ikns._kernels.cache_folder.cache_folder`;
+        exists, and no one else can write to it: what is loaded is run.
     """
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:

@@ -147,7 +147,7 @@ def _left_out(
 ) -> list[str]:
     """Name markers, of the chain or seen later, that the static trial lacks.
 
-    The other arm's may be missing from all of them: nobody asked for it.
+    The other arm's may be missing from all of them: no one asked for it.
     """
     own = ("thorax", *chain_sides(chain))
     counts = np.array([marker.link.startswith(own) for marker in worn.markers])

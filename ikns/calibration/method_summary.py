@@ -118,7 +118,7 @@ def method_summary(
 def no_range_learned(summary: dict[str, Any]) -> str:
     """Say that reaches move c by more than its range, whatever the method; or nothing.
 
-    Then nobody turned the elbow with the hand held: the range that was learned is that
+    Then no one turned the elbow with the hand held: the range that was learned is that
     of small movements, or of noise.
     """
     counts, rows = summary["reaches"], summary["methods"].values()

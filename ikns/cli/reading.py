@@ -104,7 +104,7 @@ def reads_markers(command: Callable[..., None]) -> Callable[..., None]:
 
         command(read=read, **values)
 
-    # Typer reads the options from here, and nobody from the command below.
+    # Typer reads the options from here, and no one from the command below.
     del run.__wrapped__
     run.__signature__ = own.replace(parameters=parameters)
     run.__annotations__ = {p.name: p.annotation for p in parameters}

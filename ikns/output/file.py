@@ -190,7 +190,7 @@ def _write_part(path: Path, content: bytes) -> Path:
             os.fsync(file.fileno())
     except OSError as error:
         part.unlink(missing_ok=True)
-        # The hidden name tells nobody anything.
+        # The hidden name tells no one anything.
         raise OSError(error.errno, error.strerror, str(path)) from None
     except BaseException:
         part.unlink(missing_ok=True)

@@ -83,7 +83,7 @@ def between(
     low = -np.inf if start is None else start
     high = np.inf if end is None else end
     check_order(recording.source, low, high)
-    # A moment that was typed in lies a rounding beside the frame that it means.
+    # A moment that was typed in lies a rounding off the frame that it means.
     rounding = 1e-6
     kept = (time >= low - rounding) & (time <= high + rounding)
     if not kept.any():

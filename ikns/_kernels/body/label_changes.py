@@ -128,7 +128,7 @@ def _keep_cycles(came: Indices) -> bool:
             if came[m] != m:
                 taken[came[m]] += 1
         for m in range(n):
-            # Whose place nobody took, or whose new place others took too, or had kept.
+            # Whose place no one took, or whose new place others took too, or had kept.
             alone = taken[m] != 1 or taken[came[m]] != 1 or came[came[m]] == came[m]
             if came[m] != m and alone:
                 came[m], again = m, True

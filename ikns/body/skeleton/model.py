@@ -47,7 +47,7 @@ def build_model(urdf: str) -> pin.Model:
 def upper_body_model(urdf: str) -> pin.Model:
     """Build the model of an upper body; other links and joints are a FileError.
 
-    Nobody changes it, so bodies that differ in their markers share it.
+    No one changes it, so bodies that differ in their markers share it.
     """
     model = build_model(urdf)
     joints = set(tuple(model.names)[2:])

@@ -32,7 +32,7 @@ from ikns.recording.recording import Recording
 #: the whole body, m: as much as markers are misplaced on the skin (10 mm for most of a
 #: set). Eight real static trials have 0.3 to 3.2 mm, simulated ones 2 to 7 mm.
 STILL_MARKERS = 0.010
-#: Beyond these nobody is; between them and the likely ones it is said, but used.
+#: Beyond these no one is; between them and the likely ones it is said, but used.
 _IMPOSSIBLE_OFFSET, _IMPOSSIBLE_BEYOND = 10.0, np.radians(30.0)
 #: Whatever a marker set promises, hands misplace markers by this much, m, and by no
 #: more than this.

@@ -9,7 +9,7 @@ from ikns.arrays import Array, Mask
 #: Two markers are never this close, m: half of the smallest sold, 1.5 mm. Recordings
 #: name one place twice when they write a number for "not seen".
 _SAME_PLACE = 1e-6
-#: Nobody is this far from the middle of the markers, m.
+#: No one is this far from the middle of the markers, m.
 _FAR = 15.0
 #: A marker is frozen when all three coordinates stay equal for so long, s and frames,
 #: while the nearest markers go this far, m.

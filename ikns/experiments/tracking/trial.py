@@ -138,7 +138,7 @@ class TrackingTrial:
         return self._view()
 
     def add_samples(self, times: Iterable[float], c: Iterable[float]) -> None:
-        """Take many samples, for which nobody looks at the screen."""
+        """Take many samples, for which no one looks at the screen."""
         for now, each in zip(times, c, strict=True):
             self._take(now, each)
 

@@ -176,7 +176,7 @@ class RosNode:
         return [each for each in found if each and each.node != self._name]
 
     def _ask_router(self) -> None:
-        """Ask it for a token that nobody has: only it can say that there is none."""
+        """Ask it for a token that no one has: only it can say that there is none."""
         asked = time.monotonic()
         failed: list[Any] = []
 

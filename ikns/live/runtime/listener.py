@@ -17,7 +17,7 @@ class LoopListener(Protocol):
     def decision(self, received: float, decision: Decision, markers: Array) -> None:
         """Take the result of a frame, received at a time, once it was commanded.
 
-        The markers are those that were used, (M, 3) m in the world; nobody changes them
+        The markers are those that were used, (M, 3) m in the world; no one changes them
         any more.
         """
 

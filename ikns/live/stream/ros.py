@@ -53,7 +53,7 @@ class RosFeed(ClientFeed):
     Raises
     ------
     StreamError
-        When no router answers, or nobody publishes markers on the topic, or none that
+        When no router answers, or no one publishes markers on the topic, or none that
         have names, or with stamps that do not advance.
     """
 

@@ -148,7 +148,7 @@ def _points(path: Path, layout: C3dLayout, rate: float) -> NDArray[np.float32]:
 def _padding(raw: bytes, frame_bytes: int, available: int) -> int:
     """Return how many frames at the end are zeros that fill the last block of a file.
 
-    They look like frames in which nobody is seen. Where the frames fill their last
+    They look like frames in which no one is seen. Where the frames fill their last
     block, ezc3d adds a whole one.
     """
     if available % BLOCK:

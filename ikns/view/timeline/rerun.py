@@ -115,7 +115,7 @@ def check_rrd(
     ----------
     file : Path
     force : bool, optional
-        Whether it may be replaced; None where nobody can say so.
+        Whether it may be replaced; None where no one can say so.
     inputs : iterable of Path or None
         What is read, and never replaced.
 
