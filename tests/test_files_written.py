@@ -1,6 +1,7 @@
 """TRC, CSV, MOT and STO written and read; one format into another."""
 
 import importlib.util
+import os
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
@@ -118,8 +119,13 @@ def markers_by_the_book(path):
 
 
 def in_a_process(function, path):
-    """OpenSim does not load beside the CasADi that other tests have loaded."""
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    """OpenSim does not load next to the CasADi that other tests have loaded.
+
+    It writes its log where it is loaded: in the folder of `path`.
+    """
+    with ProcessPoolExecutor(
+        1, get_context("spawn"), initializer=os.chdir, initargs=(path.parent,)
+    ) as pool:
         return pool.submit(function, path).result()
 
 

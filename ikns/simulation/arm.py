@@ -11,17 +11,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from ikns._kernels.body.paths import Paths
 from ikns._kernels.body.reach import reach_poses
 from ikns._kernels.body.self_motion import follow_self_motion
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 #: Hand pose error at which Newton's method stops, m and rad: a thousandth of the 0.1 mm
 #: that cameras resolve, far above rounding.

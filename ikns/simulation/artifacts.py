@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.simulation.wander import wander
-
-Array = NDArray[np.float64]
 
 #: Shares of the variance: the cluster moves as one, each marker moves with the posture,
 #: each marker moves slowly at random. Translations and rotations of the whole

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ikns._kernels.body.simulated_markers import write_markers, write_posture
+from ikns.arrays import Array
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.simulation.arm import ArmKinematics, SelfMotion
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.trial import SEATED_SWAY, place_in_room, still_joints
-
-Array = NDArray[np.float64]
 
 #: Height of the thorax frame, m: no result depends on it.
 _HEIGHT = 1.0

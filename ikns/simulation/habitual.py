@@ -7,16 +7,14 @@ decides forearm and wrist, as far as they turn.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.nullspace.hinge_swivel import arm_swivel
 from ikns.simulation.arm import GIRDLE_FOLLOW, ArmKinematics, girdle
 from ikns.simulation.posture_habits import PostureHabits, draw_hands
-
-Array = NDArray[np.float64]
 
 #: Distance from all joint limits, rad: a little room for drift.
 _ROOM = np.radians(3.0)

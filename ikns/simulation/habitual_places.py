@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.nullspace.hinge_swivel import arm_swivel
 from ikns.simulation.arm import ArmKinematics
@@ -29,8 +29,6 @@ from ikns.simulation.places import (
 )
 from ikns.simulation.posture_habits import PostureHabits
 from ikns.simulation.wander import minimum_jerk
-
-Array = NDArray[np.float64]
 
 #: People hold the hand 4 to 6 cm off the corners of the box that they are shown; normal
 #: errors of 3 cm an axis are 4.8 cm in the mean.

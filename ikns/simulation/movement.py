@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from ikns.arrays import Array
 from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.places import Place
 from ikns.simulation.wander import minimum_jerk, tremor, wander
-
-Array = NDArray[np.float64]
 
 #: Range of the swivel frequency in exploration, Hz: a comfortable pace (assumption).
 SWIVEL_HZ = (0.3, 0.6)

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.simulation.arm import (
     GIRDLE_FOLLOW,
@@ -23,8 +23,6 @@ from ikns.simulation.arm import (
     girdle,
     self_motion,
 )
-
-Array = NDArray[np.float64]
 
 #: Corners of the box from the shoulder joint, in arm lengths (shoulder to knuckles):
 #: forward, up, and outwards. In a hundred subjects, on both arms, the elbow can swivel

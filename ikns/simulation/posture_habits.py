@@ -15,13 +15,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.errors import FileError
 from ikns.nullspace.posture_terms import MIDDLE, UNIT, quadratic_terms
-
-Array = NDArray[np.float64]
 
 _PEOPLE = Path(__file__).with_name("posture_habits.toml")
 #: Share of the diagonal in the covariance: 14 arms do not determine 28 coefficients.

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.simulation.arm import GIRDLE_FOLLOW, ArmKinematics
 from ikns.simulation.artifacts import SoftTissue
@@ -22,8 +23,6 @@ from ikns.simulation.posture_habits import PostureHabits, draw_posture_habits
 from ikns.simulation.protocol_body import draw_protocol_body
 from ikns.simulation.subject import VirtualSubject
 from ikns.simulation.trial import Trial, record_trial
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

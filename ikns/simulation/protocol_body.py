@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.simulation.arm import ArmKinematics
@@ -18,8 +18,6 @@ from ikns.simulation.places import VERTEX_SD, Place, box_points, explored_places
 from ikns.simulation.posture_habits import PostureHabits
 from ikns.simulation.subject import VirtualSubject
 from ikns.simulation.trial import SEATED_SWAY, place_in_room, still_joints
-
-Array = NDArray[np.float64]
 
 #: Height of the jugular notch over the floor, share of stature, standing and on a chair
 #: (assumptions; no result depends on them).

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.body.skeleton import Robot
 from ikns.errors import InvalidInput
 from ikns.simulation.wander import wander
-
-Array = NDArray[np.float64]
 
 #: Pose error at which Newton's method stops, m and rad: far above rounding, far below
 #: what can be measured.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.body.chains import SIDES
 from ikns.body.skeleton import Skeleton
 from ikns.motion.motion import Motion
@@ -17,8 +18,6 @@ from ikns.recording.recording import Recording
 from ikns.simulation.arm import ArmKinematics
 from ikns.simulation.artifacts import SoftTissue, occlusions
 from ikns.simulation.wander import wander
-
-Array = NDArray[np.float64]
 
 #: Sway of the trunk on a chair, m and rad, standard deviations per axis: small, as the
 #: protocol asks not to move the torso (assumption).

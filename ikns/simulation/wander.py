@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 #: Physiological tremor of the arm, Hz.
 _TREMOR_BAND = (8.0, 12.0)

@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.statistics.pairs import Pairs, pair_trials
 from ikns.statistics.paper import SUBJECTS, TIME, subject_spread_limit
 from ikns.statistics.power import Spread
 from ikns.statistics.table import Table, column, labels, numbers
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,12 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import gammaln, nctdtrinc
 
+from ikns.arrays import Array
 from ikns.output.wording import interval_text, number
 from ikns.statistics.pairs import Pairs
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

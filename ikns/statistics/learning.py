@@ -20,11 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.output.wording import number
 from ikns.statistics.table import Table, column, finite_values, labels
-
-Array = NDArray[np.float64]
 
 MODELS = ("constant", "exponential", "power law")
 #: Trials a person needs: AICc of four parameters (with the noise) is finite from 6 on.

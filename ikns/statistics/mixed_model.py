@@ -23,12 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from ikns.arrays import Array
 from ikns.output.wording import interval_text, number, p_text
 from ikns.statistics.library import statsmodels
 from ikns.statistics.model_design import comparable_trials, fixed_effects
 from ikns.statistics.table import Table
-
-Array = NDArray[np.float64]
 
 _FULL = "random intercept and condition per subject"
 _UNCORRELATED = "random intercept and condition per subject, uncorrelated"

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.statistics.table import Table, column, finite_values, labels, two_conditions
-
-Array = NDArray[np.float64]
 
 
 class ComparableTrials(NamedTuple):

@@ -12,10 +12,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.statistics.table import Table, column, finite_values, labels, two_conditions
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.output.wording import number
 from ikns.statistics.equivalence import checked_margin
 
-Array = NDArray[np.float64]
 Analysis = Literal["subject means", "pooled"]
 #: Largest number of normal draws held at once.
 _CHUNK = 2_000_000

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 
-Array = NDArray[np.float64]
 Table = Mapping[str, Sequence[Any] | NDArray[Any]]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ikns._kernels.body.tree import Tree
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike, chain_joints, chain_sides
 from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput
@@ -24,7 +25,6 @@ from ikns.symbolic.kinematics import (
 )
 from ikns.symbolic.volumes import Capsule, arm_pairs, capsules, distance
 
-Array = NDArray[np.float64]
 Pair = tuple[Capsule, Capsule]
 
 

@@ -20,8 +20,9 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Robot, Skeleton
 from ikns.errors import InvalidInput
@@ -31,7 +32,6 @@ from ikns.symbolic.posture import Start, binding, start_of
 from ikns.symbolic.programs import NODES, Climber, Sweeper
 from ikns.symbolic.results import AvailableRange, Sweep
 
-Array = NDArray[np.float64]
 #: A posture or postures, active limits, whether it is a solution, optimizer status.
 Found = tuple[Array, tuple[str, ...], bool, str]
 

@@ -10,16 +10,15 @@ from collections.abc import Mapping, Sequence
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns._kernels.body.tree import FREE_FLYER, PRISMATIC, Tree
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike, as_chain, chain_joints
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 from ikns.body.skeleton.markers import part_along
 from ikns.errors import InvalidInput
 
-Array = NDArray[np.float64]
 #: Rotation (3, 3) and translation (3, 1), m, as expressions.
 Pose = tuple[ca.SX, ca.SX]
 #: A frame fixed to a joint of a tree: joint, rotation (3, 3), translation (3,) m.

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.marker_set import MarkerSet
 from ikns.body.model_file import SEGMENTS, relative_sizes
 from ikns.body.skeleton import Skeleton
@@ -40,8 +41,6 @@ from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.marker_ik import MarkerIK
 from ikns.recording.recording import Recording
 from ikns.symbolic.length_program import FrameData, LengthProgram, Solution
-
-Array = NDArray[np.float64]
 
 #: Fewer frames than this are refused.
 MIN_FRAMES = 10

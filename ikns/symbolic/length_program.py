@@ -13,16 +13,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
+from ikns.arrays import Array
 from ikns.body.model_file import SEGMENTS
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.size_fit import size_covariance
 from ikns.symbolic.kinematics import sized_markers
-
-Array = NDArray[np.float64]
 
 _IPOPT: dict[str, Any] = {
     "print_level": 0,

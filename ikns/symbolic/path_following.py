@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ikns.arrays import Array
+
 Function = Callable[[Array], Array]
 
 #: Step along the curve, rad of joint-space length.

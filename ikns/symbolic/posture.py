@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ikns._kernels.body.tree import PRISMATIC
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.symbolic.chain import ChainModel, Held
-
-Array = NDArray[np.float64]
 
 #: A limit or volume is active when less than this is left, rad and m: a thousand times
 #: the optimizer's tolerance.

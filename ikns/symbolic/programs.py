@@ -10,11 +10,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.symbolic.chain import ChainModel, Held
-
-Array = NDArray[np.float64]
 
 #: IPOPT without its output, to 1e-9 in meters and radians; a warm start stays near.
 IPOPT: dict[str, Any] = {

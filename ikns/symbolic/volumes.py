@@ -15,12 +15,10 @@ from math import ceil
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 #: Part of the upper arm next to the shoulder that is not kept off the trunk, which it
 #: touches in the armpit whatever the posture.

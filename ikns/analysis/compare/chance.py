@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import betaincinv
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.numerics.subspace import principal_angles
-
-Array = NDArray[np.float64]
 
 #: Draws where there is no closed form.
 _DRAWS = 4000

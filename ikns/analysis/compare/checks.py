@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.nullspace.map.checks import checked_map
 from ikns.numerics.subspace import null_spaces
-
-Array = NDArray[np.float64]
 
 
 class CheckedSamples(NamedTuple):

@@ -19,12 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 COORDINATES = ("internal", "isb", "rotation_vector")
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.map_samples import (
@@ -18,13 +17,12 @@ from ikns.analysis.compare.map_samples import (
 )
 from ikns.analysis.compare.reaching import Crosstalk, crosstalk
 from ikns.analysis.compare.samples import NullSpaceComparison
+from ikns.arrays import Array
 from ikns.body.chains import SIDES, ChainLike, as_chain, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
 from ikns.nullspace.map import NullSpaceMap, still_mask
-
-Array = NDArray[np.float64]
 
 _SHOULDER = ("shoulder_abduction", "shoulder_flexion", "shoulder_rotation")
 

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.numerics.subspace import mean_null_direction, principal_angles
-
-Array = NDArray[np.float64]
 
 #: Half a step along Z for the derivative of the hand's pose, rad: its error is of the
 #: order of the step squared (1e-10 m/rad), that of rounding 1e-16 m over the step.

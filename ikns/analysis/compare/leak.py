@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ikns.analysis.compare.resampling import draw
+from ikns.arrays import Array
 from ikns.numerics.bootstrap import length_estimate
-
-Array = NDArray[np.float64]
 
 
 class HandSlope(NamedTuple):

@@ -12,11 +12,10 @@ from ikns.analysis.compare.coordinates import Coordinates, shoulder_coordinates
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.samples import NullSpaceComparison, compare_samples
 from ikns.analysis.compare.subspaces import learned_directions
+from ikns.arrays import Array
 from ikns.errors import NotEnoughData
 from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap
-
-Array = NDArray[np.float64]
 
 
 class MapSamples(NamedTuple):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ikns.analysis.compare.leak import hand_turns, slope_scores, slopes
 from ikns.analysis.compare.resampling import draw
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike
 from ikns.errors import InvalidInput
 from ikns.motion.motion import Motion
@@ -16,8 +17,6 @@ from ikns.nullspace.clustering import nearest_center
 from ikns.nullspace.map import NullSpaceMap, null_space_samples, still_mask
 from ikns.numerics.bootstrap import LengthEstimate, length_estimate
 from ikns.numerics.subspace import principal_angles
-
-Array = NDArray[np.float64]
 
 #: Fewer samples have no interval.
 _LEAST = 10

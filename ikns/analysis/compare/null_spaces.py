@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.resampling import Moments
@@ -18,10 +17,9 @@ from ikns.analysis.compare.subspaces import (
     compare_subspaces,
     span_covariance,
 )
+from ikns.arrays import Array
 from ikns.numerics.bootstrap import student_interval
 from ikns.numerics.subspace import null_space, null_spaces
-
-Array = NDArray[np.float64]
 
 
 class NullSpaces(NamedTuple):

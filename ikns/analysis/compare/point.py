@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns.analysis.compare.chance import chance_inside
 from ikns.analysis.compare.checks import CheckedSamples
@@ -26,9 +25,8 @@ from ikns.analysis.compare.null_spaces import (
 )
 from ikns.analysis.compare.resampling import resampled_moments
 from ikns.analysis.compare.subspaces import Subspaces, angle_estimate, share_interval
+from ikns.arrays import Array
 from ikns.numerics.bootstrap import length_estimate
-
-Array = NDArray[np.float64]
 
 
 def compare_point(

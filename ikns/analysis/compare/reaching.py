@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.motion.reaches import find_reaches
 from ikns.numerics.bootstrap import block_counts, blocks_for, student_interval
-
-Array = NDArray[np.float64]
 
 #: Neighboring reaches share the rest between them, so their changes are correlated, by
 #: 0.22 for normally distributed c at unrelated rests. Then G / g(0) of

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.numerics.bootstrap import block_counts, blocks_for
-
-Array = NDArray[np.float64]
 
 
 class Moments(NamedTuple):

@@ -18,8 +18,7 @@ from ikns.analysis.compare.chance import chance_angles
 from ikns.analysis.compare.checks import checked_samples
 from ikns.analysis.compare.kinematics import Kinematics
 from ikns.analysis.compare.point import compare_point, pool
-
-Array = NDArray[np.float64]
+from ikns.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.numerics.bootstrap import LengthEstimate, length_estimate, student_interval
 from ikns.numerics.subspace import principal_angles
-
-Array = NDArray[np.float64]
 
 
 class Subspaces(NamedTuple):

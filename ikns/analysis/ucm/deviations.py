@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
-
-Array = NDArray[np.float64]
 
 #: A joint that moves less than this share of its largest angle is constant but for
 #: rounding, which leaves 1e-16.

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from ikns.analysis.ucm.split import VarianceSplit, half_log_ratio, parts
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.numerics.bootstrap import block_counts, blocks_for, student_interval
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

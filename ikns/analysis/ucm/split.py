@@ -26,10 +26,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ikns.analysis.ucm.deviations import check_joints, check_trials, mean_jacobian
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.numerics.subspace import null_spaces
-
-Array = NDArray[np.float64]
 
 #: A part of the squares below this share is what rounding leaves of zero: a deviation
 #: is projected with an error of some 1e-15 of its length, so its square with 1e-30.

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns.analysis.ucm.split import VarianceSplit, half_log_ratio, sums_of_squares
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 #: Differences of dVz up to this are rounding: the same trials summed in another order.
 _SAME = 1e-9

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike, as_chain, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 
 def chain_task(

@@ -7,14 +7,13 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike
 from ikns.errors import InvalidInput, NotEnoughData, naming
 from ikns.motion.excursion import other_hand_moves
 from ikns.motion.motion import Motion
-
-Array = NDArray[np.float64]
 
 #: A time this part of a step from a sample is that sample's, but for rounding.
 _ON = 1e-9

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import chain_joints
 from ikns.errors import InvalidInput
 from ikns.experiments.picking.objects import PickObject, load_objects
@@ -33,8 +33,6 @@ from ikns.simulation.grasp import (
 from ikns.simulation.grasp.route import DOWN, EXTRA_RANGE, LIFT
 from ikns.simulation.movement import Unsteadiness, hand_drift, reach_seconds
 from ikns.simulation.operator import Operator, Participant
-
-Array = NDArray[np.float64]
 
 #: Conditions that a virtual participant can do.
 VIRTUAL_CONDITIONS = ("ikns", "ring")

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput, NotEnoughData
 from ikns.experiments.tracking.profiles import Profile
 from ikns.experiments.tracking.trial import TrackingRecord
-
-Array = NDArray[np.float64]
 
 #: Trials are resampled to this rate for lag and smoothness, 1/s.
 RATE = 100.0

@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 #: Peak speed of a minimum-jerk move over its mean speed (Flash and Hogan 1985).
 PEAK = 1.875

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.experiments.tracking.profiles import Profile
 
-Array = NDArray[np.float64]
 State = Literal["waiting", "align", "track", "done", "aborted"]
 
 #: Time to bring the pointer to the start of the profile, s (the paper's).

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
@@ -17,8 +17,6 @@ from ikns.live.calibration.protocol import LiveProtocol, ProtocolStep
 from ikns.live.calibration.targets import TargetPoints, direction_in_words
 from ikns.live.stream import Frame, Source
 from ikns.motion.marker_ik import MarkerIK
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

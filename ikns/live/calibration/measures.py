@@ -6,16 +6,14 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike
 from ikns.body.skeleton import Skeleton
 from ikns.calibration.judge.exploration import judge_exploration
 from ikns.motion.marker_ik.rejection import rejection_sentence
 from ikns.motion.motion import Motion
 from ikns.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 #: Smallest share of frames in which the arm is in sight.
 SEEN_SHARE = 0.5

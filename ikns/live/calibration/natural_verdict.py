@@ -29,8 +29,6 @@ from ikns.nullspace.readout.ends import swept_ends
 from ikns.nullspace.readout.intent import wrapped
 from ikns.recording.recording import Recording
 
-Array = NDArray[np.float64]
-
 #: Smallest share of the time in which the hand moves.
 _MOVING_SHARE = 0.5
 #: A place with less than this share of the usual width, and an end more than a tenth of

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ikns.analysis.compare.leak import slopes
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike, chain_joints
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import elbow_reference, two_arms_fault
@@ -33,8 +33,6 @@ from ikns.nullspace.map import MapWarning, NullSpaceMap, still_mask
 from ikns.nullspace.map.samples import samples_in
 from ikns.nullspace.natural_posture import NaturalPosture
 from ikns.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 #: Smallest share of samples with the hand still. A virtual person who holds the hand,
 #: with soft tissue artifacts, has 0.47 at the worst of ten points; a quarter of 5 s is

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.nullspace.clustering import (
     BoundingBox,
     box_surface_points,
     minimum_bounding_box,
 )
-
-Array = NDArray[np.float64]
 
 #: Components smaller than this share of the largest one are not mentioned.
 _LEAST_SHARE = 0.3

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.chains import ChainLike
 from ikns.body.marker_set import MarkerSet
 from ikns.body.skeleton import Skeleton
@@ -32,8 +33,6 @@ from ikns.motion.marker_ik import MarkerIK
 from ikns.motion.motion import Motion
 from ikns.nullspace.clustering import minimum_bounding_box
 from ikns.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 #: A hand that moves farther than this is not at one position, and two points closer
 #: than this are not two positions, m (a fifth of a small workspace; chosen here).

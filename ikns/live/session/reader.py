@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError, plain, unreadable
 from ikns.live.session.dataset import next_run, run_files
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.live.control.controller import Controller
 from ikns.live.control.frame import MAX_UNCERTAINTY, FrameSolver
 from ikns.live.control.settings import ControlSettings
@@ -18,8 +18,6 @@ from ikns.simulation.body_frames import BodyFrames
 from ikns.simulation.grasp.route import Route
 from ikns.simulation.operator.cohort import Participant
 from ikns.simulation.operator.loop import Delay
-
-Array = NDArray[np.float64]
 
 
 class CarriedArm:

@@ -6,8 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 
 # The motor is that of the simulated finger.
@@ -15,8 +16,6 @@ from ikns.finger.guard import Guard, Safety
 from ikns.finger.simulated import FOLLOW, SPEED, SPIN
 from ikns.simulation.grasp.parts import Solid, constant, finger_parts
 from ikns.simulation.grasp.world import world_model
-
-Array = NDArray[np.float64]
 
 
 class Observation(NamedTuple):

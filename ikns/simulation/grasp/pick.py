@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.finger.inputs import RingButton
 from ikns.simulation.grasp.carried_arm import CarriedArm
@@ -18,7 +19,6 @@ from ikns.simulation.grasp.physics import Grasp, Observation
 from ikns.simulation.operator.loop import Delay
 from ikns.simulation.operator.model import Operator
 
-Array = NDArray[np.float64]
 Outcome = Literal["success", "dropped", "timeout"]
 Feedback = Literal["finger", "signal"]
 

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.simulation.arm import ArmKinematics, SelfMotion, self_motion
 from ikns.simulation.artifacts import SoftTissue
 from ikns.simulation.body_frames import arm_rows
 from ikns.simulation.operator.cohort import Participant, tracking_place
 
-Array = NDArray[np.float64]
 Piece = tuple[Array, Array, Array]
 
 #: Positions of object and goal in the box of the calibration points, as shares forward

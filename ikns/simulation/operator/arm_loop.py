@@ -8,10 +8,10 @@ map -> c. The simulated body is independent of the map.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ikns._kernels.body.simulated_markers import write_cubic
+from ikns.arrays import Array
 from ikns.calibration.subject import Subject
 from ikns.errors import InvalidInput
 from ikns.live.control.controller import Controller
@@ -24,8 +24,6 @@ from ikns.simulation.body_frames import BodyFrames, arm_rows
 from ikns.simulation.movement import Unsteadiness, hand_drift
 from ikns.simulation.operator.loop import Delay
 from ikns.simulation.places import Place
-
-Array = NDArray[np.float64]
 
 
 class ArmLoop:

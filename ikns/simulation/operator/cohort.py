@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.body.skeleton import Skeleton
 from ikns.calibration import calibrate
 from ikns.calibration.subject import Subject
@@ -19,8 +19,6 @@ from ikns.simulation.operator.arm_loop import ArmLoop
 from ikns.simulation.places import Place, widest_place
 from ikns.simulation.protocol import Protocol, simulate_protocol
 from ikns.simulation.subject import virtual_subject
-
-Array = NDArray[np.float64]
 
 #: Largest number of persons drawn until one can do the protocol.
 _TRIES = 20

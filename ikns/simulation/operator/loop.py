@@ -8,12 +8,11 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.simulation.operator.model import Operator
-
-Array = NDArray[np.float64]
 
 
 class ControlledElement(Protocol):

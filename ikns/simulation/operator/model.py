@@ -18,13 +18,11 @@ import math
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
 from ikns.simulation.operator.ability import Ability
-
-Array = NDArray[np.float64]
 
 #: Anti-windup: how far the command u may exceed the limits of the limb, c.
 _WINDUP = 0.05

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.errors import FileError, IknsError, NotEnoughData, naming
 from ikns.experiments.tracking import error_over_time, measure
 from ikns.experiments.visits import (
@@ -22,8 +22,6 @@ from ikns.experiments.visits import (
     read_visit,
     tracking_record,
 )
-
-Array = NDArray[np.float64]
 
 #: Of :class:`ikns.experiments.tracking.Metrics`.
 METRICS = (

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from ikns.arrays import Array
 from ikns.experiments.study.summary.trials import Columns
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

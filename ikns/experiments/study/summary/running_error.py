@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ikns.arrays import Array
 from ikns.errors import InvalidInput
-
-Array = NDArray[np.float64]
 
 #: Range and bin width of the histograms of errors, of 100.
 _FARTHEST, _BIN = 100.0, 0.5

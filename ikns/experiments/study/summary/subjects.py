@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ikns.arrays import Array
 from ikns.calibration.subject import Subject
 from ikns.errors import IknsError
 from ikns.experiments.study.summary.study import Group
 from ikns.live.session import read_run
-
-Array = NDArray[np.float64]
 
 
 class VisitSubject(NamedTuple):
